@@ -1,0 +1,44 @@
+"""Every error relgym raises on purpose; each message says what was expected, what came, and what to do."""
+
+__all__ = [
+    "ActionError",
+    "ConfigError",
+    "ModelFileError",
+    "ObservationError",
+    "QueryError",
+    "RelgymError",
+    "SchemaError",
+    "ShapeError",
+]
+
+
+class RelgymError(Exception):
+    """Base of all errors that relgym raises on purpose."""
+
+
+class ConfigError(RelgymError, ValueError):
+    """Raised when a configuration value, option or argument is outside its documented range."""
+
+
+class SchemaError(RelgymError, ValueError):
+    """Raised when a schema is inconsistent, or a scene doesn't match the schema it claims to follow."""
+
+
+class ShapeError(RelgymError, ValueError):
+    """Raised when a shape can't be used: not convex, degenerate, or of a non-positive size."""
+
+
+class ObservationError(RelgymError, ValueError):
+    """Raised when an observation holds NaN or infinity, a wrong length, or an unknown object or type."""
+
+
+class ActionError(RelgymError, ValueError):
+    """Raised when an action lies outside its action space."""
+
+
+class ModelFileError(RelgymError, ValueError):
+    """Raised when a model file is truncated, edited, of another version, or not a relgym model at all."""
+
+
+class QueryError(RelgymError, LookupError):
+    """Raised when a model is asked about a target, object or type that it doesn't know."""

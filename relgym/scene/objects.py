@@ -1,0 +1,459 @@
+"""What the world is made of: object types, the schema, scenes, transitions and learning targets (design §4).
+
+A *scene* is one state of the world: the objects that are present, each with its type's property vector. All of
+them share one flat float64 array, the thesis' state vector (§1.2.1): the concatenation of the property vectors in
+schema order. Which objects lie where in that array is the scene's `SceneLayout`, shared by all scenes with the same
+objects, so that a batch of scenes is simply a matrix.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.errors import ObservationError, QueryError, SchemaError
+from relgym.scene.shapes import Shape
+
+__all__ = [
+    "ACTION",
+    "POSE",
+    "TASK",
+    "Float1D",
+    "Float2D",
+    "Kinematics",
+    "ObjectType",
+    "Scene",
+    "SceneLayout",
+    "SceneObject",
+    "SceneSchema",
+    "Target",
+    "Transition",
+]
+
+Float1D: TypeAlias = NDArray[np.float64]
+"""A float64 array with one axis."""
+Float2D: TypeAlias = NDArray[np.float64]
+"""A float64 array with two axes; rows are examples or scenes."""
+
+POSE = ("px", "py", "pz", "rx", "ry", "rz", "sx", "sy", "sz")
+"""Position, rotation (Euler angles in radians, applied x, then y, then z) and full extents, of every body (§4.1)."""
+
+ACTION = "action"
+"""Name of the bodiless object whose properties are the agent's output (§1.2.3)."""
+
+TASK = "task"
+"""Name of the bodiless object whose properties are reward and termination."""
+
+_POSE_DEFAULTS = {name: (1.0 if name[0] == "s" else 0.0) for name in POSE}
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectType:
+    """A kind of object: its properties, its shape and what is known of them (§1.2.6).
+
+    Parameters
+    ----------
+    name
+        The type's name; also the name of a unary relation.
+    properties
+        Names of the property vector's elements, in order.
+    shape
+        Canonical shape; ``None`` for a bodiless type, which takes part in functions but not in relations.
+    parent
+        Name of a more general type, itself declared in the schema or not; it too becomes a unary relation.
+    pose
+        Which property supplies which pose component, where it isn't the one of the same name:
+        ``{"px": "x"}``. Components that no property supplies are constant: 0, or 1 for an extent.
+    velocity
+        The three properties that form the velocity along the x, y and z axis, ``None`` where there is none
+        (``("vx", "vy", None)``). Empty: the type has no velocity and counts as resting.
+    exogenous
+        Properties redrawn from outside the world; the model never predicts them (they persist in roll-outs).
+    optional
+        Whether objects of the type may be absent from a scene.
+    """
+
+    name: str
+    properties: tuple[str, ...]
+    shape: Shape | None = None
+    parent: str | None = None
+    pose: Mapping[str, str] = field(default_factory=dict)
+    velocity: tuple[str | None, ...] = ()
+    exogenous: tuple[str, ...] = ()
+    optional: bool = False
+
+    def __post_init__(self) -> None:
+        if len(set(self.properties)) != len(self.properties):
+            raise SchemaError(f"type {self.name!r}: property names must differ, got {self.properties}")
+        named = [*self.pose.values(), *(v for v in self.velocity if v), *self.exogenous]
+        for name in named:
+            if name not in self.properties:
+                raise SchemaError(
+                    f"type {self.name!r}: {name!r} is named as a pose, velocity or exogenous property but is not "
+                    f"among its properties {self.properties}; add it or correct the name"
+                )
+        for component in self.pose:
+            if component not in POSE:
+                raise SchemaError(f"type {self.name!r}: {component!r} is no pose component; expected one of {POSE}")
+        if self.velocity and len(self.velocity) != 3:
+            raise SchemaError(f"type {self.name!r}: velocity needs three entries (x, y, z), got {self.velocity}")
+
+    @property
+    def has_body(self) -> bool:
+        """Whether objects of this type have a shape and take part in spatial relations."""
+        return self.shape is not None
+
+    def pose_columns(self) -> tuple[int, ...]:
+        """Index of the property that supplies each of the nine pose components; -1 where it is constant."""
+        return tuple(self._index_or_missing(self.pose.get(name, name)) for name in POSE)
+
+    def velocity_columns(self) -> tuple[int, int, int]:
+        """Index of the velocity property along x, y and z; -1 where there is none."""
+        names = self.velocity or (None, None, None)
+        x, y, z = (-1 if name is None else self.properties.index(name) for name in names)
+        return x, y, z
+
+    def _index_or_missing(self, name: str) -> int:
+        return self.properties.index(name) if name in self.properties else -1
+
+
+@dataclass(frozen=True, slots=True)
+class Kinematics:
+    """A declared law ``property' = property + step * rate'`` (or ``* rate`` when `uses_next` is false)."""
+
+    type: str
+    property: str
+    rate: str
+    step: float = 1.0
+    uses_next: bool = True
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Target:
+    """What one `PropertyModel` predicts: a property of all objects of a type.
+
+    `given` lists (type, property) pairs whose *next* values may enter the function: targets predicted before this
+    one. They appear as columns with a prime (``truck.vx'``).
+    """
+
+    type: str
+    property: str
+    given: tuple[tuple[str, str], ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.type}.{self.property}"
+
+
+@dataclass(frozen=True)
+class SceneSchema:
+    """Everything about a family of scenes that never changes while an env lives (design §4).
+
+    Parameters
+    ----------
+    types
+        The object types.
+    objects
+        ``(name, type name)`` of every object that may occur, in the order of the state vector. Names are Python
+        identifiers. They match objects across one step and mean nothing else.
+    up
+        The world axis that points up, ``"x"``, ``"y"`` or ``"z"``.
+    planar
+        Whether the world is 2-D: the depth axis (z when y is up, else y) carries no information.
+    kinematics
+        Declared laws; their properties are not learned.
+    targets
+        What to learn by default, in causal order; ``None``: every property that changes.
+    action_scale
+        ``(property, low, high)``: the physical range that [-1, 1] of each component of the env's action stands for.
+    """
+
+    types: tuple[ObjectType, ...]
+    objects: tuple[tuple[str, str], ...]
+    up: str = "y"
+    planar: bool = True
+    kinematics: tuple[Kinematics, ...] = ()
+    targets: tuple[Target, ...] | None = None
+    action_scale: tuple[tuple[str, float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.up not in ("x", "y", "z"):
+            raise SchemaError(f"up must be 'x', 'y' or 'z', got {self.up!r}")
+        names = [t.name for t in self.types]
+        if len(set(names)) != len(names):
+            raise SchemaError(f"type names must differ, got {names}")
+        objects = [name for name, _ in self.objects]
+        if len(set(objects)) != len(objects):
+            raise SchemaError(f"object names must differ, got {objects}")
+        for name, type_name in self.objects:
+            if not name.isidentifier():
+                raise SchemaError(f"object name {name!r} must be a Python identifier (letters, digits, underscore)")
+            if type_name not in names:
+                raise SchemaError(f"object {name!r} has unknown type {type_name!r}; the schema has {names}")
+        for law in self.kinematics:
+            for prop in (law.property, law.rate):
+                if prop not in self.type(law.type).properties:
+                    raise SchemaError(f"kinematics {law}: type {law.type!r} has no property {prop!r}")
+
+    @cached_property
+    def _types(self) -> dict[str, ObjectType]:
+        return {t.name: t for t in self.types}
+
+    @cached_property
+    def _layouts(self) -> dict[tuple[str, ...], SceneLayout]:
+        return {}
+
+    @cached_property
+    def order(self) -> tuple[str, ...]:
+        """Object names in the order of the state vector."""
+        return tuple(name for name, _ in self.objects)
+
+    def type(self, name: str) -> ObjectType:
+        """Return the type of that name; `QueryError` when there is none."""
+        try:
+            return self._types[name]
+        except KeyError:
+            raise QueryError(f"unknown type {name!r}; the schema has {sorted(self._types)}") from None
+
+    def type_of(self, object_name: str) -> ObjectType:
+        """Return the type of the object of that name; `QueryError` when there is none."""
+        for name, type_name in self.objects:
+            if name == object_name:
+                return self._types[type_name]
+        raise QueryError(f"unknown object {object_name!r}; the schema has {list(self.order)}")
+
+    def ancestry(self, type_name: str) -> tuple[str, ...]:
+        """The type's name followed by its parents', nearest first."""
+        chain = [type_name]
+        while (known := self._types.get(chain[-1])) is not None and known.parent is not None:
+            if known.parent in chain:
+                raise SchemaError(f"type {type_name!r} is its own ancestor: {chain}")
+            chain.append(known.parent)
+        return tuple(chain)
+
+    def layout(self, names: Iterable[str] | None = None) -> SceneLayout:
+        """Layout of a scene with these objects (default: all), in schema order; cached."""
+        present = frozenset(self.order if names is None else names)
+        key = tuple(name for name in self.order if name in present)
+        if (layout := self._layouts.get(key)) is None:
+            if len(key) != len(present):
+                raise ObservationError(
+                    f"unknown objects {sorted(present - set(key))}; the schema has {list(self.order)}"
+                )
+            layout = self._layouts[key] = SceneLayout(key, tuple(self.type_of(name) for name in key))
+        return layout
+
+    def scene(self, values: Mapping[str, Any]) -> Scene:
+        """Build a scene from ``{object name: property vector}``, checking lengths and finiteness.
+
+        Raises
+        ------
+        ObservationError
+            An unknown object, a wrong length, NaN or infinity; the message names object and property.
+        """
+        layout = self.layout(values)
+        parts = [_checked(name, t, values[name]) for name, t in zip(layout.names, layout.types, strict=True)]
+        return Scene(self, layout, np.concatenate(parts) if parts else np.empty(0))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Cached layouts are rebuilt on demand; leaving them out keeps pickles small and equal.
+        return {name: value for name, value in self.__dict__.items() if not name.startswith("_")}
+
+    def __hash__(self) -> int:
+        return hash((self.objects, self.up, self.planar))
+
+
+@dataclass(frozen=True)
+class SceneLayout:
+    """Which objects a state vector holds, and where (thesis: signature)."""
+
+    names: tuple[str, ...]
+    types: tuple[ObjectType, ...]
+
+    @cached_property
+    def offsets(self) -> tuple[int, ...]:
+        """Where each object's property vector starts."""
+        offsets, at = [], 0
+        for t in self.types:
+            offsets.append(at)
+            at += len(t.properties)
+        return tuple(offsets)
+
+    @cached_property
+    def width(self) -> int:
+        """Length of the state vector."""
+        return sum(len(t.properties) for t in self.types)
+
+    @cached_property
+    def bodies(self) -> tuple[int, ...]:
+        """Indices of the objects that have a body."""
+        return tuple(i for i, t in enumerate(self.types) if t.has_body)
+
+    @cached_property
+    def _index(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.names)}
+
+    def index(self, name: str) -> int:
+        """Position of the object of that name; `QueryError` when it is not in the scene."""
+        try:
+            return self._index[name]
+        except KeyError:
+            raise QueryError(f"no object {name!r} in the scene; it has {list(self.names)}") from None
+
+    def slice(self, index: int) -> slice:
+        """Where the `index`-th object's property vector lies."""
+        start = self.offsets[index]
+        return slice(start, start + len(self.types[index].properties))
+
+    def column(self, index: int, prop: str) -> int:
+        """Column of one property of the `index`-th object; `QueryError` when its type has no such property."""
+        try:
+            return self.offsets[index] + self.types[index].properties.index(prop)
+        except ValueError:
+            t = self.types[index]
+            raise QueryError(f"type {t.name!r} has no property {prop!r}; it has {t.properties}") from None
+
+    def of_type(self, type_name: str) -> tuple[int, ...]:
+        """Indices of the objects of exactly that type."""
+        return tuple(i for i, t in enumerate(self.types) if t.name == type_name)
+
+
+@dataclass(frozen=True, slots=True)
+class SceneObject:
+    """One object of a scene, for people: name, type and property vector (read-only view)."""
+
+    name: str
+    type: ObjectType
+    values: Float1D
+
+    def __getitem__(self, prop: str) -> float:
+        if prop not in self.type.properties:
+            raise QueryError(f"object {self.name!r} has no property {prop!r}; it has {self.type.properties}")
+        return float(self.values[self.type.properties.index(prop)])
+
+
+class Scene:
+    """One state of the world; immutable.
+
+    Parameters
+    ----------
+    schema
+        The schema it follows.
+    layout
+        Which objects are present.
+    vector
+        float64 array of shape ``(layout.width,)``, in units of the properties. It is made read-only, not copied.
+    """
+
+    __slots__ = ("layout", "schema", "vector")
+
+    def __init__(self, schema: SceneSchema, layout: SceneLayout, vector: Float1D) -> None:
+        vector.flags.writeable = False
+        self.schema = schema
+        self.layout = layout
+        self.vector = vector
+
+    def __getitem__(self, name: str) -> SceneObject:
+        i = self.layout.index(name)
+        return SceneObject(name, self.layout.types[i], self.vector[self.layout.slice(i)])
+
+    def __iter__(self) -> Iterator[SceneObject]:
+        return (self[name] for name in self.layout.names)
+
+    def __len__(self) -> int:
+        return len(self.layout.names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.layout.names
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Scene):
+            return NotImplemented
+        return self.layout == other.layout and bool(np.array_equal(self.vector, other.vector))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scene, (self.schema, self.layout, self.vector.copy())
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{o.name}: {o.type.name}" for o in self)
+        return f"Scene({inside})"
+
+    def values(self) -> dict[str, Float1D]:
+        """Property vectors by object name; copies."""
+        return {o.name: o.values.copy() for o in self}
+
+    def replace(self, changes: Mapping[tuple[str, str], float]) -> Scene:
+        """A scene with ``{(object, property): value}`` changed."""
+        vector = self.vector.copy()
+        for (name, prop), value in changes.items():
+            vector[self.layout.column(self.layout.index(name), prop)] = value
+        return Scene(self.schema, self.layout, vector)
+
+    def pose(self) -> Float2D:
+        """Poses of all bodies, shape ``(len(layout.bodies), 9)``, in the order of `POSE`."""
+        return poses(self.layout, self.vector[None])[0]
+
+
+def poses(layout: SceneLayout, vectors: Float2D) -> NDArray[np.float64]:
+    """Poses of all bodies in a batch of scenes.
+
+    Parameters
+    ----------
+    layout
+        The layout that all scenes share.
+    vectors
+        State vectors, shape ``(n, layout.width)``.
+
+    Returns
+    -------
+    Shape ``(n, len(layout.bodies), 9)``, components in the order of `POSE`.
+    """
+    columns, constants = pose_columns(layout)
+    padded = np.concatenate([vectors, np.broadcast_to(constants, (len(vectors), 2))], axis=1)
+    return padded[:, columns]
+
+
+def pose_columns(layout: SceneLayout) -> tuple[NDArray[np.intp], Float1D]:
+    """Columns of `poses` in a state vector that the constants (0, 1) were appended to; cached on the layout."""
+    cached = layout.__dict__.get("_pose_columns")
+    if cached is None:
+        columns = np.empty((len(layout.bodies), len(POSE)), dtype=np.intp)
+        for row, i in enumerate(layout.bodies):
+            for k, own in enumerate(layout.types[i].pose_columns()):
+                default = layout.width + int(_POSE_DEFAULTS[POSE[k]])
+                columns[row, k] = default if own < 0 else layout.offsets[i] + own
+        cached = layout.__dict__["_pose_columns"] = (columns, np.array([0.0, 1.0]))
+    result: tuple[NDArray[np.intp], Float1D] = cached
+    return result
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """One step of the world: the scene before (with the action), and the scene after (§1.2.3)."""
+
+    before: Scene
+    after: Scene
+
+
+def _checked(name: str, t: ObjectType, values: Sequence[float] | Float1D) -> Float1D:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != (len(t.properties),):
+        raise ObservationError(
+            f"object {name!r} of type {t.name!r}: expected {len(t.properties)} properties {t.properties}, "
+            f"got an array of shape {array.shape}"
+        )
+    if not math.isfinite(array.sum()):
+        for prop, value in zip(t.properties, array, strict=True):
+            if not math.isfinite(value):
+                raise ObservationError(
+                    f"object {name!r}, property {prop!r}: expected a finite number, got {value}; "
+                    "check the env's observation before it is learned from"
+                )
+    return array
