@@ -1,0 +1,241 @@
+"""All free parameters of relgym, as frozen dataclasses.
+
+Every field says what it means, its symbol and section in the thesis where it has one, its default and range,
+and what raising it does. Nothing here imports the rest of the package.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from relgym.errors import ConfigError
+
+__all__ = ["ClassificationConfig", "ClusteringConfig"]
+
+
+@dataclass(frozen=True, slots=True)
+class ClassificationConfig:
+    """Preconditions: when does a mode hold, and which object plays which role (§3.4, §3.5).
+
+    Parameters
+    ----------
+    votes
+        How binary classifiers are combined (§3.4.3). ``"hard"``: one vote each, as in the thesis. ``"soft"``
+        (default): log-probabilities of the clause that fired, so that one unsure pair decides nothing.
+    context
+        Which objects clauses of mode classifiers speak of. ``"touching"``: the target and all that touch it,
+        or else the nearest one. ``"all"``: every object. ``"auto"`` (default): both vocabularies are tried
+        for every pair, the shorter description wins, ``"touching"`` on ties.
+    contact_facts
+        Whether relations and features that the vocabulary marks as contact facts are offered (approach
+        velocity, normal, slip). Default true; the thesis had none, hence its confusion of bouncing and
+        leaving (§4.8).
+    numeric_literals
+        Whether clauses may hold numeric thresholds. Default true; the thesis kept numbers to trees (§3.4.4).
+    mode_function_features
+        Whether the two modes' predictions and their difference are offered as numbers. Default true.
+        Boundaries of friction and halting become one threshold.
+    ambiguous
+        What to do with an example that both modes of a pair explain. ``"drop"`` (default): it teaches the
+        pair nothing. ``"keep"``: it counts for the mode it was assigned to, as in the thesis.
+    both_polarities
+        Whether either mode of a pair may be the positive class (§3.4.5). Default true.
+    literal_choice
+        What ChooseLiteral maximises (Algorithm 2): ``"gain"`` (default): FOIL's information gain, as in the
+        original system; ``"negatives"``: the negatives filtered out, as printed.
+    max_literals
+        Longest clause, in literals. Default 5 (as the original), range >= 1. Raising it admits finer
+        distinctions at a cost that grows linearly.
+    max_clauses
+        Most clauses of one definition. Default 8, range >= 1.
+    max_new_variables
+        Most existential variables of one clause. Default 2, range >= 0. Cost grows with objects to this
+        power.
+    beam
+        Clauses grown at the same time. Default 4, range >= 1; 1 is the greedy search of Algorithm 2. Raising
+        it finds conjunctions whose first literal gains nothing alone, at proportional cost.
+    mdl
+        Whether a clause must pay for its bits in exceptions explained. Default true.
+    min_precision
+        Least share of positives among the examples that a clause covers, weighted. Default 0.5, range [0, 1]
+        (the original: 0.9 on a held-out quarter). Raising it leaves more to the tree of the fall-through.
+    clause_tree_threshold
+        A clause whose false-positive rate exceeds this gets a decision tree (§3.4.4). Default 0.01, range [0,
+        1] (thesis-like: 0.05). Raising it gives fewer trees, that overfit less and separate less.
+    fall_through_tree_threshold
+        The same for the false-negative rate of the whole disjunction. Default 0.02, range [0, 1]
+        (thesis-like: 0.2).
+    tree_min_leaf
+        Fewest examples on either side of a split. Default 3, range >= 1 (the original: no split of 3 or
+        fewer).
+    tree_max_depth
+        Deepest tree, in splits. Default 6, range >= 1.
+    class_balance
+        Exponent in [0, 1] by which classes are balanced: each is weighted by (its share) ** -class_balance.
+        Default 0: description length counts a rare class' examples dearly already; 1 gives both classes equal
+        say, which makes frequent modes suffer where the data are noisy.
+    exemplars_per_state
+        Examples kept per mode and relational state. Default 30, range >= 1. Raising it sharpens thresholds
+        and costs time and memory in proportion.
+    noise_per_state
+        The same for noise, whose examples may still become a rare mode. Default 200, range >= 1.
+    max_exemplars
+        Examples kept in all. Default 6000, range >= 100.
+    repair
+        Whether a contradicted definition is first mended (a threshold moved, a clause dropped or added) and
+        only learned anew where that isn't enough (§5.1). Default true.
+    relearn_growth
+        An imperfect or mended pair is learned anew when its rarer mode's examples have grown by this factor.
+        Default 2, range > 1. Raising it saves time and lets definitions age.
+    """
+
+    votes: Literal["soft", "hard"] = "soft"
+    context: Literal["auto", "touching", "all"] = "auto"
+    contact_facts: bool = True
+    numeric_literals: bool = True
+    mode_function_features: bool = True
+    ambiguous: Literal["drop", "keep"] = "drop"
+    both_polarities: bool = True
+    literal_choice: Literal["gain", "negatives"] = "gain"
+    max_literals: int = 5
+    max_clauses: int = 8
+    max_new_variables: int = 2
+    beam: int = 4
+    mdl: bool = True
+    min_precision: float = 0.5
+    clause_tree_threshold: float = 0.01
+    fall_through_tree_threshold: float = 0.02
+    tree_min_leaf: int = 3
+    tree_max_depth: int = 6
+    class_balance: float = 0.0
+    exemplars_per_state: int = 30
+    noise_per_state: int = 200
+    max_exemplars: int = 6000
+    repair: bool = True
+    relearn_growth: float = 2.0
+
+    def __post_init__(self) -> None:
+        _one_of(self, votes=("soft", "hard"), context=("auto", "touching", "all"))
+        _one_of(self, ambiguous=("drop", "keep"), literal_choice=("gain", "negatives"))
+        _at_least(self, 1, "max_literals", "max_clauses", "beam", "tree_min_leaf", "tree_max_depth")
+        _at_least(self, 1, "exemplars_per_state", "noise_per_state")
+        _at_least(self, 0, "max_new_variables")
+        _at_least(self, 100, "max_exemplars")
+        _unit(self, "min_precision", "clause_tree_threshold", "fall_through_tree_threshold", "class_balance")
+        if not self.relearn_growth > 1:
+            raise ConfigError(f"relearn_growth must be greater than 1, got {self.relearn_growth}")
+
+    @classmethod
+    def thesis(cls, **changes: Any) -> ClassificationConfig:
+        """§3.4 as published: hard votes, only relations, greedy search, few trees, arbitrary labels.
+
+        Mended where it can't work as printed: the inner loop of Algorithm 2 stops at a clause that describes
+        more than it explains and never gives up all positives; a rejected clause doesn't end learning; errors
+        are counted on all examples.
+        """
+        return replace(_THESIS, **changes)
+
+    @classmethod
+    def original(cls, **changes: Any) -> ClassificationConfig:
+        """The constants of the thesis' own system: FOIL gain, 90 % precision, trees above 25 % errors."""
+        trees = {"clause_tree_threshold": 0.25, "fall_through_tree_threshold": 0.25}
+        return replace(_THESIS, literal_choice="gain", mdl=False, min_precision=0.9, **(trees | changes))
+
+
+@dataclass(frozen=True, slots=True)
+class ClusteringConfig:
+    """Modes: discovery, assignment and unification (§3.2).
+
+    Parameters
+    ----------
+    noise_std
+        σ of §3.2.2, the standard deviation of the noise on a target, in its units. ``"auto"`` (default) estimates
+        it per target from the data and their precision; a positive number overrides the estimate. Too large folds
+        behaviours into one mode, too small learns none (§4.6).
+    inlier_stds
+        An example fits a function when its residual is at most this many σ. Default 4 (thesis 2, original 3).
+        Raising it admits more of a noisy mode's tail.
+    tail_stds
+        Noise within this many σ of a known mode never seeds another. Default 8. Raising it prevents duplicates of a
+        noisy frequent mode and hides behaviours that differ by less.
+    min_examples
+        T of §3.2.2, examples needed to found a mode; it is deleted below half of them. ``"auto"`` (default): 10
+        where data are exact, because each further example then verifies the function to many digits, up to 40 (the
+        thesis' value) the noisier they are. Raising it learns later and fewer modes.
+    draws
+        N of §3.2.2, samples drawn per search. Default 1536 (thesis 2000). Raising it finds rarer modes sooner.
+    max_terms
+        Largest number of weights in a mode. Default 8.
+    own_only
+        Whether only the target's own properties (and bodiless objects') may enter. Default false.
+    unify_ratio
+        R_unify of §3.2.5: share of the examples of *each* side that a unified function must explain. Default 0.995
+        (thesis 0.9).
+    support
+        Number of examples that must back each weight: what fewer than this many leverage points alone determine
+        isn't learned. Default 3.
+    refit_growth
+        A mode is refitted when its examples have grown by this factor. Default 2.
+    stickiness
+        Whether, of the modes that explain an example equally well, those with fewest parameters win ("simple",
+        default) or, as in the original program, whichever is nearest ("nearest").
+    """
+
+    noise_std: float | Literal["auto"] = "auto"
+    inlier_stds: float = 4.0
+    tail_stds: float = 8.0
+    min_examples: int | Literal["auto"] = "auto"
+    draws: int = 1536
+    max_terms: int = 8
+    own_only: bool = False
+    unify_ratio: float = 0.995
+    support: int = 3
+    refit_growth: float = 2.0
+    stickiness: Literal["simple", "nearest"] = "simple"
+
+    def __post_init__(self) -> None:
+        _one_of(self, stickiness=("simple", "nearest"))
+        _at_least(self, 1, "draws", "support")
+        _at_least(self, 0, "max_terms")
+        if self.noise_std != "auto" and not (isinstance(self.noise_std, float) and self.noise_std > 0):
+            raise ConfigError(f"noise_std must be 'auto' or a positive float, got {self.noise_std!r}")
+        if self.min_examples != "auto" and not (isinstance(self.min_examples, int) and self.min_examples >= 4):
+            raise ConfigError(f"min_examples must be 'auto' or an int >= 4, got {self.min_examples!r}")
+        if not 0.5 <= self.unify_ratio <= 1.0:
+            raise ConfigError(f"unify_ratio must lie in [0.5, 1], got {self.unify_ratio}")
+        if not self.refit_growth > 1.0:
+            raise ConfigError(f"refit_growth must be greater than 1, got {self.refit_growth}")
+
+
+def _one_of(config: object, **allowed: tuple[str, ...]) -> None:
+    for name, values in allowed.items():
+        if getattr(config, name) not in values:
+            raise ConfigError(f"{name} must be one of {values}, got {getattr(config, name)!r}")
+
+
+def _at_least(config: object, low: int, *names: str) -> None:
+    for name in names:
+        if not getattr(config, name) >= low:
+            raise ConfigError(f"{name} must be at least {low}, got {getattr(config, name)!r}")
+
+
+def _unit(config: object, *names: str) -> None:
+    for name in names:
+        if not 0 <= getattr(config, name) <= 1:
+            raise ConfigError(f"{name} must lie in [0, 1], got {getattr(config, name)!r}")
+
+
+_THESIS = ClassificationConfig(
+    votes="hard",
+    context="touching",
+    contact_facts=False,
+    numeric_literals=False,
+    mode_function_features=False,
+    ambiguous="keep",
+    literal_choice="negatives",
+    beam=1,
+    clause_tree_threshold=0.05,
+    fall_through_tree_threshold=0.2,
+    repair=False,
+)
