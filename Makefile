@@ -1,0 +1,77 @@
+# Every target sets itself up: a fresh machine needs Python >= 3.11 and make, nothing else. The environment lies in
+# .venv and is made once; pip's settings (PIP_INDEX_URL, PIP_EXTRA_INDEX_URL, pip.conf) are the caller's.
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+PYTEST := $(BIN)/python -m pytest
+
+# A stamp is newer than what it was made from, so a second call installs nothing.
+VIZ := $(VENV)/.installed-viz
+DEV := $(VENV)/.installed-dev
+SB3 := $(VENV)/.installed-sb3
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-sb3 slow bench coverage lint format types check wheel clean
+
+help:            ## show this list
+	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
+
+demo: $(VIZ)     ## learn the laws of both worlds and print them
+	$(BIN)/relgym demo
+
+test: $(DEV)     ## all tests but the slow ones
+	$(PYTEST) -n 2
+
+test-sb3: $(SB3) ## the tests that need Stable-Baselines3 (installs torch)
+	$(PYTEST) -m "sb3 and not slow"
+
+slow: $(DEV)     ## the tests that take minutes
+	$(PYTEST) -m "slow and not sb3"
+
+bench: $(DEV)    ## the benchmarks
+	$(PYTEST) tests/bench -m bench --benchmark-enable --benchmark-only
+
+coverage: $(DEV) ## which lines the tests never reach
+	$(BIN)/coverage run -m pytest
+	$(BIN)/coverage report --skip-covered
+
+lint: $(DEV)     ## ruff: rules and format
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+format: $(DEV)   ## let ruff mend what it can
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+types: $(DEV)    ## mypy, strict
+	$(BIN)/mypy
+
+check: lint types test ## what must pass before every commit
+
+# build/ would hand modules deleted since to the new wheel.
+wheel: $(VIZ)    ## build dist/relgym-*.whl
+	rm -rf build dist
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	rm -rf build
+
+clean:           ## remove all that was installed, built and cached
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .coverage
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)/pyvenv.cfg:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "relgym needs Python >= 3.11, this is %d.%d: make PYTHON=python3.11 ..." % sys.version_info[:2])'
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(VIZ): $(VENV)/pyvenv.cfg pyproject.toml constraints.txt
+	$(PIP) -e '.[viz]'
+	@touch $@
+
+$(DEV): $(VIZ)
+	$(PIP) -e '.[viz,dev]'
+	@touch $@
+
+$(SB3): $(DEV)
+	$(PIP) -e '.[viz,dev,sb3]'
+	@touch $@
