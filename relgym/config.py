@@ -150,36 +150,37 @@ class ClusteringConfig:
     Parameters
     ----------
     noise_std
-        σ of §3.2.2, the standard deviation of the noise on a target, in its units. ``"auto"`` (default) estimates
-        it per target from the data and their precision; a positive number overrides the estimate. Too large folds
-        behaviours into one mode, too small learns none (§4.6).
+        σ of §3.2.2, the standard deviation of the noise on a target, in its units. ``"auto"`` (default)
+        estimates it per target from the data and their precision; a positive number overrides the estimate.
+        Too large folds behaviours into one mode, too small learns none (§4.6).
     inlier_stds
         An example fits a function when its residual is at most this many σ. Default 4 (thesis 2, original 3).
         Raising it admits more of a noisy mode's tail.
     tail_stds
-        Noise within this many σ of a known mode never seeds another. Default 8. Raising it prevents duplicates of a
-        noisy frequent mode and hides behaviours that differ by less.
+        Noise within this many σ of a known mode never seeds another. Default 8. Raising it prevents
+        duplicates of a noisy frequent mode and hides behaviours that differ by less.
     min_examples
-        T of §3.2.2, examples needed to found a mode; it is deleted below half of them. ``"auto"`` (default): 10
-        where data are exact, because each further example then verifies the function to many digits, up to 40 (the
-        thesis' value) the noisier they are. Raising it learns later and fewer modes.
+        T of §3.2.2, examples needed to found a mode; it is deleted below half of them. ``"auto"`` (default):
+        10 where data are exact, because each further example then verifies the function to many digits, up to
+        40 (the thesis' value) the noisier they are. Raising it learns later and fewer modes.
     draws
-        N of §3.2.2, samples drawn per search. Default 1536 (thesis 2000). Raising it finds rarer modes sooner.
+        N of §3.2.2, samples drawn per search. Default 1536 (thesis 2000). Raising it finds rarer modes
+        sooner.
     max_terms
         Largest number of weights in a mode. Default 8.
     own_only
         Whether only the target's own properties (and bodiless objects') may enter. Default false.
     unify_ratio
-        R_unify of §3.2.5: share of the examples of *each* side that a unified function must explain. Default 0.995
-        (thesis 0.9).
+        R_unify of §3.2.5: share of the examples of *each* side that a unified function must explain. Default
+        0.995 (thesis 0.9).
     support
-        Number of examples that must back each weight: what fewer than this many leverage points alone determine
-        isn't learned. Default 3.
+        Number of examples that must back each weight: what fewer than this many leverage points alone
+        determine isn't learned. Default 3.
     refit_growth
         A mode is refitted when its examples have grown by this factor. Default 2.
     stickiness
-        Whether, of the modes that explain an example equally well, those with fewest parameters win ("simple",
-        default) or, as in the original program, whichever is nearest ("nearest").
+        Whether, of the modes that explain an example equally well, those with fewest parameters win
+        ("simple", default) or, as in the original program, whichever is nearest ("nearest").
     """
 
     noise_std: float | Literal["auto"] = "auto"
@@ -200,7 +201,9 @@ class ClusteringConfig:
         _at_least(self, 0, "max_terms")
         if self.noise_std != "auto" and not (isinstance(self.noise_std, float) and self.noise_std > 0):
             raise ConfigError(f"noise_std must be 'auto' or a positive float, got {self.noise_std!r}")
-        if self.min_examples != "auto" and not (isinstance(self.min_examples, int) and self.min_examples >= 4):
+        if self.min_examples != "auto" and not (
+            isinstance(self.min_examples, int) and self.min_examples >= 4
+        ):
             raise ConfigError(f"min_examples must be 'auto' or an int >= 4, got {self.min_examples!r}")
         if not 0.5 <= self.unify_ratio <= 1.0:
             raise ConfigError(f"unify_ratio must lie in [0.5, 1], got {self.unify_ratio}")

@@ -1,0 +1,1 @@
+"""Modes, §3.2: discovery, roles, assignment and unification."""

@@ -1,0 +1,368 @@
+"""The clusterer of one target: EM, discovery and unification over a stream of examples (§3.2, Figure 3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.discovery import Scale, find_mode, least_examples
+from relgym.clustering.em import Cluster, preferred, refit
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.mode import NOISE, Mode
+from relgym.clustering.noise import estimate_noise, rounding_noise
+from relgym.clustering.roles import identify_roles
+from relgym.clustering.unification import covering, unified
+from relgym.config import ClusteringConfig
+from relgym.numeric.stepwise import LinearFit
+from relgym.scene.objects import Target
+
+__all__ = ["ClusterReport", "ModeClusterer"]
+
+ESTIMATE_AT = (64, 512, 4096)
+"""Numbers of examples after which the noise is estimated anew."""
+
+MOST_DISCOVERIES = 4
+"""New modes per example at most; what is left in the noise waits for the next one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterReport:
+    """What one example changed.
+
+    Attributes
+    ----------
+    mode
+        Id of the mode the example was assigned to; `NOISE` if none explains it.
+    fits
+        Ids of all modes that explain it.
+    created, removed
+        Ids of modes that came and went.
+    """
+
+    mode: int
+    fits: tuple[int, ...]
+    created: tuple[int, ...] = ()
+    removed: tuple[int, ...] = ()
+
+    @property
+    def changed(self) -> bool:
+        """Whether the set of modes is another than before."""
+        return bool(self.created or self.removed)
+
+
+@dataclass(slots=True)
+class _Search:
+    """When to search the noise of one slot signature next."""
+
+    waiting: int = 0
+    failures: int = 0
+    seen: int = field(default=0)
+
+
+class ModeClusterer:
+    """Segments a target's examples into modes, one example at a time.
+
+    Parameters
+    ----------
+    target
+        The target whose examples it sees.
+    config
+        Free parameters.
+    seed
+        Seed of the random draws; the same examples and seed give the same modes.
+
+    Notes
+    -----
+    Cost per example: one evaluation of every mode, O(modes * terms * assignments). A search runs only when an
+    unexplained example came, ever more rarely while searches fail. Every loop ends: a search that finds a mode
+    shrinks the noise, a unification lowers the number of modes, and both are counted.
+    """
+
+    def __init__(self, target: Target, config: ClusteringConfig, *, seed: int) -> None:
+        self.target = target
+        self.config = config
+        self.clusters: dict[int, Cluster] = {}
+        self.scale = Scale(1e-12, config.inlier_stds, config.tail_stds)
+        self._rng = np.random.default_rng(seed)
+        self._y = np.zeros(256)
+        self._label = np.zeros(256, dtype=np.int32)
+        self._rows = np.zeros(256, dtype=np.int64)
+        self._size = 0
+        self._next_id = 1
+        self._searches: dict[int, _Search] = {}
+        self._largest = 0.0
+
+    # ------------------------------------------------------------------ what is known
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Target values of all examples, shape ``(n,)``."""
+        return self._y[: self._size]
+
+    @property
+    def labels(self) -> NDArray[np.int32]:
+        """Mode id of every example, shape ``(n,)``."""
+        return self._label[: self._size]
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """Row of every example in the example table, shape ``(n,)``."""
+        return self._rows[: self._size]
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """All modes but noise, by id."""
+        counts = np.bincount(self.labels, minlength=self._next_id)
+        return tuple(c.mode.with_examples(int(counts[i])) for i, c in sorted(self.clusters.items()))
+
+    @property
+    def noise_examples(self) -> int:
+        """Number of examples no mode explains."""
+        return int((self.labels == NOISE).sum())
+
+    def fits(self, table: ExampleTable, examples: NDArray[np.intp]) -> tuple[tuple[int, ...], NDArray[np.bool_]]:
+        """Which modes explain the given examples: ids and a boolean array ``(len(examples), modes)``."""
+        ids = tuple(sorted(self.clusters))
+        found = np.zeros((len(examples), len(ids)), dtype=bool)
+        for k, i in enumerate(ids):
+            error, _ = self.clusters[i].errors(table, self.rows[examples], self.y[examples], self.scale)
+            found[:, k] = error <= self.scale.tolerance
+        return ids, found
+
+    # ------------------------------------------------------------------ one example (Figure 3.2)
+    def learn_one(self, table: ExampleTable, row: int, y: float) -> ClusterReport:
+        """Take up one example: assign it, and where it is news, look for modes.
+
+        Parameters
+        ----------
+        table
+            The rows of the target's type.
+        row
+            Number of the example's row in it.
+        y
+            The property's next value.
+        """
+        example = self._append(table, row, y)
+        errors = self._errors_of(table, example)
+        fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
+        if fitting:
+            mode = preferred(fitting, errors, self.clusters, self.scale, self.config)
+            self._label[example] = mode
+            self._grow(table, mode)
+            return ClusterReport(mode, tuple(sorted(fitting)))
+        if errors and min(errors.values()) <= self.scale.tail:
+            return ClusterReport(NOISE, ())  # a known mode's tail seeds nothing
+        before = set(self.clusters)
+        self._discover(table, example)
+        after = set(self.clusters)
+        if before == after:
+            return ClusterReport(NOISE, ())
+        ids, fits = self.fits(table, np.array([example]))
+        explained = tuple(i for i, ok in zip(ids, fits[0], strict=True) if ok)
+        created, removed = tuple(sorted(after - before)), tuple(sorted(before - after))
+        return ClusterReport(int(self._label[example]), explained, created, removed)
+
+    def _append(self, table: ExampleTable, row: int, y: float) -> int:
+        if self._size == len(self._y):
+            self._y = np.pad(self._y, (0, self._size))
+            self._label = np.pad(self._label, (0, self._size))
+            self._rows = np.pad(self._rows, (0, self._size))
+        self._y[self._size], self._rows[self._size] = y, row
+        self._label[self._size] = NOISE
+        self._size += 1
+        core = table.signatures[table.signature_ids[row]].core
+        largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
+        if largest > self._largest or self._size in ESTIMATE_AT:
+            self._largest = max(largest, self._largest)
+            self._rescale(table)
+        return self._size - 1
+
+    def _errors_of(self, table: ExampleTable, example: int) -> dict[int, float]:
+        rows, y = self.rows[example : example + 1], self.y[example : example + 1]
+        return {i: float(c.errors(table, rows, y, self.scale)[0][0]) for i, c in self.clusters.items()}
+
+    def _grow(self, table: ExampleTable, mode: int) -> None:
+        """§3.2.4, M-step: refit a mode whose examples have multiplied since its last fit."""
+        cluster = self.clusters[mode]
+        cluster.unfitted += 1
+        if cluster.unfitted >= (self.config.refit_growth - 1.0) * cluster.fitted:
+            members = np.flatnonzero(self.labels == mode)
+            self.clusters[mode] = refit(cluster, table, self.rows[members], self.y[members], self.scale)
+
+    # ------------------------------------------------------------------ noise scale
+    def _rescale(self, table: ExampleTable) -> None:
+        if self.config.noise_std != "auto":
+            self.scale = replace(self.scale, sigma=float(self.config.noise_std))
+            return
+        n = self._size
+        y, rows = self.y, self.rows
+        signature = table.signatures[table.signature_ids[rows[-1]]]
+        floor = rounding_noise(np.array([[self._largest]]), y[:256])
+        known = self.scale.sigma
+        if n in ESTIMATE_AT:
+            x = table.x[rows, : signature.own]
+            estimate = estimate_noise(x, y, table.strata[rows], floor=floor)
+            if estimate > 4.0 * floor and not 0.5 < estimate / known < 2.0:
+                self.scale = replace(self.scale, sigma=estimate)
+                self._start_over(table)
+            elif estimate > 4.0 * floor:
+                return
+        self.scale = replace(self.scale, sigma=max(floor, self.scale.sigma))
+
+    def _start_over(self, table: ExampleTable) -> None:
+        """Another noise scale: forget the modes, all examples become noise and are searched again."""
+        self.clusters.clear()
+        self._searches.clear()
+        self._label[: self._size] = NOISE
+
+    # ------------------------------------------------------------------ discovery (§3.2.2)
+    def _discover(self, table: ExampleTable, example: int) -> None:
+        signature = int(table.signature_ids[self.rows[example]])
+        search = self._searches.setdefault(signature, _Search())
+        search.waiting += 1
+        if search.waiting <= search.failures // 6:
+            return
+        for _ in range(MOST_DISCOVERIES):
+            if not self._search_once(table, signature, fresh=search.waiting):
+                search.failures += 1
+                break
+            search.failures = 0
+        search.waiting = 0
+
+    def _pool(self, table: ExampleTable, signature: int | None) -> NDArray[np.intp]:
+        """Noise examples (of one signature) that aren't some mode's tail, oldest first."""
+        pool = np.flatnonzero(self.labels == NOISE)
+        if signature is not None:
+            pool = pool[table.signature_ids[self.rows[pool]] == signature]
+        if len(pool) and self.clusters:
+            near = np.full(len(pool), np.inf)
+            for cluster in self.clusters.values():
+                near = np.minimum(near, cluster.errors(table, self.rows[pool], self.y[pool], self.scale)[0])
+            pool = pool[near > self.scale.tail]
+        return pool
+
+    def _search_once(self, table: ExampleTable, signature: int, fresh: int) -> bool:
+        pool = self._pool(table, signature)
+        y = self.y[pool]
+        if len(pool) < least_examples(y, self.scale, self.config):
+            return False
+        slots = table.signatures[signature]
+        order = slots.preference(self.target.property)
+        rows = self.rows[pool]
+        found = find_mode(
+            table.x[rows][:, order],
+            y,
+            table.strata[rows],
+            own=slots.own + (self.target.property in _pose_names(slots)),
+            fresh=fresh,
+            scale=self.scale,
+            config=self.config,
+            rng=self._rng,
+        )
+        if found is None:
+            return False
+        self._adopt(table, signature, _reordered(found.fit, order), pool[found.inliers])
+        return True
+
+    def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit, members: NDArray[np.intp]) -> None:
+        """Make a mode of a function, unify it with the known ones (§3.2.5), reassign the examples (§3.2.4)."""
+        cluster = self._cluster(fit, table, signature)
+        members = self._explained(table, cluster, self._noise())
+        absorbed: list[int] = []
+        for i in sorted(self.clusters, key=lambda k: (-int((self.labels == k).sum()), k)):
+            rival = self.clusters[i]
+            theirs = np.flatnonzero(self.labels == i)
+            if covering(cluster, table, self.rows[theirs], self.y[theirs], self.scale, self.config):
+                absorbed.append(i)
+                continue
+            general = unified(
+                table, self.rows, self.y, members, theirs,
+                target=self.target, scale=self.scale, config=self.config, rng=self._rng,
+                simpler_than=(cluster.mode, rival.mode),
+            )
+            if general is not None:
+                cluster = self._cluster(general[1], table, general[0])
+                absorbed.append(i)
+                members = np.concatenate([members, theirs])
+        for i in absorbed:
+            self._remove(i)
+        new = self._next_id
+        self._next_id += 1
+        self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
+        self._reassign(table, new)
+
+    def _cluster(self, fit: LinearFit, table: ExampleTable, signature: int) -> Cluster:
+        roles = identify_roles(fit, table.signatures[signature])
+        return Cluster(Mode(0, self.target, roles, fit.intercept, sigma=self.scale.sigma))
+
+    def _noise(self) -> NDArray[np.intp]:
+        return np.flatnonzero(self.labels == NOISE)
+
+    def _explained(self, table: ExampleTable, cluster: Cluster, examples: NDArray[np.intp]) -> NDArray[np.intp]:
+        error, _ = cluster.errors(table, self.rows[examples], self.y[examples], self.scale)
+        return examples[error <= self.scale.tolerance]
+
+    def _remove(self, mode: int) -> None:
+        """A deleted mode gives its examples back to the noise, from where others take them."""
+        del self.clusters[mode]
+        self._label[: self._size][self.labels == mode] = NOISE
+
+    def _reassign(self, table: ExampleTable, new: int) -> None:
+        """E-step for a new mode: it takes what it explains from the noise and from modes it is preferred to."""
+        everyone = self._explained(table, self.clusters[new], np.arange(self._size))
+        for example in everyone:
+            held = int(self._label[example])
+            if held == NOISE or _simpler(self.clusters[new].mode, self.clusters[held].mode):
+                self._label[example] = new
+        self._prune(table)
+        for i in [new] if new in self.clusters else []:
+            members = np.flatnonzero(self.labels == i)
+            self.clusters[i] = refit(self.clusters[i], table, self.rows[members], self.y[members], self.scale)
+
+    def _prune(self, table: ExampleTable) -> None:
+        """Delete modes that were left with fewer than T / 2 examples; their examples find other homes."""
+        least = least_examples(self.y, self.scale, self.config) / 2
+        for i in sorted(self.clusters):
+            if (self.labels == i).sum() >= least or len(self.clusters) == 1:
+                continue
+            orphans = np.flatnonzero(self.labels == i)
+            self._remove(i)
+            self._rehome(table, orphans)
+
+    def _rehome(self, table: ExampleTable, examples: NDArray[np.intp]) -> None:
+        ids, fits = self.fits(table, examples)
+        for example, row in zip(examples, fits, strict=True):
+            fitting = [i for i, ok in zip(ids, row, strict=True) if ok]
+            if fitting:
+                errors = self._errors_of(table, int(example))
+                self._label[example] = preferred(fitting, errors, self.clusters, self.scale, self.config)
+
+    # ------------------------------------------------------------------ saving
+    def to_json(self) -> dict[str, Any]:
+        """The modes and the noise scale; examples are kept elsewhere."""
+        return {"sigma": self.scale.sigma, "next_id": self._next_id, "modes": [m.to_json() for m in self.modes]}
+
+    def restore(self, data: dict[str, Any]) -> None:
+        """Take over what `to_json` wrote."""
+        self.scale = replace(self.scale, sigma=float(data["sigma"]))
+        self._next_id = int(data["next_id"])
+        modes: Iterable[Mode] = (Mode.from_json(self.target, m) for m in data["modes"])
+        self.clusters = {m.id: Cluster(m, fitted=max(1, m.examples)) for m in modes}
+
+
+def _simpler(mode: Mode, rival: Mode) -> bool:
+    return mode.parameters < rival.parameters
+
+
+def _pose_names(slots: Any) -> set[str]:
+    own = slots.types[0]
+    return {own.properties[k] for k in own.pose_columns() if k >= 0}
+
+
+def _reordered(fit: LinearFit, order: NDArray[np.intp]) -> LinearFit:
+    """The same function on columns before they were put in order of preference."""
+    pairs = sorted((int(order[c]), w) for c, w in zip(fit.columns, fit.weights, strict=True))
+    return LinearFit(tuple(c for c, _ in pairs), tuple(w for _, w in pairs), fit.intercept, fit.rss)

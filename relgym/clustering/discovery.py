@@ -1,0 +1,185 @@
+"""Finding a new mode among the noise (§3.2.2), and judging whether data identify a function."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.config import ClusteringConfig
+from relgym.numeric.ransac import Consensus, consensus, refine
+from relgym.numeric.stepwise import LinearFit, least_squares
+
+__all__ = ["Scale", "find_mode", "identified", "least_examples"]
+
+SEARCH = 400
+"""At most this many rows are searched at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Noise of a target and the tolerances that follow from it, in units of the target."""
+
+    sigma: float
+    inlier_stds: float
+    tail_stds: float
+
+    @property
+    def tolerance(self) -> float:
+        """Largest residual of an example that a function explains."""
+        return self.inlier_stds * self.sigma
+
+    @property
+    def tail(self) -> float:
+        """Residual up to which an unexplained example may be a known mode's tail."""
+        return self.tail_stds * self.sigma
+
+
+def least_examples(y: NDArray[np.float64], scale: Scale, config: ClusteringConfig) -> int:
+    """T: examples that found a mode, from the number of bits by which each verifies the function."""
+    if config.min_examples != "auto":
+        return int(config.min_examples)
+    spread = float(np.ptp(y)) if len(y) else 0.0
+    bits = math.log2(max(spread / scale.tolerance, 2.0))
+    share = min(max((24.0 - bits) / 12.0, 0.0), 1.0)
+    return round(10 + 30 * share)
+
+
+def find_mode(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    strata: NDArray[np.integer],
+    *,
+    own: int,
+    fresh: int,
+    scale: Scale,
+    config: ClusteringConfig,
+    rng: np.random.Generator,
+) -> Consensus | None:
+    """Search rows of one slot signature for a function that enough of them obey.
+
+    Parameters
+    ----------
+    x, y, strata
+        Rows ``(n, d)`` with columns in order of preference, responses and relational states, oldest first.
+    own
+        Number of leading columns that belong to the target or to bodiless objects: tried alone first, because a law
+        of the object's own state needs smaller samples and is the simpler law.
+    fresh
+        Number of rows at the end that no earlier search has seen: each sample holds one of them.
+    """
+    needed = least_examples(y, scale, config)
+    rows = _recent(len(y), fresh, rng)
+    for columns, terms, size in _plans(x.shape[1], own, config):
+        if len(rows) < max(needed, size):
+            continue
+        found = consensus(
+            x[rows][:, :columns],
+            y[rows],
+            sigma=scale.sigma,
+            tolerance=scale.tolerance,
+            terms=terms,
+            size=size,
+            draws=max(32, config.draws // (1 if columns == own else 3)),
+            rng=rng,
+            strata=strata[rows],
+            anchors=np.flatnonzero(rows >= len(y) - fresh),
+        )
+        if found is None or found.size < min(needed, 6):
+            continue
+        found = identified(x, y, found.fit, scale=scale, support=config.support)
+        if found is not None and found.size >= needed:
+            return found
+    return None
+
+
+def _plans(width: int, own: int, config: ClusteringConfig) -> list[tuple[int, int, int]]:
+    """(columns, terms, sample size) of the searches, cheapest first."""
+    plans = []
+    most = config.max_terms
+    if own:
+        terms = min(own, most, 5)
+        plans.append((own, terms, terms + 3))
+    if not config.own_only and width > own:
+        plans += [(width, min(t, most), s) for t, s in ((2, 5), (5, 12), (most, 3 * most))]
+    return plans
+
+
+def _recent(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """The newest rows and a random choice of older ones, ascending."""
+    if n <= SEARCH:
+        return np.arange(n)
+    newest = np.arange(n - max(fresh, SEARCH // 2), n)
+    older = rng.choice(newest[0], size=min(int(newest[0]), SEARCH // 2), replace=False) if newest[0] else newest[:0]
+    return np.concatenate([np.sort(older), newest])
+
+
+def identified(
+    x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, *, scale: Scale, support: int
+) -> Consensus | None:
+    """The part of a function that its inliers really determine, with those inliers; None if nothing is left.
+
+    Two things are refused. A weight that fewer than `support` examples determine (a leverage point fixes it at
+    nonsense). Weights on columns that take few distinct values, when there are too few of those to tell a law from a
+    look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations.
+    """
+    for _ in range(len(fit.columns) + 1):
+        found = refine(
+            x, y, Consensus(fit, np.abs(y - fit.predict(x)) <= scale.tolerance), sigma=scale.sigma,
+            tolerance=scale.tolerance,
+        )
+        rows = np.flatnonzero(found.inliers)
+        if len(rows) < 4:
+            return None
+        weak, kept = _unsupported(x[rows], found.fit, scale.tolerance, support)
+        if weak is None:
+            return found if _enough_combinations(x[rows], y[rows], found.fit, scale.tolerance) else None
+        columns = tuple(c for c in found.fit.columns if c != weak)
+        fit = least_squares(x[rows[kept]], y[rows[kept]], columns)
+    return None
+
+
+def _unsupported(
+    x: NDArray[np.float64], fit: LinearFit, tolerance: float, support: int
+) -> tuple[int | None, NDArray[np.bool_]]:
+    """A column whose weight fewer than `support` rows determine, and the rows without those; (None, all) if none."""
+    everything = np.ones(len(x), dtype=bool)
+    for column, weight in zip(fit.columns, fit.weights, strict=True):
+        kept = everything.copy()
+        for _ in range(support - 1):
+            left = _own_part(x[kept], fit, column)
+            if len(left) <= len(fit.columns) + 2:
+                break
+            kept[np.flatnonzero(kept)[np.argmax(np.abs(left))]] = False
+        remaining = np.abs(weight * _own_part(x[kept], fit, column))
+        if remaining.max(initial=0.0) <= 10.0 * tolerance:
+            return column, kept
+    return None, everything
+
+
+def _own_part(x: NDArray[np.float64], fit: LinearFit, column: int) -> NDArray[np.float64]:
+    """What of a column the function's other terms don't reproduce."""
+    others = tuple(c for c in fit.columns if c != column)
+    rest = least_squares(x, x[:, column], others, intercept=fit.intercept != 0.0)
+    part: NDArray[np.float64] = x[:, column] - rest.predict(x)
+    return part
+
+
+def _enough_combinations(
+    x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, tolerance: float
+) -> bool:
+    """Whether slowly changing columns take enough combinations of values to support their weights."""
+    if fit.terms == 1 and fit.weights and abs(fit.weights[0] - 1.0) < 1e-9:
+        return True  # persistence has no free parameter
+    slow = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3]
+    if not slow:
+        return True
+    combinations = np.unique(x[:, slow], axis=0)
+    if len(combinations) < 2 * len(slow) + 2:
+        return False
+    if len(slow) == len(fit.columns) and np.ptp(y) > tolerance:
+        return len(np.unique(np.round(y / tolerance))) >= 2 * fit.terms
+    return True
+

@@ -1,0 +1,135 @@
+"""Expectation and maximisation: which mode explains an example, and fitting a mode to its examples (§3.2.4).
+
+Deviation from the thesis
+-------------------------
+A Gaussian density decides between modes only where residuals differ by more than the noise. Residuals within it are
+ties: the thesis let rounding decide between ``v' = v`` and ``v' = 0`` for a resting ball and called that
+unprincipled. Here the mode with fewest parameters wins, then the one with more examples, then the older one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.discovery import Scale
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.mode import Mode
+from relgym.clustering.roles import Binding, bind
+from relgym.config import ClusteringConfig
+from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
+
+__all__ = ["Cluster", "preferred", "refit", "role_matrix"]
+
+MOST_REFIT = 4_000
+"""At most this many examples, evenly spread over time, determine a refit."""
+
+
+@dataclass(frozen=False, slots=True)
+class Cluster:
+    """A mode at work: its function laid over the signatures seen, and when it was last fitted."""
+
+    mode: Mode
+    fitted: int = 1
+    unfitted: int = 0
+    _bindings: dict[int, Binding | None] = field(default_factory=dict)
+
+    def binding(self, table: ExampleTable, signature: int) -> Binding | None:
+        """The mode over one signature of the table; None if its roles can't be filled there."""
+        if signature not in self._bindings:
+            self._bindings[signature] = bind(self.mode, table.signatures[signature])
+        return self._bindings[signature]
+
+    def errors(
+        self, table: ExampleTable, rows: NDArray[np.integer], y: NDArray[np.float64], scale: Scale
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Smallest absolute residual of each example over all role assignments, and the number of that assignment.
+
+        Infinite where no assignment is legal.
+        """
+        error = np.full(len(rows), np.inf)
+        assignment = np.zeros(len(rows), dtype=np.intp)
+        ids = table.signature_ids[rows]
+        for signature in np.unique(ids):
+            if (binding := self.binding(table, int(signature))) is not None:
+                part = np.flatnonzero(ids == signature)
+                error[part], assignment[part] = binding.closest(table.x[rows[part]], y[part], scale.sigma)
+        return error, assignment
+
+
+def preferred(
+    fitting: list[int], errors: dict[int, float], clusters: dict[int, Cluster], scale: Scale, config: ClusteringConfig
+) -> int:
+    """The mode an example is assigned to, among those that explain it (E-step)."""
+
+    def key(i: int) -> tuple[float, int, int, int]:
+        cluster = clusters[i]
+        surprise = 0.0 if config.stickiness == "simple" and errors[i] <= 2.0 * scale.sigma else errors[i]
+        return (surprise, cluster.mode.parameters, -(cluster.fitted + cluster.unfitted), i)
+
+    return min(fitting, key=key)
+
+
+def role_matrix(
+    mode: Mode, table: ExampleTable, rows: NDArray[np.integer], assignment: NDArray[np.intp], cluster: Cluster
+) -> NDArray[np.float64]:
+    """Regression rows of a mode: one column per weight, each read from the object that plays the role.
+
+    Columns stand in the order of the roles and their terms.
+    """
+    width = sum(len(role.terms) for role in mode.roles)
+    x = np.zeros((len(rows), width))
+    ids = table.signature_ids[rows]
+    for signature in np.unique(ids):
+        binding = cluster.binding(table, int(signature))
+        if binding is None:
+            continue
+        slots = table.signatures[int(signature)]
+        for k in np.unique(assignment[ids == signature]):
+            part = np.flatnonzero((ids == signature) & (assignment == k))
+            played = (0, *binding.roles_of(int(k)))
+            columns = [
+                slots.column(slot, prop)
+                for slot, role in zip(played, mode.roles, strict=True)
+                for prop, _ in role.terms
+            ]
+            x[part] = table.x[rows[part]][:, columns]
+    return x
+
+
+def refit(
+    cluster: Cluster, table: ExampleTable, rows: NDArray[np.integer], y: NDArray[np.float64], scale: Scale
+) -> Cluster:
+    """M-step: least squares on the mode's examples under their role assignments, needless terms dropped.
+
+    The old function stays where the new one would lose an example that it explains.
+    """
+    done = replace(cluster, fitted=max(1, len(rows)), unfitted=0)
+    if len(rows) < 3:
+        return done
+    if len(rows) > MOST_REFIT:
+        pick = np.linspace(0, len(rows) - 1, MOST_REFIT).astype(np.intp)
+        rows, y = rows[pick], y[pick]
+    mode = cluster.mode
+    _, assignment = cluster.errors(table, rows, y, scale)
+    x = role_matrix(mode, table, rows, assignment, cluster)
+    fit = least_squares(x, y, tuple(range(x.shape[1])), intercept=mode.intercept != 0.0)
+    fit = eliminate_backward(x, y, fit, sigma=scale.sigma)
+    if np.abs(y - fit.predict(x)).max() > scale.tolerance:
+        return done
+    residual = float(np.sqrt(fit.rss / max(1, len(y) - fit.terms)))
+    better = replace(_with_weights(mode, fit), sigma=residual)
+    return Cluster(better, fitted=done.fitted, unfitted=0)
+
+
+def _with_weights(mode: Mode, fit: LinearFit) -> Mode:
+    weights = dict(zip(fit.columns, fit.weights, strict=True))
+    roles, at = [], 0
+    for role in mode.roles:
+        terms = tuple((p, weights[at + k]) for k, (p, _) in enumerate(role.terms) if at + k in weights)
+        at += len(role.terms)
+        roles.append(replace(role, terms=terms))
+    own, others = roles[0], sorted(r for r in roles[1:] if r.terms)
+    return replace(mode, roles=(own, *others), intercept=fit.intercept)

@@ -1,0 +1,63 @@
+"""How noisy a target is: a first estimate from the data and their precision."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.numeric.stepwise import least_squares, varying_columns
+
+__all__ = ["estimate_noise", "rounding_noise"]
+
+ROUNDINGS = 32.0
+"""A function of a few terms on differences of stored numbers carries at most about this many roundings."""
+
+
+def rounding_noise(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Standard deviation that mere rounding leaves, in units of y.
+
+    Numbers that float32 represents exactly are taken to have been rounded to it.
+
+    Parameters
+    ----------
+    x
+        The target object's own columns, shape ``(n, d)``.
+    y
+        Responses, shape ``(n,)``.
+    """
+    scale = max(float(np.abs(x).max(initial=0.0)), float(np.abs(y).max(initial=0.0)), 1e-3)
+    single = bool((y.astype(np.float32).astype(np.float64) == y).all()) and bool(np.any(y != np.round(y)))
+    step = float(np.finfo(np.float32).eps) * 0.25 if single else float(np.finfo(np.float64).eps)
+    return (4.0 if single else ROUNDINGS) * step * scale
+
+
+def estimate_noise(
+    x: NDArray[np.float64], y: NDArray[np.float64], strata: NDArray[np.integer], *, floor: float, window: int = 16
+) -> float:
+    """Noise of y about a locally linear function: lower quartile over windows of like examples.
+
+    Consecutive examples in the same relational state mostly share a mode; the spread that a linear function of the
+    target's own properties leaves in such a window is noise. Windows that straddle a change of mode leave more, hence
+    the lower quartile.
+
+    Parameters
+    ----------
+    x
+        Columns offered to the local function, shape ``(n, d)``.
+    y, strata
+        Responses and relational states, shape ``(n,)``.
+    floor
+        Rounding noise; the estimate is never smaller, and equals it unless it is clearly larger.
+    """
+    spreads = []
+    for start in range(0, len(y) - window + 1, window // 2):
+        part = slice(start, start + window)
+        if (strata[part] != strata[start]).any():
+            continue
+        columns = tuple(int(c) for c in varying_columns(x[part]))[: window // 3]
+        fit = least_squares(x[part], y[part], columns)
+        spreads.append(np.sqrt(fit.rss / (window - len(columns) - 1)))
+    if not spreads:
+        return floor
+    estimate = float(np.quantile(spreads, 0.25))
+    return estimate if estimate > 4.0 * floor else floor

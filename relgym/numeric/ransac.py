@@ -1,0 +1,193 @@
+"""Random sampling and consensus, many samples at a time (§3.2.2).
+
+Each draw fits a sparse function to a handful of rows by forward selection; a draw whose rows are reproduced with
+degrees of freedom to spare is *verified* and its inliers among all rows are counted. All draws are made as one batch
+of array operations.
+
+Deviation from the thesis
+-------------------------
+The thesis fits every sample and counts; with N=2000 draws of 6 rows it never finds a mode that makes up a fifth of
+the noise. Exact data verify themselves, so small samples (terms + 3 rows) and many draws find what large samples
+can't, and a draw that doesn't reproduce its own rows costs no counting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares, varying_columns
+
+__all__ = ["Consensus", "consensus", "draw_samples", "refine"]
+
+LOOSE = 100.0
+"""A fit to few rows is extrapolated: its inliers are first counted with a tolerance this much wider."""
+
+
+@dataclass(frozen=True, slots=True)
+class Consensus:
+    """A function and the rows it explains: boolean array of shape ``(n,)``."""
+
+    fit: LinearFit
+    inliers: NDArray[np.bool_]
+
+    @property
+    def size(self) -> int:
+        """Number of inliers."""
+        return int(self.inliers.sum())
+
+
+def draw_samples(
+    n: int,
+    size: int,
+    draws: int,
+    *,
+    rng: np.random.Generator,
+    strata: NDArray[np.integer] | None = None,
+    anchors: NDArray[np.intp] | None = None,
+) -> NDArray[np.intp]:
+    """Row numbers of `draws` samples of `size` distinct rows, shape ``(draws, size)``.
+
+    The first row of each sample comes from `anchors` (default: any row). A third of the samples takes the others from
+    anywhere, a third from the first row's stratum, a third from the rows nearest to it in time: contiguous examples
+    and examples in the same relational state tend to share a mode (§3.2.3).
+    """
+    first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
+    keys = rng.random((draws, n))
+    style = np.arange(draws) % 3
+    if strata is not None:
+        other = strata[None, :] != strata[first][:, None]
+        keys += np.where((style == 1)[:, None], 2.0 * other, 0.0)
+    age = np.abs(np.arange(n)[None, :] - first[:, None])
+    keys += np.where((style == 2)[:, None], age // (2 * size), 0.0)
+    keys[np.arange(draws), first] = -1.0
+    return np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
+
+
+def consensus(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    *,
+    sigma: float,
+    tolerance: float,
+    terms: int,
+    size: int,
+    draws: int,
+    rng: np.random.Generator,
+    strata: NDArray[np.integer] | None = None,
+    anchors: NDArray[np.intp] | None = None,
+) -> Consensus | None:
+    """The function with the largest consensus among `draws` random samples; None if no sample verified itself.
+
+    Parameters
+    ----------
+    x, y
+        Rows of shape ``(n, d)`` and responses of shape ``(n,)``; columns in order of preference.
+    sigma, tolerance
+        Noise on y and largest residual of an inlier, in units of y.
+    terms
+        Largest number of weights in a sample's function.
+    size
+        Rows in a sample; at least ``terms + 2``, so that one degree of freedom verifies the fit.
+    draws
+        Number of samples.
+    strata, anchors
+        See `draw_samples`.
+
+    Notes
+    -----
+    Cost O(draws * size * d * terms) plus O(n) for every verified sample.
+    """
+    n = len(y)
+    if n < size:
+        return None
+    columns = varying_columns(x)
+    samples = draw_samples(n, size, draws, rng=rng, strata=strata, anchors=anchors)
+    chosen = _forward_batch(x[:, columns][samples], y[samples], terms=terms, sigma=sigma)
+    best: Consensus | None = None
+    for sample, picked in _distinct(samples, chosen):
+        fit = least_squares(x[sample], y[sample], tuple(int(columns[c]) for c in picked))
+        found = Consensus(fit, np.abs(y - fit.predict(x)) <= LOOSE * tolerance)
+        if best is None or (found.size, -found.fit.terms) > (best.size, -best.fit.terms):
+            best = refine(x, y, found, sigma=sigma, tolerance=tolerance)
+    return best
+
+
+def refine(
+    x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, *, sigma: float, tolerance: float
+) -> Consensus:
+    """Refit on the inliers and count again until nothing changes, then drop needless terms; at most 8 rounds."""
+    for round_ in range(8):
+        if found.size <= len(found.fit.columns) + 1:
+            return Consensus(found.fit, np.zeros(len(y), dtype=bool))
+        fit = least_squares(x[found.inliers], y[found.inliers], found.fit.columns)
+        fit = eliminate_backward(x[found.inliers], y[found.inliers], fit, sigma=sigma)
+        inliers = np.abs(y - fit.predict(x)) <= tolerance
+        same = bool((inliers == found.inliers).all())
+        found = Consensus(fit, inliers)
+        if same and round_:
+            break
+    return found
+
+
+def _forward_batch(
+    a: NDArray[np.float64], y: NDArray[np.float64], *, terms: int, sigma: float
+) -> NDArray[np.intp]:
+    """Columns chosen for each sample, shape ``(draws, terms)``, -1 where none; -2 in front if not verified."""
+    draws, size, _ = a.shape
+    a = a - a.mean(axis=1, keepdims=True)
+    sizes = np.square(a).sum(axis=1)
+    residual = y - y.mean(axis=1, keepdims=True)
+    enough = size * (LOOSE * sigma) ** 2
+    chosen = np.full((draws, max(terms, 1)), -1, dtype=np.intp)
+    for t in range(terms):
+        left = np.square(residual).sum(axis=1)
+        open_ = left > enough
+        if not open_.any():
+            break
+        best, usable = _best_columns(a, sizes, residual, left, size * sigma**2)
+        take = open_ & usable
+        chosen[take, t] = best[take]
+        q = np.where(take[:, None], a[np.arange(draws), :, best], 0.0)
+        q /= np.where(take, np.sqrt(np.square(q).sum(axis=1)), 1.0)[:, None]
+        residual = residual - (q * residual).sum(axis=1)[:, None] * q
+        a -= q[:, :, None] * (q[:, :, None] * a).sum(axis=1)[:, None, :]
+    chosen[np.square(residual).sum(axis=1) > enough, 0] = -2
+    return chosen
+
+
+def _best_columns(
+    a: NDArray[np.float64],
+    sizes: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    left: NDArray[np.float64],
+    floor: float,
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    pivots = np.square(a).sum(axis=1)
+    usable = pivots > 1e-16 * sizes
+    usable &= sizes > 0.0
+    gains = np.square((a * residual[:, :, None]).sum(axis=1)) / np.where(usable, pivots, np.inf)
+    best = gains.max(axis=1)
+    slack = np.maximum(4.0 * floor, 1e-12 * left)
+    return np.argmax(gains >= (best - slack)[:, None], axis=1), best > 0.0
+
+
+def _distinct(
+    samples: NDArray[np.intp], chosen: NDArray[np.intp], limit: int = 48
+) -> list[tuple[NDArray[np.intp], list[int]]]:
+    """Verified samples with their columns: fewest terms first, at most `limit`, few of each set of columns."""
+    kept: list[tuple[NDArray[np.intp], list[int]]] = []
+    seen: dict[tuple[int, ...], int] = {}
+    verified = np.flatnonzero(chosen[:, 0] != -2)
+    order = verified[np.argsort((chosen[verified] >= 0).sum(axis=1), kind="stable")]
+    for i in order:
+        picked = sorted(int(c) for c in chosen[i] if c >= 0)
+        key = tuple(picked)
+        seen[key] = seen.get(key, 0) + 1
+        if seen[key] <= 6:
+            kept.append((samples[i], picked))
+        if len(kept) >= limit:
+            break
+    return kept
