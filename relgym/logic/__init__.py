@@ -1,0 +1,1 @@
+"""First-order rules from examples: FOIL (Quinlan 1990), over integers and symbols only."""

@@ -1,0 +1,309 @@
+"""Literals, clauses and definitions: the language that FOIL writes its rules in (thesis §3.4.1, §4.3.2).
+
+Variables are small integers. Numbers below a clause's `arity` are the arguments of the target relation,
+printed ``A``, ``B``, …; all later ones are existential: *there is* an object that makes the clause true.
+`ANY`, printed ``*``, stands inside negated literals only and is universal: ``¬intersect(A, *)`` holds if A
+intersects nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Final
+
+from relgym.errors import ConfigError, ModelFileError
+
+__all__ = ["ANY", "Clause", "Coverage", "Definition", "Literal"]
+
+ANY: Final = -1
+"""The universally quantified argument of a negated literal, printed ``*``."""
+
+_OPERATORS = (None, "<=", ">")
+
+
+def _variable_name(variable: int) -> str:
+    if variable == ANY:
+        return "*"
+    return chr(ord("A") + variable) if variable < 26 else f"V{variable}"
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """One test: a relation or its negation, or a numeric function compared with a threshold.
+
+    Parameters
+    ----------
+    relation
+        Name of the relation or, if `op` is given, of the numeric function.
+    args
+        Variable numbers, without repeats; `ANY` only if the literal is negated.
+    negated
+        Whether the test is that *no* assignment of objects to the `ANY` arguments makes the rest true.
+    op
+        ``"<="`` or ``">"`` for numeric literals, otherwise ``None``. An undefined value satisfies neither.
+    threshold
+        What the function's value is compared with; 0 and without meaning for relations.
+
+    Raises
+    ------
+    ConfigError
+        If a variable is repeated, `ANY` stands in a literal that isn't negated, the operator is unknown or
+        the threshold isn't finite.
+    """
+
+    relation: str
+    args: tuple[int, ...] = ()
+    negated: bool = False
+    op: str | None = None
+    threshold: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.op not in _OPERATORS:
+            raise ConfigError(f"{self.relation}: expected the operator '<=', '>' or None, got {self.op!r}.")
+        if not math.isfinite(self.threshold):
+            raise ConfigError(f"{self.relation}: expected a finite threshold, got {self.threshold}.")
+        if min(self.args, default=0) < ANY or len(set(self.variables)) < len(self.variables):
+            raise ConfigError(f"{self.relation}: expected distinct variables >= 0 or ANY, got {self.args}.")
+        if ANY in self.args and not self.negated:
+            raise ConfigError(f"{self.relation}{self.args}: ANY is universal; use it in a negated literal.")
+
+    @property
+    def variables(self) -> tuple[int, ...]:
+        """The arguments that are variables, that is, all but `ANY`."""
+        return tuple([arg for arg in self.args if arg != ANY])
+
+    def rename(self, names: Mapping[int, int]) -> Literal:
+        """Return the literal with every variable replaced by its entry in `names`."""
+        args = tuple(ANY if arg == ANY else names[arg] for arg in self.args)
+        return Literal(self.relation, args, self.negated, self.op, self.threshold)
+
+    def __str__(self) -> str:
+        args = f"({', '.join(_variable_name(arg) for arg in self.args)})" if self.args else ""
+        text = f"{self.relation}{args}"
+        if self.op is not None:
+            text = f"{text} {self.op} {self.threshold:.6g}"
+            return f"¬({text})" if self.negated else text
+        return f"¬{text}" if self.negated else text
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a plain dictionary that JSON can hold; fields at their defaults are left out."""
+        plain: dict[str, Any] = {"relation": self.relation, "args": list(self.args)}
+        if self.negated:
+            plain["negated"] = True
+        if self.op is not None:
+            plain |= {"op": self.op, "threshold": self.threshold}
+        return plain
+
+    @staticmethod
+    def from_dict(plain: Mapping[str, Any]) -> Literal:
+        """Inverse of `to_dict`; raises `ModelFileError` if `plain` isn't such a dictionary."""
+        try:
+            args = tuple(int(arg) for arg in plain["args"])
+            negated, threshold = bool(plain.get("negated", False)), float(plain.get("threshold", 0.0))
+            return Literal(str(plain["relation"]), args, negated, plain.get("op"), threshold)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise ModelFileError(
+                f"Expected a literal as written by Literal.to_dict, got {plain!r}."
+            ) from error
+
+
+@dataclass(frozen=True)
+class Clause:
+    """A conjunction of literals with shared variables: the body of a Horn clause (§3.4.1).
+
+    Parameters
+    ----------
+    literals
+        The conjuncts. None at all: the clause is always true.
+    arity
+        Number of arguments of the target; these variables are bound before the clause is tested.
+
+    Raises
+    ------
+    ConfigError
+        If an existential variable occurs in negated literals only, where it would mean "some object doesn't";
+        `Clause.of` turns such variables into ``*``.
+    """
+
+    literals: tuple[Literal, ...]
+    arity: int = 1
+
+    def __post_init__(self) -> None:
+        loose = _loose_variables(self.literals, self.arity)
+        if loose:
+            names = ", ".join(_variable_name(variable) for variable in sorted(loose))
+            raise ConfigError(
+                f"{self}: {names} occurs in negated literals only; use Clause.of, which writes *."
+            )
+
+    @staticmethod
+    def of(literals: Iterable[Literal], arity: int = 1) -> Clause:
+        """Build a clause in normal form.
+
+        Variables that are left in negated literals only become `ANY`, the other existential ones are numbered
+        in the order of their first appearance, and repeated literals are dropped.
+        """
+        literals = tuple(literals)
+        names: dict[int, int] = {variable: variable for variable in range(arity)}
+        names |= dict.fromkeys(_loose_variables(literals, arity), ANY)
+        fresh = arity
+        for variable in _variables(literals):
+            if variable not in names:
+                names[variable] = fresh
+                fresh += 1
+        return Clause(tuple(dict.fromkeys(literal.rename(names) for literal in literals)), arity)
+
+    @cached_property
+    def variables(self) -> int:
+        """Number of variables, the target's arguments included."""
+        return max(self.arity, max(_variables(self.literals), default=-1) + 1)
+
+    def without(self, index: int) -> Clause:
+        """Return the clause in normal form without its literal number `index`."""
+        return Clause.of(self.literals[:index] + self.literals[index + 1 :], self.arity)
+
+    def replace(self, index: int, literal: Literal) -> Clause:
+        """Return the clause with its literal number `index` replaced."""
+        return Clause((*self.literals[:index], literal, *self.literals[index + 1 :]), self.arity)
+
+    def __iter__(self) -> Iterator[Literal]:
+        return iter(self.literals)
+
+    def __len__(self) -> int:
+        return len(self.literals)
+
+    def __str__(self) -> str:
+        return " ∧ ".join(str(literal) for literal in self.literals) or "true"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a plain dictionary that JSON can hold."""
+        return {"arity": self.arity, "literals": [literal.to_dict() for literal in self.literals]}
+
+    @staticmethod
+    def from_dict(plain: Mapping[str, Any]) -> Clause:
+        """Inverse of `to_dict`; raises `ModelFileError` if `plain` isn't such a dictionary."""
+        try:
+            literals, arity = plain["literals"], int(plain["arity"])
+            return Clause(tuple(Literal.from_dict(literal) for literal in literals), arity)
+        except (KeyError, TypeError, ConfigError) as error:
+            raise ModelFileError(f"Expected a clause as written by Clause.to_dict, got {plain!r}.") from error
+
+
+def _variables(literals: Iterable[Literal]) -> list[int]:
+    return list(dict.fromkeys(variable for literal in literals for variable in literal.variables))
+
+
+def _loose_variables(literals: Iterable[Literal], arity: int) -> set[int]:
+    """Existential variables that no literal binds, because all that they occur in are negated."""
+    bound = {variable for literal in literals if not literal.negated for variable in literal.variables}
+    return {variable for variable in _variables(literals) if variable >= arity and variable not in bound}
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """How many training tuples, by weight, something covers (the counts of tables 3.2 and 4.3)."""
+
+    positives: float = 0.0
+    negatives: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Positives and negatives together."""
+        return self.positives + self.negatives
+
+    @property
+    def precision(self) -> float:
+        """Share of positives; 0 if nothing is covered."""
+        return self.positives / self.total if self.total > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A disjunction of clauses that describes one class of tuples (§3.4.1), and how well it did in training.
+
+    Parameters
+    ----------
+    clauses
+        The disjuncts in the order in which they are tried; none at all: always false.
+    arity
+        Number of arguments of the target relation.
+    negated
+        Whether the clauses describe the *negative* tuples (§3.4.5, "Negated" in table 4.3). The definition
+        then holds where no clause matches.
+    coverage
+        Per clause, the tuples that it decides: those it matches and no earlier clause does. Positives and
+        negatives are those of the clauses: if the definition is negated, the problem's negatives count as
+        positives.
+    uncovered
+        The tuples that no clause matches, the row "Negative" in table 3.2.
+    bits
+        Description length of the clauses and of their exceptions.
+    work
+        Work spent in learning, in tuples x candidate literals; not compared and not stored.
+    """
+
+    clauses: tuple[Clause, ...]
+    arity: int = 1
+    negated: bool = False
+    coverage: tuple[Coverage, ...] = ()
+    uncovered: Coverage = field(default_factory=Coverage)
+    bits: float = 0.0
+    work: int = field(default=0, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.coverage and len(self.coverage) != len(self.clauses):
+            message = f"Expected one count per clause ({len(self.clauses)}), got {len(self.coverage)}."
+            raise ConfigError(message)
+        if any(clause.arity != self.arity for clause in self.clauses):
+            raise ConfigError(
+                f"Expected clauses of arity {self.arity}, got {[c.arity for c in self.clauses]}."
+            )
+
+    @property
+    def errors(self) -> float:
+        """Weight of the training tuples that the definition gets wrong."""
+        return sum(count.negatives for count in self.coverage) + self.uncovered.positives
+
+    @property
+    def performance(self) -> float:
+        """Share of the training tuples that the definition gets right, "train perf." in table 3.2."""
+        total = sum(count.total for count in self.coverage) + self.uncovered.total
+        return 1.0 - self.errors / total if total > 0 else 1.0
+
+    def __len__(self) -> int:
+        return len(self.clauses)
+
+    def __str__(self) -> str:
+        body = (
+            " ∨ ".join(f"({clause})" if len(clause) > 1 else str(clause) for clause in self.clauses)
+            or "false"
+        )
+        return f"¬[{body}]" if self.negated else body
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a plain dictionary that JSON can hold; `from_dict` restores everything but `work`."""
+        return {
+            "arity": self.arity,
+            "negated": self.negated,
+            "clauses": [clause.to_dict()["literals"] for clause in self.clauses],
+            "coverage": [[count.positives, count.negatives] for count in self.coverage],
+            "uncovered": [self.uncovered.positives, self.uncovered.negatives],
+            "bits": self.bits,
+        }
+
+    @staticmethod
+    def from_dict(plain: Mapping[str, Any]) -> Definition:
+        """Inverse of `to_dict`; raises `ModelFileError` if `plain` isn't such a dictionary."""
+        try:
+            arity = int(plain["arity"])
+            clauses = [Clause.from_dict({"arity": arity, "literals": body}) for body in plain["clauses"]]
+            coverage = tuple(Coverage(float(good), float(bad)) for good, bad in plain["coverage"])
+            good, bad = plain["uncovered"]
+            uncovered, bits = Coverage(float(good), float(bad)), float(plain["bits"])
+            return Definition(tuple(clauses), arity, bool(plain["negated"]), coverage, uncovered, bits)
+        except (KeyError, TypeError, ValueError) as error:
+            message = f"Expected a definition as written by Definition.to_dict, got {plain!r}."
+            raise ModelFileError(message) from error
