@@ -1,0 +1,37 @@
+"""Gymnasium envs whose observations are scenes of rigid objects; imported as ``relgym.envs``."""
+
+import importlib
+from typing import Any
+
+if __name__ != "relgym.envs":
+    raise ImportError(
+        f"this package is called relgym.envs, not {__name__!r}: a second copy of every class would follow; "
+        "use `from relgym.envs import …`"
+    )
+
+_HOMES = {
+    "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
+    "EnvState": "relgym.envs.base",
+    "SceneEnv": "relgym.envs.base",
+    "TruckPushEnv": "relgym.envs.truck_push",
+    "render_scene": "relgym.envs.rendering",
+}
+"""Where each public name lives; loaded on first use, so that `import relgym` needs neither pymunk nor pygame."""
+
+__all__ = [
+    "BallBoxRampEnv",
+    "EnvState",
+    "SceneEnv",
+    "TruckPushEnv",
+    "render_scene",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {sorted(_HOMES)}")
+    return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])

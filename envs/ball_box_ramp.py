@@ -1,0 +1,325 @@
+"""The ball-box-ramp domain (§4.1) as a Gymnasium env."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from relgym.envs.ball_scenes import BALL_PLACES, Placed, draw_room, option_names
+from relgym.envs.base import SceneEnv, check_options
+from relgym.envs.physics import BallWorld, Contact, Obstacle, Point
+from relgym.errors import ConfigError
+from relgym.scene.objects import POSE, Float1D, Kinematics, ObjectType, Scene, SceneSchema, Target
+from relgym.scene.shapes import Box, Sphere, Wedge
+
+__all__ = ["BallBoxRampEnv", "configurations"]
+
+_SHELL = {"floor": "floor", "ceiling": "ceiling", "left_wall": "wall", "right_wall": "wall"}
+_KINDS = ("box", "ramp")
+_X, _Y, _SX, _SY, _RZ = (POSE.index(name) for name in ("px", "py", "sx", "sy", "rz"))
+_VX = len(POSE)  # a ball's velocity follows its pose
+_WEDGE = ((-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))  # vertical side left, slope descending to the right
+_BOX = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
+
+Coefficient = float | Mapping[str, float]
+
+
+def configurations() -> tuple[dict[str, Any], ...]:
+    """The thesis' 40 initial configurations (Table 4.1), as reset options."""
+    return tuple(
+        {"ramp": ramp, "touching": touching, "ball": place, "direction": direction}
+        for ramp in ("left", "right")
+        for touching in (True, False)
+        for place in BALL_PLACES
+        for direction in ("left", "right")
+    )
+
+
+class BallBoxRampEnv(SceneEnv):
+    """A ball flies, bounces and slides in a room with a box and a ramp; nobody acts.
+
+    Description
+    -----------
+    The world of the thesis' experiments (§4.1). A ball that doesn't rotate moves under gravity among a floor,
+    a ceiling, two walls and what stands on the floor. One step is 0.01 s. The pair of position and velocity at one
+    step determines the next: with g = (0, -9.8e-4), a contact's unit normal n, elasticity e and friction mu,
+    ``J = max(0, -((1+e) v.n + g.n))`` and ``v' = v + g + J n + friction``, where friction opposes sliding and is at
+    most ``mu J``. Balls have elasticity and friction 1, so that a contact has the coefficients of the obstacle.
+
+    Action Space
+    ------------
+    ``Discrete(1)``: watch. The schema has no action object.
+
+    Observation Space
+    -----------------
+    ``Dict``, object name -> ``Box(float64)`` in the order of the type's properties:
+
+    ===================  ========================================  =======  ========  =======
+    property             meaning                                   unit     min       max
+    ===================  ========================================  =======  ========  =======
+    px, py, pz           position of the centre (pz = 0)           unit     -1e4      1e4
+    rx, ry, rz           rotation (0)                              radian   -pi       pi
+    sx, sy, sz           full extents; a ball's diameter           unit     0         1e3
+    vx, vy (balls only)  last displacement, p_t - p_{t-1}          unit     -1        1
+    ===================  ========================================  =======  ========  =======
+
+    Objects: ``ball``; ``box``, ``ramp``; ``floor``, ``ceiling``, ``left_wall``, ``right_wall``. A ramp's vertical
+    side is on its left, wherever it stands; its incline is sy / sx.
+
+    Rewards
+    -------
+    Always 0.
+
+    Starting State
+    --------------
+    Room 4.5–6 wide and 2.5–3.5 high; ball radius 0.08–0.15; box 0.6–1 wide, 0.4–0.9 high; ramp base 1–1.5, scaled
+    down when it would be higher than 1. Box and ramp touch, or are 4–8 ball radii apart, with 30–70 % of the free
+    floor on their left. *Leftmost* and *rightmost*: on the floor, sunk 1–10 mm, 3–6 units/s; *above-left* and
+    *above-right*: 0.1–0.8 over the object; *between*: 0.05–0.6 over the higher one, or on the floor in half of the
+    cases where there is one between them. In the air: 0.5–4 units/s sideways. Everything is shifted by up to 5 along
+    both axes. All uniform. The first velocity is the displacement that led to the first position.
+
+    Reset options, all optional: ``ramp`` ("left", "right"), ``touching`` (bool), ``ball`` ("leftmost", "above-left",
+    "between", "above-right", "rightmost"), ``direction`` ("left", "right"), and every other draw: ``room_width``,
+    ``room_height``, ``left_share``, ``gap`` (in ball radii), ``shift_x``, ``shift_y``, ``box_width``, ``box_height``,
+    ``ramp_base``, ``ball_radius``, ``ball_floor`` (bool), ``ball_x`` (0–1 along the place), ``ball_sink``,
+    ``ball_drop``, ``ball_speed``. `reset_options` lists those of an instance: objects beyond the first of their kind
+    have options of their own (``box2_width``, ``ball2``, ``ball2_direction``), and ``order`` replaces ``ramp`` when
+    the standing objects aren't a box and a ramp. ``info["configuration"]`` holds what was drawn: passed as options,
+    it gives the same scene again.
+
+    Episode End
+    -----------
+    Never terminates; truncated after 200 steps by the registered time limit.
+
+    Info
+    ----
+    ``info["contacts"]``: a tuple of `Contact`, the engine's own record of what touches what in the current state,
+    which is what decides the next step. At reset also ``info["scene"]`` and ``info["configuration"]``.
+
+    Arguments
+    ---------
+    incline
+        Angle of the ramps in degrees, in (0, 90); a number, or a mapping by ramp name.
+    elasticity, friction
+        Coefficients e (0 to 1) and mu (>= 0) of a contact: a number, or a mapping by object name or type
+        (``{"floor": 0.1, "ramp2": 0.3}``, the rest as by default). Two balls take the entry ``"ball"``.
+    objects
+        Kinds of the objects that stand on the floor: ``("box",)``, ``("box", "ramp", "ramp")``, or counts
+        ``{"box": 1, "ramp": 2}``. Beyond two of them the room is 2 units wider for each.
+    balls
+        How many balls (>= 1): ``ball``, ``ball2``, …
+    type_names
+        ``"shape"``: ball, box, ramp, floor, wall, ceiling. ``"thesis"``: the coefficients are part of the type's
+        name (§4.2), friction first: ``box_0.1_0.9``, ``ramp_0.3_0.8_60``; the parent is ``box``, ``ramp``.
+
+    Version History
+    ---------------
+    * v0: initial version.
+    """
+
+    _transient = ("_viewer", "_world")
+
+    def __init__(
+        self,
+        incline: Coefficient = 30.0,
+        elasticity: Coefficient = 0.9,
+        friction: Coefficient = 0.0,
+        objects: Sequence[str] | Mapping[str, int] = ("box", "ramp"),
+        balls: int = 1,
+        type_names: str = "shape",
+        render_mode: str | None = None,
+    ) -> None:
+        self._standing = _standing(objects)
+        self._balls = _numbered("ball", _checked_count("balls", balls, least=1))
+        kinds = {**dict.fromkeys(self._balls, "ball"), **self._standing, **_SHELL}
+        ramps = {name: kind for name, kind in self._standing.items() if kind == "ramp"}
+        self._incline = _per_object("incline", incline, ramps, 30.0, (1e-3, 90.0 - 1e-3))
+        self._elasticity = _per_object("elasticity", elasticity, kinds, 0.9, (0.0, 1.0))
+        self._friction = _per_object("friction", friction, kinds, 0.0, (0.0, math.inf))
+        types = self._types(kinds, type_names)
+        super().__init__(
+            _schema(kinds, types), spaces.Discrete(1), {"vx": (-1.0, 1.0), "vy": (-1.0, 1.0)}, render_mode
+        )
+        self._offsets = [self._layout.offsets[self._layout.index(ball)] for ball in self._balls]
+        self._world: BallWorld | None = None
+        self._configuration: Mapping[str, Any] = {}
+
+    @property
+    def reset_options(self) -> tuple[str, ...]:
+        """Names of all options of `reset`."""
+        return tuple(option_names(self._standing, self._balls))
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """What the balls touch in the current state, by the engine's own record."""
+        self._required_state()
+        return self._engine.contacts()
+
+    @property
+    def _engine(self) -> BallWorld:
+        assert self._world is not None
+        return self._world
+
+    def _begin(self, options: Mapping[str, Any], *, rng: np.random.Generator) -> Float1D:
+        check_options(options, self.reset_options)
+        inclines = {name: math.radians(degrees) for name, degrees in self._incline.items()}
+        room = draw_room(self._standing, self._balls, inclines, options=options, rng=rng)
+        self._configuration = room.configuration
+        state = np.concatenate(
+            [_properties(name, room.objects[name], self._balls) for name in self._layout.names]
+        )
+        return self._landed(state)
+
+    def _landed(self, state: Float1D) -> Float1D:
+        """Build the engine for `state` and let the last displacement happen in it."""
+        self._world = self._build(state)
+        centres = [(float(state[o + _X]), float(state[o + _Y])) for o in self._offsets]
+        moves = [(float(state[o + _VX]), float(state[o + _VX + 1])) for o in self._offsets]
+        self._world.land(centres, moves)
+        before = [(x - dx, y - dy) for (x, y), (dx, dy) in zip(centres, moves, strict=True)]
+        return self._read(state.copy(), before)
+
+    def _advance(self, state: Float1D, action: Any) -> Float1D:
+        self._engine.step()
+        return self._read(state.copy(), [(state[o + _X], state[o + _Y]) for o in self._offsets])
+
+    def _read(self, state: Float1D, before: Sequence[tuple[float, float]]) -> Float1D:
+        """Write positions and displacements into `state`, the state vector to be."""
+        for o, (x, y), (old_x, old_y) in zip(self._offsets, self._engine.positions(), before, strict=True):
+            state[o + _X], state[o + _Y] = x, y
+            state[o + _VX], state[o + _VX + 1] = x - old_x, y - old_y
+        return state
+
+    def _info(self) -> dict[str, Any]:
+        return {"contacts": self._engine.contacts()}
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Float1D], dict[str, Any]]:
+        """Begin an episode; the class lists the `options`."""
+        observation, info = super().reset(seed=seed, options=options)
+        return observation, {**info, "configuration": dict(self._configuration)}
+
+    def _hidden(self) -> Any:
+        return tuple(self._engine.velocities())
+
+    def _restore(self, vector: Float1D, hidden: Any) -> None:
+        self._state = self._landed(vector)
+        if hidden is not None:
+            # The landing made the contacts known; now remove its rounding.
+            self._state = vector.copy()
+            self._engine.resume([(vector[o + _X], vector[o + _Y]) for o in self._offsets], hidden)
+
+    def _build(self, state: Float1D) -> BallWorld:
+        scene = Scene(self.schema, self._layout, state.copy())
+        obstacles = [
+            Obstacle(o.name, _vertices(o.type, o.values), self._elasticity[o.name], self._friction[o.name])
+            for o in scene
+            if o.name not in self._balls
+        ]
+        radii = {ball: scene[ball]["sx"] / 2 for ball in self._balls}
+        first = self._balls[0]
+        return BallWorld(
+            obstacles, radii, ball_elasticity=self._elasticity[first], ball_friction=self._friction[first]
+        )
+
+    def _types(self, kinds: Mapping[str, str], type_names: str) -> dict[str, ObjectType]:
+        """Type of each object, by name."""
+        if type_names not in ("shape", "thesis"):
+            raise ConfigError(f"type_names={type_names!r}: expected 'shape' or 'thesis'")
+        return {name: self._type(name, kind, type_names == "thesis") for name, kind in kinds.items()}
+
+    def _type(self, name: str, kind: str, thesis: bool) -> ObjectType:
+        if kind == "ball":
+            return ObjectType("ball", (*POSE, "vx", "vy"), Sphere(), velocity=("vx", "vy", None))
+        shape = Wedge() if kind == "ramp" else Box()
+        if not thesis:
+            return ObjectType(kind, POSE, shape)
+        numbers = [
+            self._friction[name],
+            self._elasticity[name],
+            *([self._incline[name]] if kind == "ramp" else []),
+        ]
+        return ObjectType("_".join([kind, *(f"{number:g}" for number in numbers)]), POSE, shape, parent=kind)
+
+
+def _schema(kinds: Mapping[str, str], types: Mapping[str, ObjectType]) -> SceneSchema:
+    return SceneSchema(
+        types=tuple({t.name: t for t in types.values()}.values()),
+        objects=tuple((name, types[name].name) for name in kinds),
+        up="y",
+        planar=True,
+        kinematics=(Kinematics("ball", "px", "vx"), Kinematics("ball", "py", "vy")),
+        targets=(Target("ball", "vx"), Target("ball", "vy")),
+    )
+
+
+def _properties(name: str, placed: Placed, balls: Sequence[str]) -> Float1D:
+    values = np.zeros(len(POSE) + (2 if name in balls else 0))
+    values[[_X, _Y, _SX, _SY]] = placed.x, placed.y, placed.width, placed.height
+    values[_SY + 1] = placed.width if name in balls else 1.0
+    if name in balls:
+        values[_VX:] = placed.dx, placed.dy
+    return values
+
+
+def _vertices(t: ObjectType, values: Float1D) -> tuple[Point, ...]:
+    """Corners of an obstacle in the plane, counter-clockwise."""
+    x, y, width, height, angle = (float(values[i]) for i in (_X, _Y, _SX, _SY, _RZ))
+    corners = [(u * width, w * height) for u, w in (_WEDGE if isinstance(t.shape, Wedge) else _BOX)]
+    if angle != 0.0:  # an unrotated corner must not be rounded
+        cos, sin = math.cos(angle), math.sin(angle)
+        corners = [(cos * u - sin * w, sin * u + cos * w) for u, w in corners]
+    return tuple((x + u, y + w) for u, w in corners)
+
+
+def _standing(objects: Sequence[str] | Mapping[str, int]) -> dict[str, str]:
+    """Name and kind of each object that stands on the floor."""
+    if isinstance(objects, str):
+        raise ConfigError(
+            f"objects={objects!r}: expected a sequence such as ({objects!r},) or counts by kind"
+        )
+    kinds = list(objects)
+    unknown = sorted({str(kind) for kind in kinds if kind not in _KINDS})
+    if unknown:
+        raise ConfigError(
+            f"objects: unknown kinds {unknown}; expected {_KINDS} (`balls` says how many balls)"
+        )
+    counts = dict(objects) if isinstance(objects, Mapping) else {kind: kinds.count(kind) for kind in kinds}
+    return {
+        name: kind
+        for kind, count in counts.items()
+        for name in _numbered(kind, _checked_count(f"objects[{kind!r}]", count, least=0))
+    }
+
+
+def _numbered(kind: str, count: int) -> tuple[str, ...]:
+    return tuple(kind if k == 1 else f"{kind}{k}" for k in range(1, count + 1))
+
+
+def _checked_count(what: str, count: Any, *, least: int) -> int:
+    if not isinstance(count, (int, np.integer)) or not least <= count <= 100:
+        raise ConfigError(f"{what}={count!r}: expected a whole number from {least} to 100")
+    return int(count)
+
+
+def _per_object(
+    what: str, value: Coefficient, kinds: Mapping[str, str], default: float, span: tuple[float, float]
+) -> dict[str, float]:
+    """The value for each object: its own entry, or else its kind's, or else the default."""
+    given = value if isinstance(value, Mapping) else dict.fromkeys(kinds, value)
+    legal = sorted({*kinds, *kinds.values()})
+    unknown = sorted(set(given) - set(legal))
+    if unknown:
+        raise ConfigError(f"{what}: unknown objects {unknown}; expected names or kinds among {legal}")
+    for key, number in given.items():
+        if not isinstance(number, (int, float, np.integer, np.floating)) or not span[0] <= number <= span[1]:
+            raise ConfigError(
+                f"{what}={number!r} (for {key!r}): expected a number from {span[0]:g} to {span[1]:g}"
+            )
+    return {name: float(given.get(name, given.get(kind, default))) for name, kind in kinds.items()}

@@ -1,0 +1,282 @@
+"""What all relgym envs share: one flat state array, observations cut from it, exact states, typed errors."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
+
+from relgym.errors import ActionError, ConfigError, ObservationError
+from relgym.scene.objects import POSE, Float1D, Scene, SceneLayout, SceneSchema
+
+__all__ = ["DEFAULT_BOUNDS", "EnvState", "Observation", "SceneEnv", "check_options", "checked_action"]
+
+Observation: TypeAlias = dict[str, NDArray[np.float64]]
+"""Property vector of every object, by name."""
+
+Bounds: TypeAlias = Mapping[str, tuple[float, float]]
+"""Smallest and largest value of each property."""
+
+DEFAULT_BOUNDS: Bounds = {
+    **dict.fromkeys(POSE[:3], (-1e4, 1e4)),
+    **dict.fromkeys(POSE[3:6], (-np.pi, np.pi)),
+    **dict.fromkeys(POSE[6:], (0.0, 1e3)),
+}
+"""Bounds of the nine pose components: units, radians and units."""
+
+
+@dataclass(frozen=True)
+class EnvState:
+    """Everything that an env's future depends on, as `SceneEnv.get_state` returns it.
+
+    Parameters
+    ----------
+    vector
+        The state vector (a read-only copy), without an action.
+    hidden
+        What the env keeps beside it: an engine's velocities, say. Opaque, immutable, picklable.
+    random
+        State of the env's random generator.
+    """
+
+    vector: Float1D
+    hidden: Any
+    random: Mapping[str, Any]
+
+
+class SceneEnv(gym.Env[Observation, Any]):
+    """Base of the envs whose observations are scenes.
+
+    A subclass says how an episode begins (`_begin`), how a step goes (`_advance`) and, if its state is more than
+    the state vector, how the rest is saved and restored (`_hidden`, `_restore`).
+
+    Parameters
+    ----------
+    schema
+        What the scenes are made of. Bodiless objects (the action) are no part of the observation.
+    action_space
+        The space of actions.
+    bounds
+        Smallest and largest value of each property; pose components default to `DEFAULT_BOUNDS`.
+    render_mode
+        ``None``, ``"rgb_array"`` or ``"human"``.
+
+    Attributes
+    ----------
+    schema : SceneSchema
+        Constant for the env's life; wrapped envs give it with ``env.get_wrapper_attr("schema")``.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
+
+    def __init__(
+        self, schema: SceneSchema, action_space: spaces.Space[Any], bounds: Bounds, render_mode: str | None
+    ) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ConfigError(
+                f"render_mode={render_mode!r}: expected None or one of {self.metadata['render_modes']}"
+            )
+        self.schema = schema
+        self.render_mode = render_mode
+        self.action_space = action_space
+        self._layout = schema.layout(name for name in schema.order if schema.type_of(name).has_body)
+        self.observation_space = _observation_space(self._layout, {**DEFAULT_BOUNDS, **bounds})
+        self._cuts = [(name, self._layout.slice(i)) for i, name in enumerate(self._layout.names)]
+        self._state: Float1D | None = None
+        self._viewer: Any = None
+
+    # --- the Gymnasium contract -----------------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode; see the env's docstring for its `options`.
+
+        Raises
+        ------
+        ConfigError
+            An unknown option, or an illegal value; the env is unchanged.
+        """
+        super().reset(seed=seed)
+        self._state = self._begin(options or {}, rng=self.np_random)
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), {"scene": self.scene, **self._info()}
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Advance by one step; `ActionError` when `action` lies outside the action space."""
+        state = self._required_state()
+        self._state = self._advance(state, checked_action(self.action_space, action))
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), 0.0, False, False, self._info()
+
+    def render(self) -> Any:
+        """Draw the scene: an array of shape (height, width, 3) for ``"rgb_array"``, a window for ``"human"``."""
+        from relgym.envs.rendering import SceneViewer
+
+        if self.render_mode is None:
+            raise ConfigError("nothing to render to: make the env with render_mode='rgb_array' or 'human'")
+        if self._viewer is None:
+            self._viewer = SceneViewer(self.render_mode, fps=self.metadata["render_fps"])
+        return self._viewer.show(self.scene)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None
+
+    # --- scenes and states ----------------------------------------------------------------------------------
+
+    @property
+    def scene(self) -> Scene:
+        """The current scene, without an action."""
+        return Scene(self.schema, self._layout, self._required_state().copy())
+
+    @property
+    def vector(self) -> Float1D:
+        """The current state vector, shape ``(width,)``: a copy."""
+        return self._required_state().copy()
+
+    def get_state(self) -> EnvState:
+        """Everything that the future depends on; `set_state` continues from it exactly."""
+        vector = self.vector
+        vector.flags.writeable = False
+        return EnvState(vector, self._hidden(), self.np_random.bit_generator.state)
+
+    def set_state(self, state: EnvState | Scene) -> Observation:
+        """Continue from `state`: of this env or of another one with the same schema.
+
+        Parameters
+        ----------
+        state
+            What `get_state` returned, or any scene with this env's objects (an action in it is ignored). After a
+            scene, the hidden rest is inferred from it, and the random generator goes on as it was.
+
+        Raises
+        ------
+        ObservationError
+            The state or scene has other objects than this env.
+        """
+        if isinstance(state, Scene):
+            self._state = self._vector_of(state)
+            self._restore(self._state, None)
+        else:
+            if state.vector.shape != (self._layout.width,):
+                raise ObservationError(
+                    f"expected a state of width {self._layout.width} for the objects {list(self._layout.names)}, "
+                    f"got shape {state.vector.shape}; make the env with the arguments of the one it came from"
+                )
+            self._state = state.vector.copy()
+            self._restore(self._state, state.hidden)
+            self.np_random.bit_generator.state = state.random
+        return self._observation()
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Engine, window and cached slices are rebuilt; what remains can be copied and pickled.
+        started = self._state is not None
+        kept = {name: value for name, value in self.__dict__.items() if name not in self._transient}
+        return {"kept": kept, "hidden": self._hidden() if started else None}
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        self.__dict__.update(saved["kept"])
+        self.__dict__.update(dict.fromkeys(self._transient))
+        if self._state is not None:
+            self._restore(self._state, saved["hidden"])
+
+    # --- what a subclass supplies ---------------------------------------------------------------------------
+
+    _transient: tuple[str, ...] = ("_viewer",)
+    """Names of the attributes that can't be copied; `_restore` makes them again."""
+
+    def _begin(self, options: Mapping[str, Any], *, rng: np.random.Generator) -> Float1D:
+        """Draw a scene and return its state vector."""
+        raise NotImplementedError
+
+    def _advance(self, state: Float1D, action: Any) -> Float1D:
+        """Return the next state vector: a new array."""
+        raise NotImplementedError
+
+    def _info(self) -> dict[str, Any]:
+        """What `reset` and `step` report about the current state."""
+        return {}
+
+    def _hidden(self) -> Any:
+        """Everything besides the state vector that the future depends on; immutable."""
+        return None
+
+    def _restore(self, vector: Float1D, hidden: Any) -> None:
+        """Take over a state; `hidden` is ``None`` when only the scene is known."""
+
+    # --- helpers --------------------------------------------------------------------------------------------
+
+    def _observation(self) -> Observation:
+        # One fresh array per call, cut into views: callers may keep and change what they get.
+        copy = self._required_state().copy()
+        return {name: copy[cut] for name, cut in self._cuts}
+
+    def _required_state(self) -> Float1D:
+        if self._state is None:
+            raise ResetNeeded(f"call reset() before using {type(self).__name__}'s state")
+        return self._state
+
+    def _vector_of(self, scene: Scene) -> Float1D:
+        names, types = self._layout.names, self._layout.types
+        missing = [
+            name
+            for name, t in zip(names, types, strict=True)
+            if name not in scene or scene[name].type.properties != t.properties
+        ]
+        extra = [o.name for o in scene if o.type.has_body and o.name not in names]
+        if missing or extra:
+            raise ObservationError(
+                f"the scene doesn't fit this env: objects missing or of another type {missing}, unknown {extra}; "
+                "take scenes from an env made with the same arguments"
+            )
+        return np.concatenate([scene[name].values for name in names])
+
+
+def check_options(options: Mapping[str, Any], legal: Collection[str]) -> None:
+    """Raise `ConfigError` when an option of `reset` isn't one of `legal`."""
+    unknown = sorted(set(options) - set(legal))
+    if unknown:
+        raise ConfigError(f"unknown reset options {unknown}; this env has {sorted(legal)}")
+
+
+def checked_action(space: spaces.Space[Any], action: Any) -> Any:
+    """`action` as an element of `space`, or `ActionError`.
+
+    A Box takes any float dtype and values up to 1e-6 (relative) outside, which are clipped: `Box.contains` refuses
+    float64 in a float32 Box, and rounding to float32 may overstep the bounds.
+
+    Returns
+    -------
+    For a Box a float64 array of its shape, otherwise `action` itself.
+    """
+    if not isinstance(space, spaces.Box):
+        if not space.contains(action):
+            raise ActionError(f"action {action!r} lies outside {space}")
+        return action
+    array = np.asarray(action, dtype=np.float64)
+    slack = 1e-6 * np.maximum(1.0, np.abs(space.high))
+    if array.shape != space.shape or not np.all((array >= space.low - slack) & (array <= space.high + slack)):
+        raise ActionError(
+            f"expected an action of shape {space.shape} within [{space.low}, {space.high}], got {action!r}; "
+            "clip or rescale it"
+        )
+    return np.clip(array, space.low, space.high)
+
+
+def _observation_space(layout: SceneLayout, bounds: Bounds) -> spaces.Dict:
+    boxes: dict[str, spaces.Space[Any]] = {}
+    for name, t in zip(layout.names, layout.types, strict=True):
+        low, high = (np.array([bounds[p][k] for p in t.properties]) for k in (0, 1))
+        boxes[name] = spaces.Box(low, high, dtype=np.float64)
+    return spaces.Dict(boxes)
