@@ -1,0 +1,197 @@
+"""The architecture as tests: who may import whom (docs/architecture.md), and what the wheel holds."""
+
+from __future__ import annotations
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from source_tree import FOLDERS, ROOT, Import, Module, modules, room_of
+
+FOUNDATION = frozenset({"errors", "config"})
+ROOMS = FOUNDATION | {"scene", "numeric", "logic"}
+LEARNERS = ROOMS | {"clustering", "classification"}
+CORE = LEARNERS | {"model"}
+
+MAY_IMPORT = {
+    "errors": frozenset(),
+    "config": frozenset({"errors"}),
+    "scene": FOUNDATION,
+    "numeric": FOUNDATION,
+    "logic": FOUNDATION,
+    "clustering": ROOMS,
+    "classification": ROOMS,
+    "model": LEARNERS,
+    "baselines": CORE,
+    "envs": CORE,
+    "wrappers": CORE | {"envs"},
+    "experiments": CORE | {"baselines", "envs", "wrappers"},
+    "cli": CORE | {"baselines", "envs", "wrappers", "experiments"},
+    "__main__": frozenset({"cli"}),
+}
+"""Other rooms each room may import; a line here is a decision about the design, not a way to pass."""
+
+FACADE_USERS = frozenset({"experiments", "cli"})
+"""Rooms that may `import relgym` itself: those above all that the façade offers."""
+
+CORE_LIBRARIES = frozenset({"numpy", "scipy"})
+FCL = "relgym.scene.geometry.fcl"
+"""The only module that may import python-fcl."""
+
+HEAVY = ("fcl", "matplotlib", "pygame", "pymunk", "scipy.spatial", "sklearn", "stable_baselines3", "torch")
+"""What a bare `import relgym` must not load: each costs tenths of a second or more."""
+
+WORLD_WORDS = frozenset(
+    {"ball", "ceiling", "elasticity", "floor", "force", "friction", "ramp", "truck", "vx", "vy", "vz", "wall"}
+)
+"""Names of the two worlds' objects and properties; a learner that knows one has peeked."""
+
+
+def _rooms() -> list[str]:
+    return sorted({module.room for module in modules()} - {""})
+
+
+@pytest.mark.parametrize("room", _rooms())
+def test_rooms_import_only_what_lies_below(room: str) -> None:
+    assert room in MAY_IMPORT, f"relgym.{room} has no line in MAY_IMPORT: decide what lies below it"
+    wrong = [_sentence(m, i) for m in modules() if m.room == room for i in m.imports if _upward(room, i)]
+    below = ", ".join(sorted(MAY_IMPORT[room])) or "nothing"
+    assert not wrong, f"relgym.{room} may import of relgym only: {below}\n" + "\n".join(wrong)
+
+
+def test_no_relative_imports() -> None:
+    wrong = [_sentence(m, i) for m in modules() for i in m.imports if i.target.startswith(".")]
+    assert not wrong, "write the whole name: envs/ and wrappers/ move on installation\n" + "\n".join(wrong)
+
+
+def test_nobody_imports_from_the_root() -> None:
+    top = {"envs", "wrappers", "tests", "examples"}
+    wrong = [_sentence(m, i) for m in modules() for i in m.imports if i.target.split(".")[0] in top]
+    assert not wrong, "import relgym.envs, relgym.wrappers; never tests or examples\n" + "\n".join(wrong)
+
+
+def test_the_core_needs_numpy_scipy_and_fcl_alone() -> None:
+    wrong = [
+        _sentence(m, i)
+        for m in modules()
+        if m.room in CORE
+        for i in m.imports
+        if _third_party(i) and not (m.name == FCL and _package(i) == "fcl")
+    ]
+    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, and fcl in {FCL}\n" + "\n".join(wrong)
+
+
+def test_only_one_module_imports_fcl() -> None:
+    users = {module.name for module in modules() if any(_package(i) == "fcl" for i in module.imports)}
+    assert users == {FCL}
+
+
+def test_the_core_knows_no_world_by_name() -> None:
+    wrong = [
+        f"{module.file}:{node.lineno} holds {node.value!r}"
+        for module in modules()
+        if module.room in CORE
+        for node in _strings_but_docstrings(module.tree)
+        if node.value in WORLD_WORDS
+    ]
+    assert not wrong, "the core may not test an object's, type's or property's name\n" + "\n".join(wrong)
+
+
+def test_every_package_on_disk_is_installed() -> None:
+    declared = _pyproject()["tool"]["setuptools"]["packages"]
+    on_disk = sorted(module.name for module in modules() if module.is_package)
+    # A package that pyproject.toml forgets works in the editable install and is missing from the wheel.
+    assert sorted(declared) == on_disk
+
+
+def test_every_module_lies_in_a_package() -> None:
+    bare = sorted({m.path.parent for m in modules() if not (m.path.parent / "__init__.py").is_file()})
+    assert not bare, f"folders without __init__.py are left out of the wheel: {[str(path) for path in bare]}"
+
+
+def test_tests_do_not_shadow_the_package() -> None:
+    assert not (ROOT / "tests" / "relgym").exists(), (
+        "mirror relgym/ in tests/ itself: tests/relgym would shadow the package"
+    )
+
+
+def test_import_is_light(tmp_path: Path) -> None:
+    code = f"import relgym, sys; print([name for name in {HEAVY!r} if name in sys.modules])"
+    assert _python(code, cwd=tmp_path).stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", ["envs", "wrappers"])
+def test_second_copies_refuse_to_be_imported(name: str) -> None:
+    run = _python(f"import {name}", cwd=ROOT)
+    assert run.returncode == 1
+    assert f"relgym.{name}" in run.stderr.splitlines()[-1]
+
+
+def test_a_checkout_that_shadows_the_wheel_is_whole() -> None:
+    # -S: no editable install, so that ./relgym is all there is, as when a wheel is installed elsewhere.
+    libraries = os.pathsep.join(dict.fromkeys(sysconfig.get_path(key) for key in ("purelib", "platlib")))
+    code = "import relgym.envs, relgym.wrappers; print(relgym.envs.__file__, relgym.wrappers.__file__)"
+    run = _python(code, "-S", cwd=ROOT, PYTHONPATH=libraries)
+    assert run.stdout.split() == [str(FOLDERS[p] / "__init__.py") for p in ("relgym.envs", "relgym.wrappers")]
+
+
+@pytest.mark.parametrize("package", ["envs", "wrappers"])
+def test_mypy_sees_what_is_wrong(package: str, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    shutil.copytree(ROOT / "tests" / "typings", tmp_path / "tests" / "typings", symlinks=True)
+    for folder in ("relgym", "envs", "wrappers"):
+        (tmp_path / folder).mkdir()
+        planted = 'number: int = "text"\n' if folder == package else ""
+        (tmp_path / folder / "__init__.py").write_text(planted)
+    run = subprocess.run(
+        [sys.executable, "-m", "mypy"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert f"{package}/__init__.py:1: error: Incompatible types in assignment" in run.stdout, (
+        run.stdout + run.stderr
+    )
+    assert "Found 1 error in 1 file (checked 3 source files)" in run.stdout
+
+
+def _upward(room: str, found: Import) -> bool:
+    if _package(found) != "relgym":
+        return False
+    target = room_of(found.target)
+    if target not in MAY_IMPORT:  # `import relgym`, or a name of the façade
+        return room not in FACADE_USERS
+    return target != room and target not in MAY_IMPORT[room]
+
+
+def _third_party(found: Import) -> bool:
+    return _package(found) not in {"relgym", *CORE_LIBRARIES, *sys.stdlib_module_names}
+
+
+def _package(found: Import) -> str:
+    return found.target.split(".")[0]
+
+
+def _sentence(module: Module, found: Import) -> str:
+    return f"{module.file}:{found.line} imports {found.target}"
+
+
+def _strings_but_docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
+    prose = {node.value for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in prose:
+            yield node
+
+
+def _pyproject() -> dict[str, dict[str, dict[str, list[str]]]]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def _python(code: str, *options: str, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, *options, "-c", code]
+    environ = os.environ | variables
+    return subprocess.run(command, cwd=cwd, env=environ, capture_output=True, text=True, check=False)
