@@ -190,7 +190,7 @@ class ClusteringConfig:
     draws: int = 1536
     max_terms: int = 8
     own_only: bool = False
-    unify_ratio: float = 0.995
+    unify_ratio: float = 0.9
     support: int = 3
     refit_growth: float = 2.0
     stickiness: Literal["simple", "nearest"] = "simple"

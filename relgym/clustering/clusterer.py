@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relgym.clustering.discovery import Scale, find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.mode import NOISE, Mode
+from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, rounding_noise
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import covering, unified
@@ -151,8 +151,10 @@ class ModeClusterer:
         if fitting:
             mode = preferred(fitting, errors, self.clusters, self.scale, self.config)
             self._label[example] = mode
+            newest = self._next_id
             self._grow(table, mode)
-            return ClusterReport(mode, tuple(sorted(fitting)))
+            created = tuple(range(newest, self._next_id))
+            return ClusterReport(int(self._label[example]), tuple(sorted((*fitting, *created))), created)
         if errors and min(errors.values()) <= self.scale.tail:
             return ClusterReport(NOISE, ())  # a known mode's tail seeds nothing
         before = set(self.clusters)
@@ -191,28 +193,50 @@ class ModeClusterer:
         if cluster.unfitted >= (self.config.refit_growth - 1.0) * cluster.fitted:
             members = np.flatnonzero(self.labels == mode)
             self.clusters[mode] = refit(cluster, table, self.rows[members], self.y[members], self.scale)
+            self._split_rest(table, mode, members)
+
+    def _split_rest(self, table: ExampleTable, mode: int, members: NDArray[np.intp]) -> None:
+        """Give a mode's examples on which none of its terms acts a mode of their own, if they are enough.
+
+        Where v = 0, both ``v' = 0`` and ``v' = -0.9 v`` hold. That is rest, not bouncing: the simpler law is stated
+        apart, whichever was found first.
+        """
+        cluster = self.clusters[mode]
+        if cluster.mode.intercept != 0.0 or not cluster.mode.parameters:
+            return
+        idle = members[np.abs(self.y[members]) <= self.scale.tolerance]
+        idle = idle[cluster.idle(table, self.rows[idle], self.scale.tolerance)]
+        if len(idle) < least_examples(self.y, self.scale, self.config):
+            return
+        bare = Mode(self._next_id, self.target, (Role(self.target.type, ()),), 0.0, sigma=self.scale.sigma)
+        if any(bare.same_function(c.mode) for c in self.clusters.values()):
+            return
+        self.clusters[bare.id] = Cluster(bare, fitted=len(idle))
+        self._next_id += 1
+        self._label[idle] = bare.id
 
     # ------------------------------------------------------------------ noise scale
     def _rescale(self, table: ExampleTable) -> None:
         if self.config.noise_std != "auto":
             self.scale = replace(self.scale, sigma=float(self.config.noise_std))
             return
-        n = self._size
-        y, rows = self.y, self.rows
-        signature = table.signatures[table.signature_ids[rows[-1]]]
-        floor = rounding_noise(np.array([[self._largest]]), y[:256])
-        known = self.scale.sigma
-        if n in ESTIMATE_AT:
-            x = table.x[rows, : signature.own]
-            estimate = estimate_noise(x, y, table.strata[rows], floor=floor)
-            if estimate > 4.0 * floor and not 0.5 < estimate / known < 2.0:
+        floor = rounding_noise(np.array([[self._largest]]), self.y[:256])
+        if self._size in ESTIMATE_AT and 2 * self.noise_examples > self._size:
+            estimate = self._estimate(table, floor)
+            if estimate > 2.0 * self.scale.sigma:
                 self.scale = replace(self.scale, sigma=estimate)
-                self._start_over(table)
-            elif estimate > 4.0 * floor:
-                return
+                self._start_over()
         self.scale = replace(self.scale, sigma=max(floor, self.scale.sigma))
 
-    def _start_over(self, table: ExampleTable) -> None:
+    def _estimate(self, table: ExampleTable, floor: float) -> float:
+        """Noise among examples of the newest example's signature."""
+        ids = table.signature_ids[self.rows]
+        part = np.flatnonzero(ids == ids[-1])
+        order = table.signatures[ids[-1]].preference(self.target.property)
+        rows = self.rows[part]
+        return estimate_noise(table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor)
+
+    def _start_over(self) -> None:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""
         self.clusters.clear()
         self._searches.clear()
@@ -272,27 +296,40 @@ class ModeClusterer:
         cluster = self._cluster(fit, table, signature)
         members = self._explained(table, cluster, self._noise())
         absorbed: list[int] = []
-        for i in sorted(self.clusters, key=lambda k: (-int((self.labels == k).sum()), k)):
-            rival = self.clusters[i]
-            theirs = np.flatnonzero(self.labels == i)
-            if covering(cluster, table, self.rows[theirs], self.y[theirs], self.scale, self.config):
-                absorbed.append(i)
-                continue
-            general = unified(
-                table, self.rows, self.y, members, theirs,
-                target=self.target, scale=self.scale, config=self.config, rng=self._rng,
-                simpler_than=(cluster.mode, rival.mode),
-            )
-            if general is not None:
-                cluster = self._cluster(general[1], table, general[0])
-                absorbed.append(i)
-                members = np.concatenate([members, theirs])
+        while (wider := self._unify_once(table, cluster, members, absorbed)) is not None:
+            cluster, members, gone = wider
+            absorbed.append(gone)
         for i in absorbed:
             self._remove(i)
         new = self._next_id
         self._next_id += 1
         self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
         self._reassign(table, new)
+
+    def _unify_once(
+        self, table: ExampleTable, cluster: Cluster, members: NDArray[np.intp], absorbed: list[int]
+    ) -> tuple[Cluster, NDArray[np.intp], int] | None:
+        """Unify with the largest mode possible: the general function, its examples, and the mode it absorbs."""
+        rivals = [i for i in self.clusters if i not in absorbed]
+        for i in sorted(rivals, key=lambda k: (-int((self.labels == k).sum()), k)):
+            theirs = np.flatnonzero(self.labels == i)
+            both = np.concatenate([members, theirs])
+            if covering(cluster, table, self.rows[theirs], self.y[theirs], self.scale, self.config):
+                return cluster, both, i
+            general = unified(
+                table,
+                self.rows,
+                self.y,
+                members,
+                theirs,
+                target=self.target,
+                scale=self.scale,
+                config=self.config,
+                simpler_than=(cluster.mode, self.clusters[i].mode),
+            )
+            if general is not None:
+                return self._cluster(general[1], table, general[0]), both, i
+        return None
 
     def _cluster(self, fit: LinearFit, table: ExampleTable, signature: int) -> Cluster:
         roles = identify_roles(fit, table.signatures[signature])

@@ -46,6 +46,13 @@ class SlotSignature:
     given: tuple[tuple[str, str], ...] = ()
 
     @cached_property
+    def _hash(self) -> int:
+        return hash((self.types, self.given))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    @cached_property
     def columns(self) -> tuple[Column, ...]:
         """All columns, in order of preference."""
         found = []

@@ -58,6 +58,18 @@ class Cluster:
                 error[part], assignment[part] = binding.closest(table.x[rows[part]], y[part], scale.sigma)
         return error, assignment
 
+    def idle(
+        self, table: ExampleTable, rows: NDArray[np.integer], tolerance: float
+    ) -> NDArray[np.bool_]:
+        """Where every term of the target's own role vanishes and no other object has a say, shape ``(n,)``."""
+        still = np.full(len(rows), not any(r.terms for r in self.mode.open_roles))
+        for signature in np.unique(table.signature_ids[rows]):
+            part = np.flatnonzero(table.signature_ids[rows] == signature)
+            slots = table.signatures[int(signature)]
+            for prop, weight in self.mode.roles[0].terms:
+                still[part] &= np.abs(weight * table.x[rows[part], slots.column(0, prop)]) <= tolerance
+        return still
+
 
 def preferred(
     fitting: list[int], errors: dict[int, float], clusters: dict[int, Cluster], scale: Scale, config: ClusteringConfig

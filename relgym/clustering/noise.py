@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.numeric.stepwise import least_squares, varying_columns
+from relgym.numeric.stepwise import forward_stepwise
 
 __all__ = ["estimate_noise", "rounding_noise"]
+
+MOST_WINDOWS = 24
+"""At most about this many windows are looked at."""
 
 ROUNDINGS = 32.0
 """A function of a few terms on differences of stored numbers carries at most about this many roundings."""
@@ -36,27 +39,27 @@ def estimate_noise(
 ) -> float:
     """Noise of y about a locally linear function: lower quartile over windows of like examples.
 
-    Consecutive examples in the same relational state mostly share a mode; the spread that a linear function of the
-    target's own properties leaves in such a window is noise. Windows that straddle a change of mode leave more, hence
+    Consecutive examples in the same relational state mostly share a mode; the spread that a sparse linear
+    function leaves in such a window is noise. Windows that straddle a change of mode leave more, hence
     the lower quartile.
 
     Parameters
     ----------
     x
-        Columns offered to the local function, shape ``(n, d)``.
+        Columns offered to the local function, in order of preference, shape ``(n, d)``.
     y, strata
         Responses and relational states, shape ``(n,)``.
     floor
         Rounding noise; the estimate is never smaller, and equals it unless it is clearly larger.
     """
     spreads = []
-    for start in range(0, len(y) - window + 1, window // 2):
+    starts = range(0, len(y) - window + 1, max(window // 2, (len(y) - window) // MOST_WINDOWS + 1))
+    for start in starts:
         part = slice(start, start + window)
         if (strata[part] != strata[start]).any():
             continue
-        columns = tuple(int(c) for c in varying_columns(x[part]))[: window // 3]
-        fit = least_squares(x[part], y[part], columns)
-        spreads.append(np.sqrt(fit.rss / (window - len(columns) - 1)))
+        fit = forward_stepwise(x[part], y[part], sigma=floor, max_terms=window // 3, eliminate=False)
+        spreads.append(np.sqrt(fit.rss / (window - len(fit.columns) - 1)))
     if not spreads:
         return floor
     estimate = float(np.quantile(spreads, 0.25))

@@ -50,7 +50,6 @@ def unified(
     target: Target,
     scale: Scale,
     config: ClusteringConfig,
-    rng: np.random.Generator,
     simpler_than: tuple[Mode, Mode],
 ) -> tuple[int, LinearFit] | None:
     """A function that explains both sides, as (signature, fit on its columns), or None.

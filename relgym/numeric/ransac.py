@@ -142,7 +142,7 @@ def _forward_batch(
     residual = y - y.mean(axis=1, keepdims=True)
     enough = size * (LOOSE * sigma) ** 2
     chosen = np.full((draws, max(terms, 1)), -1, dtype=np.intp)
-    for t in range(terms):
+    for t in range(min(terms, a.shape[2])):
         left = np.square(residual).sum(axis=1)
         open_ = left > enough
         if not open_.any():
@@ -151,7 +151,8 @@ def _forward_batch(
         take = open_ & usable
         chosen[take, t] = best[take]
         q = np.where(take[:, None], a[np.arange(draws), :, best], 0.0)
-        q /= np.where(take, np.sqrt(np.square(q).sum(axis=1)), 1.0)[:, None]
+        length = np.sqrt(np.square(q).sum(axis=1))
+        q /= np.where(length > 0.0, length, 1.0)[:, None]
         residual = residual - (q * residual).sum(axis=1)[:, None] * q
         a -= q[:, :, None] * (q[:, :, None] * a).sum(axis=1)[:, None, :]
     chosen[np.square(residual).sum(axis=1) > enough, 0] = -2

@@ -176,7 +176,7 @@ def learn_tree(
     if not len(x) == len(positive) == len(weights) or len(names) != x.shape[1]:
         raise ConfigError(
             "a tree needs as many classes and weights as rows and a name per column; "
-            f"got x of shape {x.shape}, {len(positive)} classes, {len(weights)} weights and {len(names)} names"
+            f"got x of shape {x.shape}, {len(positive)} classes, {len(weights)} weights, {len(names)} names"
         )
     grower = _Grower(x, np.asarray(positive, dtype=np.bool_), weights, min_leaf, max_depth)
     root = grower.grow(np.arange(len(x)), 0)

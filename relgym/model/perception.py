@@ -1,0 +1,232 @@
+"""From scenes to what the learners see: relations, regression rows and situations, once for all targets (design §5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.examples import ExampleBatch, Vocabulary
+from relgym.clustering.columns import SlotSignature, slot_order
+from relgym.scene.contacts import contact_features
+from relgym.scene.context import canonical_order, signature
+from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema
+from relgym.scene.relations import Extractor, Relations, unary
+
+__all__ = ["Percept", "Perception", "Situation"]
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """A batch of scenes as one object sees them.
+
+    Attributes
+    ----------
+    examples
+        Relations and numbers for classifiers.
+    order
+        Object index in each slot, shape ``(n, slots)``; slot 0 is the object itself.
+    signature
+        Types of the slots, the same in all scenes.
+    keys
+        Relational state of each scene under that order.
+    """
+
+    examples: ExampleBatch
+    order: NDArray[np.intp]
+    signature: SlotSignature
+    keys: list[bytes]
+
+
+class Perception:
+    """Turns scenes of one schema into percepts; holds only caches.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    given
+        (type, property) pairs whose next values some target may use.
+    geometry
+        ``"arrays"`` (default) or ``"fcl"``.
+    """
+
+    def __init__(
+        self, schema: SceneSchema, given: tuple[tuple[str, str], ...] = (), geometry: str = "arrays"
+    ) -> None:
+        self.schema = schema
+        self.given = given
+        self.extractor = Extractor(schema, geometry=geometry)
+        self._contact_names = contact_features(schema)
+        self._pair_names = _names(t for t in schema.types if t.has_body)
+        self._unary_names = tuple(sorted({n for t in schema.types if t.has_body for n in schema.ancestry(t.name)}))
+        self._signatures: dict[tuple[ObjectType, ...], SlotSignature] = {}
+        self._gathers: dict[tuple[int, tuple[int, ...]], NDArray[np.intp]] = {}
+        self._layouts: dict[int, SceneLayout] = {}
+        self._own_columns: dict[tuple[int, int], NDArray[np.intp]] = {}
+        self._unary: dict[int, NDArray[np.bool_]] = {}
+        self._features: dict[int, tuple[NDArray[np.intp], NDArray[np.bool_]]] = {}
+
+    def percept(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> Percept:
+        """Relations of a batch of scenes, shape ``(n, layout.width)``."""
+        self._layouts[id(layout)] = layout  # keeps it alive, so that its id stays its own
+        return Percept(self, layout, vectors, self.extractor.extract(layout, vectors))
+
+    def vocabulary(self, target: ObjectType) -> Vocabulary:
+        """Names of what classifiers of a type's targets are shown."""
+        bodiless = [t for t in self.schema.types if not t.has_body and t.name != target.name]
+        own = [*_free(target), *(f"{t.name}.{p}" for t in sorted(bodiless, key=_by_name) for p in t.properties)]
+        binary = tuple(self.extractor.names)
+        taken = {*binary, *self._unary_names, *own}
+        pair = [*self._contact_names, *(f"other-{p}" if p in taken else p for p in self._pair_names)]
+        contact = frozenset({*self._contact_names, *self.extractor.contact_names})
+        return Vocabulary(binary, self._unary_names, tuple(pair), tuple(own), contact)
+
+    def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:
+        """The slot signature of these types."""
+        if (known := self._signatures.get(types)) is None:
+            known = self._signatures[types] = SlotSignature(types, self.given)
+        return known
+
+    def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
+        """Columns of a regression row in the concatenation of a state vector and its next one; cached."""
+        key = (id(layout), order)
+        if (known := self._gathers.get(key)) is None:
+            known = self._gathers[key] = sig.gather(layout, order)
+        return known
+
+    def own_columns(self, layout: SceneLayout, target: int) -> NDArray[np.intp]:
+        """Where the vocabulary's own features lie in a state vector that a NaN was appended to."""
+        key = (id(layout), target)
+        if (known := self._own_columns.get(key)) is None:
+            places = [layout.column(target, p) for p in _free(layout.types[target])]
+            for t in sorted(self.schema.types, key=_by_name):
+                if t.has_body or t.name == layout.types[target].name:
+                    continue
+                where = layout.of_type(t.name)
+                places += [layout.column(where[0], p) if len(where) == 1 else layout.width for p in t.properties]
+            known = self._own_columns[key] = np.array(places, dtype=np.intp)
+        return known
+
+    def unary_table(self, layout: SceneLayout) -> NDArray[np.bool_]:
+        """Truth of the unary relations, shape ``(U, bodies)``."""
+        if (known := self._unary.get(id(layout))) is None:
+            truth = unary(self.schema, layout)
+            none = np.zeros(len(layout.bodies), dtype=bool)
+            rows = [truth.get(name, none) for name in self._unary_names]
+            known = self._unary[id(layout)] = np.array(rows, dtype=bool).reshape(len(rows), len(none))
+        return known
+
+    def feature_columns(self, layout: SceneLayout) -> NDArray[np.intp]:
+        """Columns of the bodies' own numbers (`pair` beyond contacts), shape ``(bodies, P)``; NaN's where missing."""
+        if (known := self._features.get(id(layout))) is None:
+            table = np.full((len(layout.bodies), len(self._pair_names)), layout.width, dtype=np.intp)
+            for row, i in enumerate(layout.bodies):
+                for k, name in enumerate(self._pair_names):
+                    if name in _free(layout.types[i]):
+                        table[row, k] = layout.column(i, name)
+            known = self._features[id(layout)] = (table, np.zeros(0, dtype=bool))
+        return known[0]
+
+
+@dataclass(slots=True)
+class Percept:
+    """A batch of scenes with their relations; situations of its objects are made when asked for."""
+
+    perception: Perception
+    layout: SceneLayout
+    vectors: NDArray[np.float64]
+    relations: Relations
+    _situations: dict[int, Situation] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.vectors)
+
+    def situation(self, target: int) -> Situation:
+        """How the object with this index is situated."""
+        if (known := self._situations.get(target)) is None:
+            known = self._situations[target] = self._situate(target)
+        return known
+
+    def rows(self, target: int, following: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Regression rows of an object, shape ``(n, columns)``.
+
+        Parameters
+        ----------
+        target
+            Index of the object.
+        following
+            Next state vectors as far as known, shape ``(n, layout.width)``: primed columns are read from them.
+        """
+        place = self.situation(target)
+        both = np.concatenate([self.vectors, following], axis=1)
+        if len(self) == 1:
+            return both[:, self.perception.gather(self.layout, place.signature, tuple(place.order[0].tolist()))]
+        rows = np.empty((len(self), len(place.signature.columns)))
+        orders, which = np.unique(place.order, axis=0, return_inverse=True)
+        for k, order in enumerate(orders):
+            part = np.flatnonzero(which.reshape(-1) == k)
+            columns = self.perception.gather(self.layout, place.signature, tuple(order.tolist()))
+            rows[part] = both[part][:, columns]
+        return rows
+
+    def _situate(self, target: int) -> Situation:
+        layout, perception, n = self.layout, self.perception, len(self)
+        bodies = np.array(layout.bodies, dtype=np.intp)
+        if target in layout.bodies:
+            body = layout.bodies.index(target)
+            others = bodies[canonical_order(self.relations, body)]
+            keys = signature(self.relations, body)
+            examples = self._embodied(body, target)
+        else:
+            others = np.broadcast_to(bodies, (n, len(bodies)))
+            keys = [b""] * n
+            examples = self._bodiless(target)
+        head = np.array(slot_order(layout, target, ()), dtype=np.intp)
+        order = np.concatenate([np.broadcast_to(head, (n, len(head))), others], axis=1)
+        types = tuple(layout.types[i] for i in order[0])
+        return Situation(examples, order, perception.signature_of(types), keys)
+
+    def _padded(self) -> NDArray[np.float64]:
+        return np.concatenate([self.vectors, np.full((len(self), 1), np.nan)], axis=1)
+
+    def _embodied(self, body: int, target: int) -> ExampleBatch:
+        perception, relations, n = self.perception, self.relations, len(self)
+        padded = self._padded()
+        own = padded[:, perception.own_columns(self.layout, target)]
+        numbers = padded[:, perception.feature_columns(self.layout)]
+        pair = np.concatenate([relations.contacts(body), numbers], axis=2)
+        pair[:, body] = np.nan
+        table = perception.unary_table(self.layout)
+        every = np.broadcast_to(table, (n, *table.shape))
+        return ExampleBatch(relations.table, every, relations.context(body), pair, own, body)
+
+    def _bodiless(self, target: int) -> ExampleBatch:
+        """An object without a body stands alone: no relations, only numbers."""
+        perception, n = self.perception, len(self)
+        own = self._padded()[:, perception.own_columns(self.layout, target)]
+        names = len(perception.vocabulary(self.layout.types[target]).pair)
+        binary, single = len(perception.extractor.names), len(perception._unary_names)
+        return ExampleBatch(
+            np.zeros((n, binary, 1, 1), dtype=bool),
+            np.zeros((n, single, 1), dtype=bool),
+            np.ones((n, 1), dtype=bool),
+            np.full((n, 1, names), np.nan),
+            own,
+            0,
+        )
+
+
+def _by_name(t: ObjectType) -> str:
+    return t.name
+
+
+def _free(t: ObjectType) -> tuple[str, ...]:
+    """Properties that are no pose component: those that may be compared with thresholds (R2)."""
+    pose = {k for k in t.pose_columns() if k >= 0} if t.has_body else set()
+    return tuple(p for k, p in enumerate(t.properties) if k not in pose)
+
+
+def _names(types: object) -> tuple[str, ...]:
+    return tuple(sorted({p for t in types for p in _free(t)}))  # type: ignore[attr-defined]

@@ -1,0 +1,126 @@
+"""What a model says of the next step: values, and how they came about."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.scene.objects import Scene, SceneLayout
+
+__all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
+
+
+class Outcome(enum.Enum):
+    """How a prediction came about; the value is the sentence for people.
+
+    Only `PREDICTED` is a mode's word. With every other outcome the value is *persistence*: the property keeps its
+    value, and that is a stopgap, not a claim.
+    """
+
+    PREDICTED = "predicted by a mode"
+    NO_MODE = "no mode learned yet: learn from more transitions"
+    NO_ROLES = "no mode's roles could be filled by the objects in the scene"
+    OUTSIDE = "outside experience: nothing like this situation was seen in training"
+
+
+OUTCOMES = tuple(Outcome)
+"""Order in which batches number outcomes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """The next value of one property of one object.
+
+    Attributes
+    ----------
+    object, property
+        What is predicted.
+    value
+        Its next value, in units of the property.
+    outcome
+        Whether a mode predicted it, or why none did.
+    mode
+        Id of the mode; 0 if none.
+    roles
+        Names of the objects that play the mode's roles, the target first.
+    margin
+        Lead of the mode over its rival, in log-odds; infinite with a single mode, 0 with none.
+    """
+
+    object: str
+    property: str
+    value: float
+    outcome: Outcome
+    mode: int = 0
+    roles: tuple[str, ...] = ()
+    margin: float = 0.0
+
+    @property
+    def ok(self) -> bool:
+        """Whether a mode predicted it."""
+        return self.outcome is Outcome.PREDICTED
+
+
+@dataclass(frozen=True, slots=True)
+class ScenePrediction:
+    """The next scene, and the predictions it was made of.
+
+    Attributes
+    ----------
+    scene
+        The next scene; properties that no target and no kinematics cover keep their values.
+    parts
+        One `Prediction` per target of every object, in causal order.
+    """
+
+    scene: Scene
+    parts: tuple[Prediction, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether every part was predicted by a mode."""
+        return all(p.ok for p in self.parts)
+
+    def __getitem__(self, key: tuple[str, str]) -> Prediction:
+        """Return the part of an (object, property)."""
+        for part in self.parts:
+            if (part.object, part.property) == key:
+                return part
+        raise KeyError(f"no prediction of {key}; there are {[(p.object, p.property) for p in self.parts]}")
+
+
+@dataclass(frozen=True, slots=True)
+class BatchPrediction:
+    """Predictions for n scenes with the same objects.
+
+    Attributes
+    ----------
+    layout
+        The scenes' layout.
+    vectors
+        Next state vectors, shape ``(n, layout.width)``.
+    parts
+        The (object, property) of each target, in causal order.
+    modes
+        Ids of the modes, shape ``(n, len(parts))``; 0 where none predicted.
+    outcomes
+        Position in `OUTCOMES`, shape ``(n, len(parts))``.
+    margins
+        Shape ``(n, len(parts))``.
+    """
+
+    layout: SceneLayout
+    vectors: NDArray[np.float64]
+    parts: tuple[tuple[str, str], ...]
+    modes: NDArray[np.int64]
+    outcomes: NDArray[np.int8]
+    margins: NDArray[np.float64]
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Scenes all of whose parts a mode predicted, shape ``(n,)``."""
+        predicted: NDArray[np.bool_] = (self.outcomes == OUTCOMES.index(Outcome.PREDICTED)).all(axis=1)
+        return predicted
