@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-# Python started in a checkout takes ./relgym before an installed wheel; envs/ and wrappers/ then lie beside it.
+# Python started in a checkout takes ./relgym before an installed wheel; envs/ and wrappers/ lie beside it.
 _ROOT = Path(__file__).resolve().parent.parent
 if (_ROOT / "pyproject.toml").is_file() and (_ROOT / "envs" / "__init__.py").is_file():
     __path__.append(str(_ROOT))

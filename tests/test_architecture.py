@@ -106,9 +106,11 @@ def test_the_core_knows_no_world_by_name() -> None:
 
 def test_every_package_on_disk_is_installed() -> None:
     declared = _pyproject()["tool"]["setuptools"]["packages"]
-    on_disk = sorted(module.name for module in modules() if module.is_package)
+    on_disk = {module.name for module in modules() if module.is_package}
     # A package that pyproject.toml forgets works in the editable install and is missing from the wheel.
-    assert sorted(declared) == on_disk
+    assert not (new := on_disk - set(declared)), f"add to pyproject.toml's packages: {sorted(new)}"
+    assert not (gone := set(declared) - on_disk), f"take out of pyproject.toml's packages: {sorted(gone)}"
+    assert len(declared) == len(on_disk), "a package is listed twice"
 
 
 def test_every_module_lies_in_a_package() -> None:
