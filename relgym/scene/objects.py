@@ -100,9 +100,16 @@ class ObjectType:
                 )
         for component in self.pose:
             if component not in POSE:
-                raise SchemaError(f"type {self.name!r}: {component!r} is no pose component; expected one of {POSE}")
+                raise SchemaError(
+                    f"type {self.name!r}: {component!r} is no pose component; expected one of {POSE}"
+                )
         if self.velocity and len(self.velocity) != 3:
-            raise SchemaError(f"type {self.name!r}: velocity needs three entries (x, y, z), got {self.velocity}")
+            raise SchemaError(
+                f"type {self.name!r}: velocity needs three entries (x, y, z), got {self.velocity}"
+            )
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.properties))
 
     @property
     def has_body(self) -> bool:
@@ -192,7 +199,9 @@ class SceneSchema:
             raise SchemaError(f"object names must differ, got {objects}")
         for name, type_name in self.objects:
             if not name.isidentifier():
-                raise SchemaError(f"object name {name!r} must be a Python identifier (letters, digits, underscore)")
+                raise SchemaError(
+                    f"object name {name!r} must be a Python identifier (letters, digits, underscore)"
+                )
             if type_name not in names:
                 raise SchemaError(f"object {name!r} has unknown type {type_name!r}; the schema has {names}")
         for law in self.kinematics:

@@ -1,16 +1,32 @@
-"""Canonical shapes of object types: one per type, of unit size; a scene's `sx sy sz` scale them."""
+"""Canonical shapes of object types: one per type, of unit size; a scene's `sx sy sz` scale them.
+
+A shape lives in the schema, its size and pose in the observation (design §4). Canonical coordinates are scaled by the
+extents, rotated about the world axes by `rx`, then `ry`, then `rz` (R = Rz Ry Rx), and moved to the position. So
+`sx sy sz` are the full extents along x, y, z before the rotation, for every shape that fills the unit cube.
+
+In a planar schema only the outline in the plane of the first axis and the up axis counts, turned about the depth axis;
+the other two rotations are ignored. The *first* axis is the one that is neither up nor depth: x unless x is up.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TypeAlias
 
-__all__ = ["Box", "ConvexPolyhedron", "Prism", "Shape", "Sphere", "Wedge"]
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.scene.hull import check_polygon, facets, outline_of
+
+__all__ = ["Box", "ConvexPolyhedron", "Prism", "Shape", "Sphere", "Wedge", "outline"]
 
 
 @dataclass(frozen=True, slots=True)
 class Sphere:
-    """A ball of diameter 1 around the origin (a disc in a planar schema)."""
+    """A ball of diameter 1 around the origin (a disc in a planar schema).
+
+    It stays round: a scene's diameter is `sx`, and extents that differ by more than 1e-9 of it raise `ShapeError`.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,16 +41,64 @@ class Wedge:
 
 @dataclass(frozen=True, slots=True)
 class Prism:
-    """A convex polygon in the plane of the first axis and the up axis, extruded along the depth axis."""
+    """A convex polygon in the plane of the first axis and the up axis, extruded from -1/2 to 1/2 along the depth axis.
+
+    Parameters
+    ----------
+    vertices
+        Corners in order round the outline, in either sense. `ShapeError` where they aren't strictly convex.
+    """
 
     vertices: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        check_polygon(self.vertices)
 
 
 @dataclass(frozen=True, slots=True)
 class ConvexPolyhedron:
-    """The convex polyhedron with these corners."""
+    """The convex polyhedron with these corners, given along x, y and z.
+
+    Parameters
+    ----------
+    vertices
+        Corners in any order. `ShapeError` where they lie in one plane or one isn't a corner of their convex hull.
+    """
 
     vertices: tuple[tuple[float, float, float], ...]
 
+    def __post_init__(self) -> None:
+        facets(self.vertices)
+
 
 Shape: TypeAlias = Sphere | Box | Wedge | Prism | ConvexPolyhedron
+
+_SQUARE = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
+_TRIANGLE = ((-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))
+
+
+def outline(shape: Shape, plane: tuple[int, int] = (0, 1)) -> NDArray[np.float64]:
+    """Outline of a canonical shape in the plane of the first axis and the up axis.
+
+    Parameters
+    ----------
+    shape
+        Any shape but a sphere, whose outline has no corners.
+    plane
+        World axes (0, 1, 2) that are first and up.
+
+    Returns
+    -------
+    Corners, counter-clockwise, shape ``(V, 2)``.
+    """
+    match shape:
+        case Box():
+            return np.array(_SQUARE)
+        case Wedge():
+            return np.array(_TRIANGLE)
+        case Prism(vertices):
+            return np.array(vertices if check_polygon(vertices) else vertices[::-1], dtype=np.float64)
+        case ConvexPolyhedron(corners):
+            return outline_of(np.array(corners, dtype=np.float64)[:, list(plane)])
+        case Sphere():
+            raise TypeError("a sphere's outline has no corners")
