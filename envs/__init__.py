@@ -16,7 +16,7 @@ _HOMES = {
     "TruckPushEnv": "relgym.envs.truck_push",
     "render_scene": "relgym.envs.rendering",
 }
-"""Where each public name lives; loaded on first use, so that `import relgym` needs neither pymunk nor pygame."""
+"""Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""
 
 __all__ = [
     "BallBoxRampEnv",

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from relgym.envs.arguments import Coefficient, checked_count, counted, numbered, per_object
 from relgym.envs.ball_scenes import BALL_PLACES, Placed, draw_room, option_names
 from relgym.envs.base import SceneEnv, check_options
 from relgym.envs.physics import BallWorld, Contact, Obstacle, Point
 from relgym.errors import ConfigError
-from relgym.scene.objects import POSE, Float1D, Kinematics, ObjectType, Scene, SceneSchema, Target
+from relgym.scene.objects import POSE, Float1D, Kinematics, ObjectType, SceneSchema, Target
 from relgym.scene.shapes import Box, Sphere, Wedge
 
 __all__ = ["BallBoxRampEnv", "configurations"]
@@ -24,8 +25,6 @@ _X, _Y, _SX, _SY, _RZ = (POSE.index(name) for name in ("px", "py", "sx", "sy", "
 _VX = len(POSE)  # a ball's velocity follows its pose
 _WEDGE = ((-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))  # vertical side left, slope descending to the right
 _BOX = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
-
-Coefficient = float | Mapping[str, float]
 
 
 def configurations() -> tuple[dict[str, Any], ...]:
@@ -44,11 +43,12 @@ class BallBoxRampEnv(SceneEnv):
 
     Description
     -----------
-    The world of the thesis' experiments (§4.1). A ball that doesn't rotate moves under gravity among a floor,
-    a ceiling, two walls and what stands on the floor. One step is 0.01 s. The pair of position and velocity at one
-    step determines the next: with g = (0, -9.8e-4), a contact's unit normal n, elasticity e and friction mu,
-    ``J = max(0, -((1+e) v.n + g.n))`` and ``v' = v + g + J n + friction``, where friction opposes sliding and is at
-    most ``mu J``. Balls have elasticity and friction 1, so that a contact has the coefficients of the obstacle.
+    The world of the thesis' experiments (§4.1). A ball that doesn't rotate moves under gravity among a
+    floor, a ceiling, two walls and what stands on the floor. One step is 0.01 s. The pair of position and
+    velocity at one step determines the next: with g = (0, -9.8e-4), a contact's unit normal n, elasticity e
+    and friction mu, ``J = max(0, -((1+e) v.n + g.n))`` and ``v' = v + g + J n + friction``, where friction
+    opposes sliding and is at most ``mu J``. Balls have elasticity and friction 1, so that a contact has the
+    coefficients of the obstacle.
 
     Action Space
     ------------
@@ -67,8 +67,8 @@ class BallBoxRampEnv(SceneEnv):
     vx, vy (balls only)  last displacement, p_t - p_{t-1}          unit     -1        1
     ===================  ========================================  =======  ========  =======
 
-    Objects: ``ball``; ``box``, ``ramp``; ``floor``, ``ceiling``, ``left_wall``, ``right_wall``. A ramp's vertical
-    side is on its left, wherever it stands; its incline is sy / sx.
+    Objects: ``ball``; ``box``, ``ramp``; ``floor``, ``ceiling``, ``left_wall``, ``right_wall``. A ramp's
+    vertical side is on its left, wherever it stands; its incline is sy / sx.
 
     Rewards
     -------
@@ -76,21 +76,23 @@ class BallBoxRampEnv(SceneEnv):
 
     Starting State
     --------------
-    Room 4.5–6 wide and 2.5–3.5 high; ball radius 0.08–0.15; box 0.6–1 wide, 0.4–0.9 high; ramp base 1–1.5, scaled
-    down when it would be higher than 1. Box and ramp touch, or are 4–8 ball radii apart, with 30–70 % of the free
-    floor on their left. *Leftmost* and *rightmost*: on the floor, sunk 1–10 mm, 3–6 units/s; *above-left* and
-    *above-right*: 0.1–0.8 over the object; *between*: 0.05–0.6 over the higher one, or on the floor in half of the
-    cases where there is one between them. In the air: 0.5–4 units/s sideways. Everything is shifted by up to 5 along
-    both axes. All uniform. The first velocity is the displacement that led to the first position.
+    Room 4.5–6 wide and 2.5–3.5 high; ball radius 0.08–0.15; box 0.6–1 wide, 0.4–0.9 high; ramp base 1–1.5,
+    scaled down when it would be higher than 1. Box and ramp touch, or are 4–8 ball radii apart, with 30–70
+    % of the free floor on their left. *Leftmost* and *rightmost*: on the floor, sunk 1–10 mm, 3–6 units/s;
+    *above-left* and *above-right*: 0.1–0.8 over the object; *between*: 0.05–0.6 over the higher one, or on
+    the floor in half of the cases where there is one between them. In the air: 0.5–4 units/s sideways.
+    Everything is shifted by up to 5 along both axes. All uniform. The first velocity is the displacement
+    that led to the first position.
 
-    Reset options, all optional: ``ramp`` ("left", "right"), ``touching`` (bool), ``ball`` ("leftmost", "above-left",
-    "between", "above-right", "rightmost"), ``direction`` ("left", "right"), and every other draw: ``room_width``,
-    ``room_height``, ``left_share``, ``gap`` (in ball radii), ``shift_x``, ``shift_y``, ``box_width``, ``box_height``,
-    ``ramp_base``, ``ball_radius``, ``ball_floor`` (bool), ``ball_x`` (0–1 along the place), ``ball_sink``,
-    ``ball_drop``, ``ball_speed``. `reset_options` lists those of an instance: objects beyond the first of their kind
-    have options of their own (``box2_width``, ``ball2``, ``ball2_direction``), and ``order`` replaces ``ramp`` when
-    the standing objects aren't a box and a ramp. ``info["configuration"]`` holds what was drawn: passed as options,
-    it gives the same scene again.
+    Reset options, all optional: ``ramp`` ("left", "right"), ``touching`` (bool), ``ball`` ("leftmost",
+    "above-left", "between", "above-right", "rightmost"), ``direction`` ("left", "right"), and every other
+    draw: ``room_width``, ``room_height``, ``left_share``, ``gap`` (in ball radii), ``shift_x``,
+    ``shift_y``, ``box_width``, ``box_height``, ``ramp_base``, ``ball_radius``, ``ball_floor`` (bool),
+    ``ball_x`` (0–1 along the place), ``ball_sink``, ``ball_drop``, ``ball_speed``. `reset_options` lists
+    those of an instance: objects beyond the first of their kind have options of their own (``box2_width``,
+    ``ball2``, ``ball2_direction``), and ``order`` replaces ``ramp`` when the standing objects aren't a box
+    and a ramp. ``info["configuration"]`` holds what was drawn: passed as options, it gives the same scene
+    again.
 
     Episode End
     -----------
@@ -98,8 +100,9 @@ class BallBoxRampEnv(SceneEnv):
 
     Info
     ----
-    ``info["contacts"]``: a tuple of `Contact`, the engine's own record of what touches what in the current state,
-    which is what decides the next step. At reset also ``info["scene"]`` and ``info["configuration"]``.
+    ``info["contacts"]``: a tuple of `Contact`, the engine's own record of what touches what in the current
+    state, which is what decides the next step. At reset also ``info["scene"]`` and
+    ``info["configuration"]``.
 
     Arguments
     ---------
@@ -114,8 +117,9 @@ class BallBoxRampEnv(SceneEnv):
     balls
         How many balls (>= 1): ``ball``, ``ball2``, …
     type_names
-        ``"shape"``: ball, box, ramp, floor, wall, ceiling. ``"thesis"``: the coefficients are part of the type's
-        name (§4.2), friction first: ``box_0.1_0.9``, ``ramp_0.3_0.8_60``; the parent is ``box``, ``ramp``.
+        ``"shape"``: ball, box, ramp, floor, wall, ceiling. ``"thesis"``: the coefficients are part of the
+        type's name (§4.2), friction first: ``box_0.1_0.9``, ``ramp_0.3_0.8_60``; the parent is ``box``,
+        ``ramp``.
 
     Version History
     ---------------
@@ -134,13 +138,13 @@ class BallBoxRampEnv(SceneEnv):
         type_names: str = "shape",
         render_mode: str | None = None,
     ) -> None:
-        self._standing = _standing(objects)
-        self._balls = _numbered("ball", _checked_count("balls", balls, least=1))
+        self._standing = counted(objects, _KINDS)
+        self._balls = numbered("ball", checked_count("balls", balls, 1, 100))
         kinds = {**dict.fromkeys(self._balls, "ball"), **self._standing, **_SHELL}
         ramps = {name: kind for name, kind in self._standing.items() if kind == "ramp"}
-        self._incline = _per_object("incline", incline, ramps, 30.0, (1e-3, 90.0 - 1e-3))
-        self._elasticity = _per_object("elasticity", elasticity, kinds, 0.9, (0.0, 1.0))
-        self._friction = _per_object("friction", friction, kinds, 0.0, (0.0, math.inf))
+        self._incline = per_object("incline", incline, ramps, 30.0, (1e-3, 90.0 - 1e-3))
+        self._elasticity = per_object("elasticity", elasticity, kinds, 0.9, (0.0, 1.0))
+        self._friction = per_object("friction", friction, kinds, 0.0, (0.0, math.inf))
         types = self._types(kinds, type_names)
         super().__init__(
             _schema(kinds, types), spaces.Discrete(1), {"vx": (-1.0, 1.0), "vy": (-1.0, 1.0)}, render_mode
@@ -162,7 +166,7 @@ class BallBoxRampEnv(SceneEnv):
 
     @property
     def _engine(self) -> BallWorld:
-        assert self._world is not None
+        assert self._world is not None, "made at reset"
         return self._world
 
     def _begin(self, options: Mapping[str, Any], *, rng: np.random.Generator) -> Float1D:
@@ -198,12 +202,8 @@ class BallBoxRampEnv(SceneEnv):
     def _info(self) -> dict[str, Any]:
         return {"contacts": self._engine.contacts()}
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Float1D], dict[str, Any]]:
-        """Begin an episode; the class lists the `options`."""
-        observation, info = super().reset(seed=seed, options=options)
-        return observation, {**info, "configuration": dict(self._configuration)}
+    def _reset_info(self) -> dict[str, Any]:
+        return {"configuration": dict(self._configuration)}
 
     def _hidden(self) -> Any:
         return tuple(self._engine.velocities())
@@ -216,7 +216,7 @@ class BallBoxRampEnv(SceneEnv):
             self._engine.resume([(vector[o + _X], vector[o + _Y]) for o in self._offsets], hidden)
 
     def _build(self, state: Float1D) -> BallWorld:
-        scene = Scene(self.schema, self._layout, state.copy())
+        scene = self._scene_of(state)
         obstacles = [
             Obstacle(o.name, _vertices(o.type, o.values), self._elasticity[o.name], self._friction[o.name])
             for o in scene
@@ -276,50 +276,3 @@ def _vertices(t: ObjectType, values: Float1D) -> tuple[Point, ...]:
         cos, sin = math.cos(angle), math.sin(angle)
         corners = [(cos * u - sin * w, sin * u + cos * w) for u, w in corners]
     return tuple((x + u, y + w) for u, w in corners)
-
-
-def _standing(objects: Sequence[str] | Mapping[str, int]) -> dict[str, str]:
-    """Name and kind of each object that stands on the floor."""
-    if isinstance(objects, str):
-        raise ConfigError(
-            f"objects={objects!r}: expected a sequence such as ({objects!r},) or counts by kind"
-        )
-    kinds = list(objects)
-    unknown = sorted({str(kind) for kind in kinds if kind not in _KINDS})
-    if unknown:
-        raise ConfigError(
-            f"objects: unknown kinds {unknown}; expected {_KINDS} (`balls` says how many balls)"
-        )
-    counts = dict(objects) if isinstance(objects, Mapping) else {kind: kinds.count(kind) for kind in kinds}
-    return {
-        name: kind
-        for kind, count in counts.items()
-        for name in _numbered(kind, _checked_count(f"objects[{kind!r}]", count, least=0))
-    }
-
-
-def _numbered(kind: str, count: int) -> tuple[str, ...]:
-    return tuple(kind if k == 1 else f"{kind}{k}" for k in range(1, count + 1))
-
-
-def _checked_count(what: str, count: Any, *, least: int) -> int:
-    if not isinstance(count, (int, np.integer)) or not least <= count <= 100:
-        raise ConfigError(f"{what}={count!r}: expected a whole number from {least} to 100")
-    return int(count)
-
-
-def _per_object(
-    what: str, value: Coefficient, kinds: Mapping[str, str], default: float, span: tuple[float, float]
-) -> dict[str, float]:
-    """The value for each object: its own entry, or else its kind's, or else the default."""
-    given = value if isinstance(value, Mapping) else dict.fromkeys(kinds, value)
-    legal = sorted({*kinds, *kinds.values()})
-    unknown = sorted(set(given) - set(legal))
-    if unknown:
-        raise ConfigError(f"{what}: unknown objects {unknown}; expected names or kinds among {legal}")
-    for key, number in given.items():
-        if not isinstance(number, (int, float, np.integer, np.floating)) or not span[0] <= number <= span[1]:
-            raise ConfigError(
-                f"{what}={number!r} (for {key!r}): expected a number from {span[0]:g} to {span[1]:g}"
-            )
-    return {name: float(given.get(name, given.get(kind, default))) for name, kind in kinds.items()}

@@ -1,7 +1,7 @@
 """Draws rooms with balls, boxes and ramps: the distribution of initial scenes of ``relgym/BallBoxRamp-v0``.
 
-The thesis names the 40 configurations (§4.2, Table 4.1) and leaves sizes and speeds open. Those below are this
-project's, and all of its figures hold for them: changing one means a new version of the env.
+The thesis names the 40 configurations (§4.2, Table 4.1) and leaves sizes and speeds open. Those below are
+this project's, and all of its figures hold for them: changing one means a new version of the env.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def draw_room(
         if room is not None:
             return room
     raise ConfigError(
-        f"the reset options {dict(options)} leave no room for a ball: {_ATTEMPTS} draws of the rest didn't fit; "
+        f"the reset options {dict(options)} leave no room for a ball: {_ATTEMPTS} draws didn't fit; "
         "enlarge room_width, or fix fewer sizes"
     )
 

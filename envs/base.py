@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from relgym.errors import ActionError, ConfigError, ObservationError
 from relgym.scene.objects import POSE, Float1D, Scene, SceneLayout, SceneSchema
 
-__all__ = ["DEFAULT_BOUNDS", "EnvState", "Observation", "SceneEnv", "check_options", "checked_action"]
+__all__ = [
+    "DEFAULT_BOUNDS",
+    "EnvState",
+    "Observation",
+    "SceneEnv",
+    "check_options",
+    "checked_action",
+    "physical_action",
+]
 
 Observation: TypeAlias = dict[str, NDArray[np.float64]]
 """Property vector of every object, by name."""
@@ -53,8 +61,8 @@ class EnvState:
 class SceneEnv(gym.Env[Observation, Any]):
     """Base of the envs whose observations are scenes.
 
-    A subclass says how an episode begins (`_begin`), how a step goes (`_advance`) and, if its state is more than
-    the state vector, how the rest is saved and restored (`_hidden`, `_restore`).
+    A subclass says how an episode begins (`_begin`), how a step goes (`_advance`) and, if its state is more
+    than the state vector, how the rest is saved and restored (`_hidden`, `_restore`).
 
     Parameters
     ----------
@@ -86,7 +94,9 @@ class SceneEnv(gym.Env[Observation, Any]):
         self.render_mode = render_mode
         self.action_space = action_space
         self._layout = schema.layout(name for name in schema.order if schema.type_of(name).has_body)
-        self.observation_space = _observation_space(self._layout, {**DEFAULT_BOUNDS, **bounds})
+        self.observation_space: spaces.Space[Any] = _observation_space(
+            self._layout, {**DEFAULT_BOUNDS, **bounds}
+        )
         self._cuts = [(name, self._layout.slice(i)) for i, name in enumerate(self._layout.names)]
         self._state: Float1D | None = None
         self._viewer: Any = None
@@ -107,18 +117,20 @@ class SceneEnv(gym.Env[Observation, Any]):
         self._state = self._begin(options or {}, rng=self.np_random)
         if self.render_mode == "human":
             self.render()
-        return self._observation(), {"scene": self.scene, **self._info()}
+        return self._observation(), {"scene": self.scene, **self._info(), **self._reset_info()}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advance by one step; `ActionError` when `action` lies outside the action space."""
-        state = self._required_state()
-        self._state = self._advance(state, checked_action(self.action_space, action))
+        before = self._required_state()
+        checked = checked_action(self.action_space, action)
+        self._state = self._advance(before, checked)
+        reward, terminated = self._judge(before, checked, self._state)
         if self.render_mode == "human":
             self.render()
-        return self._observation(), 0.0, False, False, self._info()
+        return self._observation(), reward, terminated, False, self._info()
 
     def render(self) -> Any:
-        """Draw the scene: an array of shape (height, width, 3) for ``"rgb_array"``, a window for ``"human"``."""
+        """Draw the scene: as an array of shape (height, width, 3), or in a window for ``"human"``."""
         from relgym.envs.rendering import SceneViewer
 
         if self.render_mode is None:
@@ -138,7 +150,7 @@ class SceneEnv(gym.Env[Observation, Any]):
     @property
     def scene(self) -> Scene:
         """The current scene, without an action."""
-        return Scene(self.schema, self._layout, self._required_state().copy())
+        return self._scene_of(self._required_state())
 
     @property
     def vector(self) -> Float1D:
@@ -157,8 +169,8 @@ class SceneEnv(gym.Env[Observation, Any]):
         Parameters
         ----------
         state
-            What `get_state` returned, or any scene with this env's objects (an action in it is ignored). After a
-            scene, the hidden rest is inferred from it, and the random generator goes on as it was.
+            What `get_state` returned, or any scene with this env's objects (an action in it is ignored).
+            After a scene, the hidden rest is inferred from it, and the random generator goes on as it was.
 
         Raises
         ------
@@ -171,8 +183,8 @@ class SceneEnv(gym.Env[Observation, Any]):
         else:
             if state.vector.shape != (self._layout.width,):
                 raise ObservationError(
-                    f"expected a state of width {self._layout.width} for the objects {list(self._layout.names)}, "
-                    f"got shape {state.vector.shape}; make the env with the arguments of the one it came from"
+                    f"expected a state of shape {(self._layout.width,)} for {list(self._layout.names)}, "
+                    f"got {state.vector.shape}; make the env with the arguments of the one it came from"
                 )
             self._state = state.vector.copy()
             self._restore(self._state, state.hidden)
@@ -204,8 +216,16 @@ class SceneEnv(gym.Env[Observation, Any]):
         """Return the next state vector: a new array."""
         raise NotImplementedError
 
+    def _judge(self, before: Float1D, action: Any, after: Float1D) -> tuple[float, bool]:
+        """Reward of a step, and whether it ends the episode."""
+        return 0.0, False
+
     def _info(self) -> dict[str, Any]:
         """What `reset` and `step` report about the current state."""
+        return {}
+
+    def _reset_info(self) -> dict[str, Any]:
+        """What only `reset` reports."""
         return {}
 
     def _hidden(self) -> Any:
@@ -222,6 +242,9 @@ class SceneEnv(gym.Env[Observation, Any]):
         copy = self._required_state().copy()
         return {name: copy[cut] for name, cut in self._cuts}
 
+    def _scene_of(self, vector: Float1D) -> Scene:
+        return Scene(self.schema, self._layout, vector.copy())
+
     def _required_state(self) -> Float1D:
         if self._state is None:
             raise ResetNeeded(f"call reset() before using {type(self).__name__}'s state")
@@ -237,7 +260,7 @@ class SceneEnv(gym.Env[Observation, Any]):
         extra = [o.name for o in scene if o.type.has_body and o.name not in names]
         if missing or extra:
             raise ObservationError(
-                f"the scene doesn't fit this env: objects missing or of another type {missing}, unknown {extra}; "
+                f"the scene doesn't fit this env: missing or of another type {missing}, unknown {extra}; "
                 "take scenes from an env made with the same arguments"
             )
         return np.concatenate([scene[name].values for name in names])
@@ -253,8 +276,8 @@ def check_options(options: Mapping[str, Any], legal: Collection[str]) -> None:
 def checked_action(space: spaces.Space[Any], action: Any) -> Any:
     """`action` as an element of `space`, or `ActionError`.
 
-    A Box takes any float dtype and values up to 1e-6 (relative) outside, which are clipped: `Box.contains` refuses
-    float64 in a float32 Box, and rounding to float32 may overstep the bounds.
+    A Box takes any float dtype and values up to 1e-6 (relative) outside, which are clipped: `Box.contains`
+    refuses float64 in a float32 Box, and rounding to float32 may overstep the bounds.
 
     Returns
     -------
@@ -272,6 +295,17 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
             "clip or rescale it"
         )
     return np.clip(array, space.low, space.high)
+
+
+def physical_action(schema: SceneSchema, action: Any) -> Float1D:
+    """Properties of the action object for an action in [-1, 1]: what the schema's affine maps make of it."""
+    array = np.asarray(action, dtype=np.float64).ravel()
+    return np.array(
+        [
+            low + (u + 1.0) / 2.0 * (high - low)
+            for u, (_, low, high) in zip(array, schema.action_scale, strict=True)
+        ]
+    )
 
 
 def _observation_space(layout: SceneLayout, bounds: Bounds) -> spaces.Dict:

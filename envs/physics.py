@@ -1,9 +1,9 @@
-"""Balls among static convex obstacles in pymunk: parametrised once, so that every law in the thesis' tables is exact.
+"""Balls among static convex obstacles in pymunk, parametrised so that the thesis' tables come out exactly.
 
 One `BallWorld.step` is one example: positions move by the current velocities, contacts are found at the new
-positions, and the velocities that the *next* displacement will have are solved for. So the contacts that are visible
-in a state are those that decide the transition out of it, provided that velocity is read as the last displacement
-(§4.1). The complete law of one contact with unit normal n, in units per step, is
+positions, and the velocities that the *next* displacement will have are solved for. So the contacts that are
+visible in a state are those that decide the transition out of it, provided that velocity is read as the last
+displacement (§4.1). The complete law of one contact with unit normal n, in units per step, is
 
     J = max(0, -((1 + e) v.n + g.n)),   v' = v + g + J n + friction,   |friction| <= mu J.
 """
@@ -20,7 +20,7 @@ import pymunk
 __all__ = ["GRAVITY", "TIME_STEP", "BallWorld", "Contact", "Obstacle"]
 
 TIME_STEP = 0.01
-"""Seconds of one example: exactly one engine step, without sub-steps (they'd blur bounces into no linear function)."""
+"""Seconds of one example: exactly one engine step. With sub-steps a bounce is no linear function any more."""
 
 GRAVITY = 9.8
 """Downward acceleration in units / s^2: 9.8e-4 units / step^2."""
@@ -42,7 +42,7 @@ class Obstacle:
     vertices
         Corners in counter-clockwise order, in world coordinates.
     elasticity, friction
-        Coefficients of a ball's contact with it (Chipmunk multiplies those of two shapes; a ball's own are 1).
+        Coefficients of a ball's contact with it: Chipmunk multiplies those of two shapes, and a ball's are 1.
     """
 
     name: str
@@ -101,7 +101,8 @@ class BallWorld:
 
     Notes
     -----
-    Cost: about 5 microseconds a step with one ball and seven obstacles, and 5 more for each contact that is read.
+    Cost: about 5 microseconds a step with one ball and six obstacles, and 5 more for each contact that is
+    read.
     """
 
     def __init__(
@@ -164,7 +165,7 @@ class BallWorld:
 
     def velocities(self) -> list[Point]:
         """The engine's velocities in units per second: those of the *next* displacement."""
-        return [tuple(body.velocity) for body in self._bodies]
+        return [(body.velocity.x, body.velocity.y) for body in self._bodies]
 
     def contacts(self) -> tuple[Contact, ...]:
         """What each ball touches where it is now; a contact of two balls is listed for both."""

@@ -1,11 +1,12 @@
-"""The ball's modes by physics: what a perfect learner of world-axis linear functions would end with.
+"""The modes by physics: what a perfect learner of world-axis linear functions would end with.
 
-One contact with unit normal n, elasticity e and friction mu changes the velocity v (in units per step) to
+Ball: one contact with unit normal n, elasticity e and friction mu changes the velocity v (in units per step) to
 
     v' = v + g + J n - mu J s t,   J = -((1 + e) v.n + g.n),   t = rot90(n),
 
-where s is the direction of sliding along t; or, when friction suffices to end the sliding, to ``v' = -e (v.n) n``.
-For a given normal both are linear in v. The same function often covers several cases: they are one mode.
+where s is the direction of sliding along t; or, when friction suffices to end the sliding, to ``v' = -e
+(v.n) n``. For a given normal both are linear in v. The same function often covers several cases: they are
+one mode.
 """
 
 from __future__ import annotations
@@ -18,9 +19,21 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.envs.truck_push import BOX_MASS, GRAVITY, TRUCK_MASS
+from relgym.envs.truck_scenes import partitions
 from relgym.scene.objects import Float1D, Float2D
 
-__all__ = ["GRAVITY_STEP", "REST", "AnalyticMode", "AnalyticModes", "Case", "analytic_modes", "contact_law"]
+__all__ = [
+    "GRAVITY_STEP",
+    "REST",
+    "AnalyticMode",
+    "AnalyticModes",
+    "Case",
+    "TruckMode",
+    "analytic_modes",
+    "contact_law",
+    "truck_modes",
+]
 
 GRAVITY_STEP = 9.8e-4
 """Change of the ball's y velocity in one free step, in units per step."""
@@ -102,7 +115,8 @@ class AnalyticModes:
         before, after
             Velocities at t and t + 1, shape ``(n, 2)``, in units per step.
         tol
-            Largest residual, in units per step. Nothing lies between 1e-14 and 1e-6: a step fits or it doesn't.
+            Largest residual, in units per step. Nothing lies between 1e-14 and 1e-6: a step fits or it
+            doesn't.
 
         Returns
         -------
@@ -174,7 +188,7 @@ def analytic_modes(incline: float, elasticity: float, friction: float | Sequence
             matrix, offset = contact_law(normal, elasticity, mu, slip)
             laws[Case(surface, slip, mu)] = matrix, offset
             if surface == "floor":
-                # With v_y = 0 its weight can't be told: the tables list v_y' = 0 and v_x' without v_y (§4.3.1, §4.5).
+                # With v_y = 0 its weight can't be told: tables 4.2 and 4.17 list such functions without v_y.
                 laws[Case(surface, slip, mu, sliding=True)] = matrix * np.array([1.0, 0.0]), offset
     return AnalyticModes(_distinct(laws, 0), _distinct(laws, 1))
 
@@ -191,4 +205,30 @@ def _distinct(laws: Mapping[Case, tuple[Float2D, Float1D]], row: int) -> tuple[A
             known.append(case)
     return tuple(
         AnalyticMode((float(f[0]), float(f[1])), float(f[2]), tuple(cases)) for f, cases in functions
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class TruckMode:
+    """``v' = v + force_weight F + sum_i friction_weights[i] C_i``; C_i belongs to the lowest box of stack i (§3.2.6).
+
+    `heights` are those of the stacks, the greatest first; their order on the ground doesn't matter.
+    """
+
+    heights: tuple[int, ...]
+    force_weight: float
+    friction_weights: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """Such as ``stacks of 2, 1``."""
+        return "stacks of " + ", ".join(map(str, self.heights))
+
+
+def truck_modes(n_boxes: int) -> tuple[TruckMode, ...]:
+    """All modes of the truck's velocity; for three boxes the three rows of Table 3.1."""
+    mass = TRUCK_MASS + BOX_MASS * n_boxes
+    return tuple(
+        TruckMode(heights, 1.0 / mass, tuple(-height * BOX_MASS * GRAVITY / mass for height in heights))
+        for heights in partitions(n_boxes)
     )

@@ -1,0 +1,259 @@
+"""The box pushing domain (§3.1) as a Gymnasium env."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from relgym.envs.arguments import checked_count
+from relgym.envs.base import SceneEnv, check_options, physical_action
+from relgym.envs.draws import Draws, Range
+from relgym.envs.truck_scenes import Placed, Stacks, draw_row, layouts, loads, option_names, stacks_of
+from relgym.errors import ConfigError
+from relgym.scene.objects import (
+    ACTION,
+    POSE,
+    Float1D,
+    Kinematics,
+    ObjectType,
+    Scene,
+    SceneSchema,
+    Target,
+)
+from relgym.scene.shapes import Box
+
+__all__ = ["BOX_MASS", "GRAVITY", "TRUCK_MASS", "TruckPushEnv"]
+
+TRUCK_MASS = 10.0
+BOX_MASS = 10.0
+GRAVITY = 10.0
+"""Mass x gravity of a box is 100, a step lasts 1: with three boxes Table 3.1's 0.025, 2.5, 5.0 and 7.5."""
+
+_PX, _SX = POSE.index("px"), POSE.index("sx")
+_OWN = len(POSE)  # a truck's velocity and a box's friction follow the pose
+
+Task = Callable[[Scene, Scene], tuple[float, bool]]
+"""From the scenes before and after a step to its reward and whether the episode ends."""
+
+
+def _no_task(before: Scene, after: Scene) -> tuple[float, bool]:
+    return 0.0, False
+
+
+_TASKS: Mapping[str | None, Task] = {None: _no_task}
+"""What an agent may be asked to do, by name."""
+
+
+class TruckPushEnv(SceneEnv):
+    """A truck pushes stacks of boxes to the right; only the lowest box of a stack rubs on the ground.
+
+    Description
+    -----------
+    The demonstration domain of the thesis (§3.1, Figure 3.1). All objects move together with the velocity
+    ``v' = max(0, v + (F - friction) / M)`` with ``M = 10 + 10 n`` for n boxes, where ``friction`` is the
+    sum over the stacks of 100 x height x friction constant of the lowest box (Coulomb; G = 10, a step lasts
+    1). With three boxes this is Table 3.1: ``0.025 F`` and 2.5, 5.0 or 7.5 per constant. Friction never
+    reverses the motion: a truck that stops has velocity exactly 0, and stays there until the force exceeds
+    the friction. The truck itself rolls without friction.
+
+    Action Space
+    ------------
+    ``Box(-1, 1, (1,), float32)``, mapped affinely to the pushing force in `force_range`. In the schema the
+    bodiless object ``action`` has the physical property ``force``; ``schema.action_scale`` holds the map.
+
+    Observation Space
+    -----------------
+    ``Dict``, object name -> ``Box(float64)`` in the order of the type's properties. y is up, z is the depth:
+
+    ====================  ========================================  =======  ========  =======
+    property              meaning                                   unit     min       max
+    ====================  ========================================  =======  ========  =======
+    px, py, pz            position of the centre                    unit     -1e6      1e6
+    rx, ry, rz            rotation (0)                              radian   -pi       pi
+    sx, sy, sz            full extents                              unit     0         1e3
+    vx (truck)            last displacement, px_t - px_{t-1}        unit     0         1e5
+    friction (boxes)      friction constant                         1        0         1e3
+    ====================  ========================================  =======  ========  =======
+
+    Objects: ``truck``, ``box1`` … ``boxN``, and ``bystander1`` … on request, which are boxes too.
+
+    Rewards
+    -------
+    0 without a task.
+
+    Starting State
+    --------------
+    One of the layouts: all compositions of the number of boxes into stacks, the greatest first; with three
+    boxes 1: one stack of three; 2: a stack of two beside the truck, then one box; 3: one box beside the
+    truck, then a stack of two; 4: three boxes in a row. Which box is where is drawn too. Boxes are 3–5
+    wide, high and deep, a box on another one no wider than that; the truck 4–6 wide and 2–3 high: no higher
+    than a box. Everything touches exactly. The truck is at rest, at x within 50 and the ground at y within
+    5 of the origin. Bystanders stand beside the track, 8 or more off it. All uniform.
+
+    Reset options, all optional: ``layout`` (1, 2, …), ``order`` (names of the boxes by position: stack by
+    stack from the truck on, each from bottom to top), ``speed``, ``shift_x``, ``shift_y``, ``truck_width``,
+    ``truck_height``, ``box1_width``, ``box1_height``, ``box1_depth``, ``box1_friction``, …,
+    ``bystander1_x``, …; `reset_options` lists them. ``info["configuration"]`` holds what was drawn: passed as
+    options, it gives the same scene again.
+
+    Episode End
+    -----------
+    Without a task never; truncated after 40 steps by the registered time limit.
+
+    Info
+    ----
+    ``info["layout"]`` (its number) and ``info["stacks"]`` (names, each stack from bottom to top, from the
+    truck on): the truth about what pushes what. At reset also ``info["scene"]`` and
+    ``info["configuration"]``.
+
+    Arguments
+    ---------
+    n_boxes
+        Number of boxes to push (1 to 12).
+    redraw
+        When the frictions are drawn: ``"block"`` at reset, ``"step"`` before every step; then the schema
+        declares them exogenous.
+    friction_range
+        From where they're drawn.
+    force_range
+        Forces (>= 0) that -1 and 1 stand for.
+    bystanders
+        How many boxes stand beside the track.
+    task
+        ``None``: watch what pushing does.
+
+    Version History
+    ---------------
+    * v0: initial version.
+    """
+
+    def __init__(
+        self,
+        n_boxes: int = 3,
+        redraw: str = "block",
+        friction_range: tuple[float, float] = (0.05, 0.5),
+        force_range: tuple[float, float] = (0.0, 500.0),
+        bystanders: int = 0,
+        task: str | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if redraw not in ("block", "step"):
+            raise ConfigError(f"redraw={redraw!r}: expected 'block' or 'step'")
+        if task not in _TASKS:
+            raise ConfigError(f"task={task!r}: expected one of {list(_TASKS)}")
+        self._boxes = tuple(f"box{k + 1}" for k in range(checked_count("n_boxes", n_boxes, 1, 12)))
+        count = checked_count("bystanders", bystanders, 0, 100)
+        self._bystanders = tuple(f"bystander{k + 1}" for k in range(count))
+        self._frictions = Range(*_checked_range("friction_range", friction_range), 0.0, 1e3)
+        self._redraw, self._task = redraw, _TASKS[task]
+        names = (*self._boxes, *self._bystanders)
+        schema = _schema(names, _checked_range("force_range", force_range), exogenous=redraw == "step")
+        action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
+        bounds = {"vx": (0.0, 1e5), "friction": (0.0, 1e3), **dict.fromkeys(POSE[:3], (-1e6, 1e6))}
+        super().__init__(schema, action_space, bounds, render_mode)
+        self._columns = {name: cut.start for name, cut in self._cuts}
+        self._friction_columns = [self._columns[name] + _OWN for name in names]
+        self._stacks: Stacks = ()
+        self._configuration: Mapping[str, Any] = {}
+
+    @property
+    def reset_options(self) -> tuple[str, ...]:
+        """Names of all options of `reset`."""
+        return tuple(option_names(self._boxes, self._bystanders))
+
+    @property
+    def stacks(self) -> Stacks:
+        """Names of the boxes of each stack from bottom to top; stacks from the truck outwards."""
+        return self._stacks
+
+    def _begin(self, options: Mapping[str, Any], *, rng: np.random.Generator) -> Float1D:
+        check_options(options, self.reset_options)
+        draws = Draws(options, rng)
+        placed, stacks, speed = draw_row(self._boxes, self._bystanders, draws)
+        own = {
+            name: draws.number(f"{name}_friction", self._frictions)
+            for name in (*self._boxes, *self._bystanders)
+        }
+        own["truck"] = speed
+        self._stacks, self._configuration = stacks, draws.taken
+        return np.concatenate([_properties(placed[name], own[name]) for name in self._layout.names])
+
+    def _advance(self, state: Float1D, action: Any) -> Float1D:
+        force = float(physical_action(self.schema, action)[0])
+        velocity = self._next_velocity(state, force)
+        after = state.copy()
+        truck = self._columns["truck"]
+        after[truck + _OWN] = velocity
+        after[truck + _PX] = state[truck + _PX] + velocity
+        self._push(after)
+        if self._redraw == "step":
+            after[self._friction_columns] = self.np_random.uniform(
+                self._frictions.low, self._frictions.high, len(self._friction_columns)
+            )
+        return after
+
+    def _next_velocity(self, state: Float1D, force: float) -> float:
+        weight = BOX_MASS * GRAVITY
+        friction = sum(
+            load * weight * float(state[self._columns[name] + _OWN])
+            for name, load in loads(self._stacks).items()
+        )
+        mass = TRUCK_MASS + BOX_MASS * len(self._boxes)
+        # §3.2.6; friction opposes the motion and ends with it: from v >= 0 it can't lead below 0.
+        return max(0.0, float(state[self._columns["truck"] + _OWN]) + (force - friction) / mass)
+
+    def _push(self, state: Float1D) -> None:
+        """Move the stacks to where they touch the truck and one another: rounding never tears them apart."""
+        truck = self._columns["truck"]
+        edge = state[truck + _PX] + state[truck + _SX] / 2
+        for stack in self._stacks:
+            width = state[self._columns[stack[0]] + _SX]
+            for name in stack:
+                state[self._columns[name] + _PX] = edge + width / 2
+            edge += width
+
+    def _judge(self, before: Float1D, action: Any, after: Float1D) -> tuple[float, bool]:
+        return self._task(self._scene_of(before), self._scene_of(after))
+
+    def _info(self) -> dict[str, Any]:
+        heights = tuple(len(stack) for stack in self._stacks)
+        return {"layout": layouts(len(self._boxes)).index(heights) + 1, "stacks": self._stacks}
+
+    def _reset_info(self) -> dict[str, Any]:
+        return {"configuration": dict(self._configuration)}
+
+    def _hidden(self) -> Any:
+        return self._stacks
+
+    def _restore(self, vector: Float1D, hidden: Any) -> None:
+        self._stacks = stacks_of(self._scene_of(vector)) if hidden is None else hidden
+
+
+def _schema(boxes: tuple[str, ...], force_range: tuple[float, float], *, exogenous: bool) -> SceneSchema:
+    truck = ObjectType("truck", (*POSE, "vx"), Box(), velocity=("vx", None, None))
+    box = ObjectType("box", (*POSE, "friction"), Box(), exogenous=("friction",) if exogenous else ())
+    return SceneSchema(
+        types=(truck, box, ObjectType(ACTION, ("force",))),
+        objects=(("truck", "truck"), *((name, "box") for name in boxes), (ACTION, ACTION)),
+        up="y",
+        planar=False,
+        kinematics=(Kinematics("truck", "px", "vx"),),
+        targets=(Target("truck", "vx"), Target("box", "px", given=(("truck", "vx"),))),
+        action_scale=(("force", *force_range),),
+    )
+
+
+def _properties(placed: Placed, own: float) -> Float1D:
+    p = placed
+    return np.array([p.x, p.y, p.z, 0.0, 0.0, 0.0, p.width, p.height, p.depth, own])
+
+
+def _checked_range(what: str, span: tuple[float, float]) -> tuple[float, float]:
+    low, high = (float(x) for x in span) if len(tuple(span)) == 2 else (math.nan, math.nan)
+    if not 0.0 <= low <= high < math.inf:
+        raise ConfigError(f"{what}={span!r}: expected two finite numbers with 0 <= low <= high")
+    return low, high
