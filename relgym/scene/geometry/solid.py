@@ -158,9 +158,8 @@ def _nearest(offset: FloatArray, a: Polyhedra, b: Polyhedra) -> tuple[FloatArray
     down, normal_b, over_b = _over_face(offset[:, None] + a.corners, b)
     up, normal_a, over_a = _over_face(b.corners - offset[:, None], a)
     skew, normal_e = nearest_edges(offset, a.starts, a.edges, b.starts, b.edges)
-    down = np.where(over_b & (down > 0.0), down, np.inf)
-    up = np.where(over_a & (up > 0.0), up, np.inf)
-    every = np.concatenate([down, up, skew])
+    # No corner lies inside the other solid, but where they touch, rounding may make a height negative: take it.
+    every = np.concatenate([np.where(over_b, down, np.inf), np.where(over_a, up, np.inf), skew])
     normals = np.concatenate([normal_b, -normal_a, normal_e], axis=1)
     distance, normal = pick(every.argmin(axis=0), every, normals)
     return distance, normal
