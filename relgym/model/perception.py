@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
-from relgym.scene.contacts import contact_features
 from relgym.scene.context import canonical_order, signature
-from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema
-from relgym.scene.relations import Extractor, Relations, unary
+from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, poses
+from relgym.scene.relations import Extractor, Relations
 
 __all__ = ["Percept", "Perception", "Situation"]
 
@@ -53,20 +54,23 @@ class Perception:
     """
 
     def __init__(
-        self, schema: SceneSchema, given: tuple[tuple[str, str], ...] = (), geometry: str = "arrays"
+        self,
+        schema: SceneSchema,
+        given: tuple[tuple[str, str], ...] = (),
+        geometry: Literal["arrays", "fcl"] = "arrays",
     ) -> None:
         self.schema = schema
         self.given = given
         self.extractor = Extractor(schema, geometry=geometry)
-        self._contact_names = contact_features(schema)
-        self._pair_names = _names(t for t in schema.types if t.has_body)
-        self._unary_names = tuple(sorted({n for t in schema.types if t.has_body for n in schema.ancestry(t.name)}))
+        self._contact_names = self.extractor.features
+        self._pair_names = tuple(sorted({p for t in schema.types if t.has_body for p in _free(t)}))
+        self._unary_names = self.extractor.unary_names
         self._signatures: dict[tuple[ObjectType, ...], SlotSignature] = {}
         self._gathers: dict[tuple[int, tuple[int, ...]], NDArray[np.intp]] = {}
         self._layouts: dict[int, SceneLayout] = {}
         self._own_columns: dict[tuple[int, int], NDArray[np.intp]] = {}
         self._unary: dict[int, NDArray[np.bool_]] = {}
-        self._features: dict[int, tuple[NDArray[np.intp], NDArray[np.bool_]]] = {}
+        self._features: dict[int, NDArray[np.intp]] = {}
 
     def percept(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> Percept:
         """Relations of a batch of scenes, shape ``(n, layout.width)``."""
@@ -80,7 +84,7 @@ class Perception:
         binary = tuple(self.extractor.names)
         taken = {*binary, *self._unary_names, *own}
         pair = [*self._contact_names, *(f"other-{p}" if p in taken else p for p in self._pair_names)]
-        contact = frozenset({*self._contact_names, *self.extractor.contact_names})
+        contact = frozenset({*self._contact_names, "approaching"})
         return Vocabulary(binary, self._unary_names, tuple(pair), tuple(own), contact)
 
     def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:
@@ -112,10 +116,8 @@ class Perception:
     def unary_table(self, layout: SceneLayout) -> NDArray[np.bool_]:
         """Truth of the unary relations, shape ``(U, bodies)``."""
         if (known := self._unary.get(id(layout))) is None:
-            truth = unary(self.schema, layout)
-            none = np.zeros(len(layout.bodies), dtype=bool)
-            rows = [truth.get(name, none) for name in self._unary_names]
-            known = self._unary[id(layout)] = np.array(rows, dtype=bool).reshape(len(rows), len(none))
+            rows = [self.extractor.unary(layout)[name] for name in self._unary_names]
+            known = self._unary[id(layout)] = np.array(rows, dtype=bool).reshape(len(rows), len(layout.bodies))
         return known
 
     def feature_columns(self, layout: SceneLayout) -> NDArray[np.intp]:
@@ -126,8 +128,8 @@ class Perception:
                 for k, name in enumerate(self._pair_names):
                     if name in _free(layout.types[i]):
                         table[row, k] = layout.column(i, name)
-            known = self._features[id(layout)] = (table, np.zeros(0, dtype=bool))
-        return known[0]
+            known = self._features[id(layout)] = table
+        return known
 
 
 @dataclass(slots=True)
@@ -176,8 +178,9 @@ class Percept:
         bodies = np.array(layout.bodies, dtype=np.intp)
         if target in layout.bodies:
             body = layout.bodies.index(target)
-            others = bodies[canonical_order(self.relations, body)]
-            keys = signature(self.relations, body)
+            numbers = canonical_order(self.relations, body, poses(layout, self.vectors))
+            others = bodies[numbers]
+            keys = signature(self.relations, body, numbers)
             examples = self._embodied(body, target)
         else:
             others = np.broadcast_to(bodies, (n, len(bodies)))
@@ -227,6 +230,3 @@ def _free(t: ObjectType) -> tuple[str, ...]:
     pose = {k for k in t.pose_columns() if k >= 0} if t.has_body else set()
     return tuple(p for k, p in enumerate(t.properties) if k not in pose)
 
-
-def _names(types: object) -> tuple[str, ...]:
-    return tuple(sorted({p for t in types for p in _free(t)}))  # type: ignore[attr-defined]
