@@ -1,15 +1,26 @@
-"""Checks of env arguments that several envs share."""
+"""Checks of arguments, reset options and actions that the envs share."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
+from gymnasium import spaces
 
-from relgym.errors import ConfigError
+from relgym.errors import ActionError, ConfigError
+from relgym.scene.objects import Float1D, SceneSchema
 
-__all__ = ["Coefficient", "checked_count", "counted", "numbered", "per_object"]
+__all__ = [
+    "Coefficient",
+    "check_options",
+    "checked_action",
+    "checked_count",
+    "counted",
+    "numbered",
+    "per_object",
+    "physical_action",
+]
 
 Coefficient: TypeAlias = float | Mapping[str, float]
 """One number for all objects, or numbers by object name or kind."""
@@ -67,3 +78,45 @@ def per_object(
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
+def check_options(options: Mapping[str, Any], legal: Collection[str]) -> None:
+    """Raise `ConfigError` when an option of `reset` isn't one of `legal`."""
+    unknown = sorted(set(options) - set(legal))
+    if unknown:
+        raise ConfigError(f"unknown reset options {unknown}; this env has {sorted(legal)}")
+
+
+def checked_action(space: spaces.Space[Any], action: Any) -> Any:
+    """`action` as an element of `space`, or `ActionError`.
+
+    A Box takes any float dtype and values up to 1e-6 (relative) outside, which are clipped: `Box.contains`
+    refuses float64 in a float32 Box, and rounding to float32 may overstep the bounds.
+
+    Returns
+    -------
+    For a Box a float64 array of its shape, otherwise `action` itself.
+    """
+    if not isinstance(space, spaces.Box):
+        if not space.contains(action):
+            raise ActionError(f"action {action!r} lies outside {space}")
+        return action
+    array = np.asarray(action, dtype=np.float64)
+    slack = 1e-6 * np.maximum(1.0, np.abs(space.high))
+    if array.shape != space.shape or not np.all((array >= space.low - slack) & (array <= space.high + slack)):
+        raise ActionError(
+            f"expected an action of shape {space.shape} within [{space.low}, {space.high}], got {action!r}; "
+            "clip or rescale it"
+        )
+    return np.clip(array, space.low, space.high)
+
+
+def physical_action(schema: SceneSchema, action: Any) -> Float1D:
+    """Properties of the action object for an action in [-1, 1]: what the schema's affine maps make of it."""
+    array = np.asarray(action, dtype=np.float64).ravel()
+    return np.array(
+        [
+            low + (u + 1.0) / 2.0 * (high - low)
+            for u, (_, low, high) in zip(array, schema.action_scale, strict=True)
+        ]
+    )

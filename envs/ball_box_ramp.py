@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import Coefficient, checked_count, counted, numbered, per_object
+from relgym.envs.arguments import Coefficient, check_options, checked_count, counted, numbered, per_object
 from relgym.envs.ball_scenes import BALL_PLACES, Placed, draw_room, option_names
-from relgym.envs.base import SceneEnv, check_options
+from relgym.envs.base import SceneEnv
 from relgym.envs.physics import BallWorld, Contact, Obstacle, Point
 from relgym.errors import ConfigError
 from relgym.scene.objects import POSE, Float1D, Kinematics, ObjectType, SceneSchema, Target

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -12,7 +12,8 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from relgym.errors import ActionError, ConfigError, ObservationError
+from relgym.envs.arguments import checked_action
+from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import POSE, Float1D, Scene, SceneLayout, SceneSchema
 
 __all__ = [
@@ -20,9 +21,6 @@ __all__ = [
     "EnvState",
     "Observation",
     "SceneEnv",
-    "check_options",
-    "checked_action",
-    "physical_action",
 ]
 
 Observation: TypeAlias = dict[str, NDArray[np.float64]]
@@ -264,48 +262,6 @@ class SceneEnv(gym.Env[Observation, Any]):
                 "take scenes from an env made with the same arguments"
             )
         return np.concatenate([scene[name].values for name in names])
-
-
-def check_options(options: Mapping[str, Any], legal: Collection[str]) -> None:
-    """Raise `ConfigError` when an option of `reset` isn't one of `legal`."""
-    unknown = sorted(set(options) - set(legal))
-    if unknown:
-        raise ConfigError(f"unknown reset options {unknown}; this env has {sorted(legal)}")
-
-
-def checked_action(space: spaces.Space[Any], action: Any) -> Any:
-    """`action` as an element of `space`, or `ActionError`.
-
-    A Box takes any float dtype and values up to 1e-6 (relative) outside, which are clipped: `Box.contains`
-    refuses float64 in a float32 Box, and rounding to float32 may overstep the bounds.
-
-    Returns
-    -------
-    For a Box a float64 array of its shape, otherwise `action` itself.
-    """
-    if not isinstance(space, spaces.Box):
-        if not space.contains(action):
-            raise ActionError(f"action {action!r} lies outside {space}")
-        return action
-    array = np.asarray(action, dtype=np.float64)
-    slack = 1e-6 * np.maximum(1.0, np.abs(space.high))
-    if array.shape != space.shape or not np.all((array >= space.low - slack) & (array <= space.high + slack)):
-        raise ActionError(
-            f"expected an action of shape {space.shape} within [{space.low}, {space.high}], got {action!r}; "
-            "clip or rescale it"
-        )
-    return np.clip(array, space.low, space.high)
-
-
-def physical_action(schema: SceneSchema, action: Any) -> Float1D:
-    """Properties of the action object for an action in [-1, 1]: what the schema's affine maps make of it."""
-    array = np.asarray(action, dtype=np.float64).ravel()
-    return np.array(
-        [
-            low + (u + 1.0) / 2.0 * (high - low)
-            for u, (_, low, high) in zip(array, schema.action_scale, strict=True)
-        ]
-    )
 
 
 def _observation_space(layout: SceneLayout, bounds: Bounds) -> spaces.Dict:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import checked_count
-from relgym.envs.base import SceneEnv, check_options, physical_action
+from relgym.envs.arguments import check_options, checked_count, physical_action
+from relgym.envs.base import SceneEnv
 from relgym.envs.draws import Draws, Range
 from relgym.envs.truck_scenes import Placed, Stacks, draw_row, layouts, loads, option_names, stacks_of
 from relgym.errors import ConfigError

@@ -1,6 +1,6 @@
 """The modes by physics: what a perfect learner of world-axis linear functions would end with.
 
-Ball: one contact with unit normal n, elasticity e and friction mu changes the velocity v (in units per step) to
+Ball: a contact with unit normal n, elasticity e and friction mu changes the velocity v (units per step) to
 
     v' = v + g + J n - mu J s t,   J = -((1 + e) v.n + g.n),   t = rot90(n),
 
@@ -210,7 +210,7 @@ def _distinct(laws: Mapping[Case, tuple[Float2D, Float1D]], row: int) -> tuple[A
 
 @dataclass(frozen=True, slots=True)
 class TruckMode:
-    """``v' = v + force_weight F + sum_i friction_weights[i] C_i``; C_i belongs to the lowest box of stack i (§3.2.6).
+    """``v' = v + force_weight F + sum_i friction_weights[i] C_i``, C_i of stack i's lowest box (§3.2.6).
 
     `heights` are those of the stacks, the greatest first; their order on the ground doesn't matter.
     """

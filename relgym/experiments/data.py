@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from relgym.envs.arguments import physical_action
 from relgym.envs.ball_box_ramp import BallBoxRampEnv, configurations
-from relgym.envs.base import physical_action
 from relgym.envs.physics import Contact
 from relgym.envs.truck_push import TruckPushEnv
 from relgym.envs.truck_scenes import layouts
