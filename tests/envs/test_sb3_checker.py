@@ -1,0 +1,27 @@
+"""Stable-Baselines3's checker accepts every registered env without a warning (warnings are errors)."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import pytest
+
+import relgym  # noqa: F401  (registers the ids)
+
+pytestmark = pytest.mark.sb3
+
+NEEDS_A_MODEL = {"relgym/LearnedModel-v0"}
+IDS = sorted(name for name in gym.registry if name.startswith("relgym/") and name not in NEEDS_A_MODEL)
+
+
+def test_ids_are_registered() -> None:
+    assert "relgym/BallBoxRamp-v0" in IDS
+    assert "relgym/TruckPush-v0" in IDS
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_checker_has_nothing_to_say(name: str) -> None:
+    from stable_baselines3.common.env_checker import check_env
+
+    env = gym.make(name)
+    check_env(env)
+    env.close()
