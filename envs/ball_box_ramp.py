@@ -15,7 +15,7 @@ from relgym.envs.base import SceneEnv
 from relgym.envs.physics import BallWorld, Contact, Obstacle, Point
 from relgym.errors import ConfigError
 from relgym.scene.objects import POSE, Float1D, Kinematics, ObjectType, SceneSchema, Target
-from relgym.scene.shapes import Box, Sphere, Wedge
+from relgym.scene.shapes import Box, Sphere, Wedge, outline
 
 __all__ = ["BallBoxRampEnv", "configurations"]
 
@@ -23,8 +23,6 @@ _SHELL = {"floor": "floor", "ceiling": "ceiling", "left_wall": "wall", "right_wa
 _KINDS = ("box", "ramp")
 _X, _Y, _SX, _SY, _RZ = (POSE.index(name) for name in ("px", "py", "sx", "sy", "rz"))
 _VX = len(POSE)  # a ball's velocity follows its pose
-_WEDGE = ((-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))  # vertical side left, slope descending to the right
-_BOX = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
 
 
 def configurations() -> tuple[dict[str, Any], ...]:
@@ -270,8 +268,9 @@ def _properties(name: str, placed: Placed, balls: Sequence[str]) -> Float1D:
 
 def _vertices(t: ObjectType, values: Float1D) -> tuple[Point, ...]:
     """Corners of an obstacle in the plane, counter-clockwise."""
+    assert t.shape is not None, "obstacles have bodies"
     x, y, width, height, angle = (float(values[i]) for i in (_X, _Y, _SX, _SY, _RZ))
-    corners = [(u * width, w * height) for u, w in (_WEDGE if isinstance(t.shape, Wedge) else _BOX)]
+    corners = [(u * width, w * height) for u, w in outline(t.shape).tolist()]
     if angle != 0.0:  # an unrotated corner must not be rounded
         cos, sin = math.cos(angle), math.sin(angle)
         corners = [(cos * u - sin * w, sin * u + cos * w) for u, w in corners]

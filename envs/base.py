@@ -135,7 +135,7 @@ class SceneEnv(gym.Env[Observation, Any]):
             raise ConfigError("nothing to render to: make the env with render_mode='rgb_array' or 'human'")
         if self._viewer is None:
             self._viewer = SceneViewer(self.render_mode, fps=self.metadata["render_fps"])
-        return self._viewer.show(self.scene)
+        return self._viewer.show(self.scene, self._view())
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -225,6 +225,10 @@ class SceneEnv(gym.Env[Observation, Any]):
     def _reset_info(self) -> dict[str, Any]:
         """What only `reset` reports."""
         return {}
+
+    def _view(self) -> Any:
+        """The `View` to draw; ``None`` for the whole scene."""
+        return None
 
     def _hidden(self) -> Any:
         """Everything besides the state vector that the future depends on; immutable."""

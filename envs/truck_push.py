@@ -226,6 +226,11 @@ class TruckPushEnv(SceneEnv):
     def _reset_info(self) -> dict[str, Any]:
         return {"configuration": dict(self._configuration)}
 
+    def _view(self) -> Any:
+        from relgym.envs.rendering import scene_view
+
+        return scene_view(self.scene, ("truck", *self._boxes), margin=0.3)
+
     def _hidden(self) -> Any:
         return self._stacks
 

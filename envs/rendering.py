@@ -1,0 +1,313 @@
+"""Draws any scene, real or dreamed, as seen from the side: along the depth axis."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.errors import ConfigError
+from relgym.scene.axes import Axes
+from relgym.scene.geometry.vectors import rotation
+from relgym.scene.hull import outline_of
+from relgym.scene.objects import POSE, Float1D, Float2D, Scene, SceneObject
+from relgym.scene.shapes import ConvexPolyhedron, Sphere, outline
+
+__all__ = ["SceneViewer", "View", "render_scene", "scene_view"]
+
+Image = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+_BACKGROUND: Colour = (250, 250, 247)
+_GRID: Colour = (230, 231, 228)
+_INK: Colour = (45, 52, 60)
+_COLOURS: dict[str, Colour] = {
+    "ball": (230, 126, 34),
+    "box": (93, 142, 190),
+    "ramp": (106, 168, 121),
+    "truck": (196, 84, 77),
+    "floor": (172, 174, 178),
+    "wall": (188, 190, 193),
+    "ceiling": (203, 204, 207),
+}
+_PALETTE: tuple[Colour, ...] = (
+    (142, 110, 176),
+    (205, 164, 67),
+    (77, 160, 166),
+    (199, 120, 158),
+    (139, 148, 83),
+    (154, 116, 94),
+)
+_OVERSAMPLING = 2  # drawn twice as large and scaled down, which smooths all edges
+_OBLIQUE = 0.3  # how far up a unit of depth is drawn, so that what stands behind can be seen
+_ARROW = 12.0  # steps of motion that a velocity arrow shows
+_ARROW_LONGEST = 0.15  # of the view's width
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The part of the world that a picture shows, in world units along the first and the up axis."""
+
+    left: float
+    bottom: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """What one body looks like: corners of its outline, or a disc, in world units."""
+
+    body: SceneObject
+    colour: Colour
+    centre: Float1D
+    depth: float
+    corners: Float2D | None
+    radius: float
+
+
+def render_scene(
+    scene: Scene,
+    *,
+    size: tuple[int, int] = (800, 500),
+    view: View | None = None,
+    labels: bool = False,
+    velocities: bool = False,
+) -> Image:
+    """Draw a scene.
+
+    Parameters
+    ----------
+    scene
+        Any scene: planar or not, observed or predicted.
+    size
+        Width and height of the picture in pixels.
+    view
+        The part of the world to show; default: all bodies.
+    labels
+        Whether to write the objects' names on them.
+    velocities
+        Whether to draw how far each object would move in 12 steps.
+
+    Returns
+    -------
+    RGB picture, uint8, shape ``(height, width, 3)``.
+
+    Raises
+    ------
+    ConfigError
+        pygame isn't installed.
+    """
+    pygame = _pygame()
+    surface = _draw(pygame, scene, size, view or scene_view(scene), labels=labels, velocities=velocities)
+    return np.ascontiguousarray(np.transpose(pygame.surfarray.array3d(surface), (1, 0, 2)), dtype=np.uint8)
+
+
+def scene_view(scene: Scene, names: Iterable[str] | None = None, margin: float = 0.04) -> View:
+    """The view that shows these bodies (default: all), with a margin relative to their extent."""
+    wanted = None if names is None else set(names)
+    extents = [_extent(d) for d in _bodies(scene) if wanted is None or d.body.name in wanted]
+    if not extents:
+        return View(-1.0, -1.0, 2.0, 2.0)
+    low, high = np.min([e[0] for e in extents], axis=0), np.max([e[1] for e in extents], axis=0)
+    pad = margin * max(float((high - low).max()), 1e-6)
+    width, height = high - low + 2 * pad
+    return View(float(low[0] - pad), float(low[1] - pad), float(width), float(height))
+
+
+class SceneViewer:
+    """Shows one scene after the other, in a window (``"human"``) or as arrays (``"rgb_array"``)."""
+
+    def __init__(self, mode: str, *, fps: int = 50, size: tuple[int, int] = (800, 500)) -> None:
+        self._mode, self._fps, self._size = mode, fps, size
+        self._window: Any = None
+        self._clock: Any = None
+
+    def show(self, scene: Scene, view: View | None = None) -> Image | None:
+        """Draw a scene; the picture for ``"rgb_array"``, ``None`` when it went to the window."""
+        if self._mode == "rgb_array":
+            return render_scene(scene, size=self._size, view=view)
+        pygame = _pygame()
+        if self._window is None:
+            pygame.display.init()
+            self._window = pygame.display.set_mode(self._size)
+            pygame.display.set_caption("relgym")
+            self._clock = pygame.time.Clock()
+        self._window.blit(_draw(pygame, scene, self._size, view or scene_view(scene)), (0, 0))
+        pygame.event.pump()
+        pygame.display.flip()
+        self._clock.tick(self._fps)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            _pygame().display.quit()
+            self._window = None
+
+
+def _pygame() -> ModuleType:
+    try:
+        import pygame
+    except ImportError:
+        raise ConfigError("drawing needs pygame-ce: pip install 'relgym[viz]'") from None
+    module: ModuleType = pygame
+    return module
+
+
+def _draw(
+    pygame: ModuleType,
+    scene: Scene,
+    size: tuple[int, int],
+    view: View,
+    *,
+    labels: bool = False,
+    velocities: bool = False,
+) -> Any:
+    """A pygame surface with the scene on it."""
+    large = (size[0] * _OVERSAMPLING, size[1] * _OVERSAMPLING)
+    canvas = pygame.Surface(large)
+    canvas.fill(_BACKGROUND)
+    pen = _Pen(pygame, canvas, view, large)
+    pen.grid(view)
+    drawn = sorted(_bodies(scene), key=lambda d: d.depth)  # what is behind comes first
+    for body in drawn:
+        pen.body(body)
+    if velocities:
+        for body in drawn:
+            pen.arrow(body.centre, _step(scene, body.body), _ARROW_LONGEST * view.width)
+    surface = pygame.transform.smoothscale(canvas, size)
+    if labels:
+        for body in drawn:
+            pen.label(surface, body)
+    return surface
+
+
+class _Pen:
+    """Draws world coordinates on a canvas: the view centred, equal scales, up is up."""
+
+    def __init__(self, pygame: ModuleType, canvas: Any, view: View, size: tuple[int, int]) -> None:
+        self._pygame, self._canvas, self._size = pygame, canvas, size
+        self._scale = min(size[0] / view.width, size[1] / view.height)
+        self._left = size[0] / 2 - self._scale * (view.left + view.width / 2)
+        self._base = size[1] / 2 + self._scale * (view.bottom + view.height / 2)
+        self._line = max(2, size[1] // 350)
+
+    def _pixel(self, point: Float1D) -> tuple[float, float]:
+        x, y = self._left + self._scale * point[0], self._base - self._scale * point[1]
+        # Far outside pixels overflow the library's short integers.
+        return float(np.clip(x, -1e4, 1e4)), float(np.clip(y, -1e4, 1e4))
+
+    def grid(self, view: View) -> None:
+        """Upright lines at round distances: they show the scale, and motion when the view follows it."""
+        step = 10.0 ** math.floor(math.log10(view.width))
+        step /= 5.0 if view.width / step < 2.0 else 2.0 if view.width / step < 5.0 else 1.0
+        first = math.ceil((0 - self._left) / self._scale / step)
+        last = math.floor((self._size[0] - self._left) / self._scale / step)
+        for k in range(first, last + 1):
+            x = self._pixel(np.array([k * step, 0.0]))[0]
+            self._pygame.draw.line(self._canvas, _GRID, (x, 0), (x, self._size[1]), self._line)
+
+    def body(self, drawn: _Drawn) -> None:
+        """Fill and outline a body."""
+        if drawn.corners is None:
+            centre, radius = self._pixel(drawn.centre), self._scale * drawn.radius
+            self._pygame.draw.circle(self._canvas, drawn.colour, centre, radius)
+            self._pygame.draw.circle(self._canvas, _INK, centre, radius, self._line)
+            return
+        corners = [self._pixel(corner) for corner in drawn.corners]
+        self._pygame.draw.polygon(self._canvas, drawn.colour, corners)
+        self._pygame.draw.polygon(self._canvas, _INK, corners, self._line)
+
+    def arrow(self, start: Float1D, step: Float1D, longest: float) -> None:
+        """Draw the way of some steps from `start`."""
+        length = _ARROW * float(np.hypot(*step))
+        if length < 0.02 * longest:
+            return
+        shown = min(length, longest)
+        way = step / np.hypot(*step) * shown
+        along = way * min(0.12 * longest / shown, 0.5)
+        across = np.array([-along[1], along[0]]) * 0.6
+        tip = start + way
+        self._pygame.draw.line(
+            self._canvas, _INK, self._pixel(start), self._pixel(tip - along), 2 * self._line
+        )
+        head = [self._pixel(p) for p in (tip, tip - along + across, tip - along - across)]
+        self._pygame.draw.polygon(self._canvas, _INK, head)
+
+    def label(self, surface: Any, drawn: _Drawn) -> None:
+        """Write a body's name on it, or above it where it is too small; on the scaled-down picture."""
+        self._pygame.font.init()
+        text = self._pygame.font.Font(None, max(14, self._size[1] // 50)).render(drawn.body.name, True, _INK)
+        low, high = _extent(drawn)
+        middle = drawn.centre if drawn.corners is None else drawn.corners.mean(axis=0)
+        x, y = (value / _OVERSAMPLING for value in self._pixel(middle))
+        box = text.get_rect(center=(x, y))
+        room = self._scale / _OVERSAMPLING * (high - low)
+        if text.get_width() > room[0] and 3 * text.get_height() > room[1]:
+            box.bottom = int(self._pixel(high)[1] / _OVERSAMPLING) - 2
+        surface.blit(text, box.clamp(surface.get_rect()))
+
+
+def _bodies(scene: Scene) -> list[_Drawn]:
+    poses = scene.pose()
+    names = [scene.layout.names[i] for i in scene.layout.bodies]
+    return [_drawn(scene, scene[name], pose) for name, pose in zip(names, poses, strict=True)]
+
+
+def _drawn(scene: Scene, body: SceneObject, pose: Float1D) -> _Drawn:
+    axes = Axes.of(scene.schema)
+    first, up, depth = axes.canonical
+    z = 0.0 if axes.planar else float(pose[depth])
+    centre = np.array([pose[first], pose[up] - _OBLIQUE * z])
+    colour = _colour(scene.schema.ancestry(body.type.name)[-1])
+    if isinstance(body.type.shape, Sphere):
+        return _Drawn(body, colour, centre, z, None, float(pose[POSE.index("sx")]) / 2)
+    return _Drawn(body, colour, centre, z, centre + _outline(axes, body, pose), 0.0)
+
+
+def _outline(axes: Axes, body: SceneObject, pose: Float1D) -> Float2D:
+    """Corners of a body's outline around its centre, as seen along the depth axis."""
+    shape, scale, angles = body.type.shape, pose[6:], pose[3:6]
+    assert shape is not None, "only bodies are drawn"
+    first, up, depth = axes.canonical
+    flat = outline(shape, (first, up))
+    if axes.planar:
+        angle = axes.turn * angles[depth]
+        u, w = flat[:, 0] * scale[first], flat[:, 1] * scale[up]
+        return np.stack(
+            [math.cos(angle) * u - math.sin(angle) * w, math.sin(angle) * u + math.cos(angle) * w], axis=1
+        )
+    if isinstance(shape, ConvexPolyhedron):
+        corners = np.array(shape.vertices)
+    else:
+        corners = np.empty((2 * len(flat), 3))
+        corners[:, [first, up]] = np.concatenate([flat, flat])
+        corners[:, depth] = np.repeat([-0.5, 0.5], len(flat))
+    turned = (corners * scale) @ np.array(rotation(angles)).T
+    return outline_of(turned[:, [first, up]])
+
+
+def _extent(drawn: _Drawn) -> tuple[Float1D, Float1D]:
+    if drawn.corners is None:
+        return drawn.centre - drawn.radius, drawn.centre + drawn.radius
+    return drawn.corners.min(axis=0), drawn.corners.max(axis=0)
+
+
+def _step(scene: Scene, body: SceneObject) -> Float1D:
+    """Displacement of one step in the picture's plane."""
+    columns = body.type.velocity_columns()
+    velocity = [float(body.values[c]) if c >= 0 else 0.0 for c in columns]
+    first, up, _ = Axes.of(scene.schema).canonical
+    return np.array([velocity[first], velocity[up]])
+
+
+def _colour(root_type: str) -> Colour:
+    """The same colour for a type in every scene and every run."""
+    return _COLOURS.get(root_type, _PALETTE[zlib.crc32(root_type.encode()) % len(_PALETTE)])
