@@ -94,18 +94,27 @@ class DecisionTree:
         """Node numbers of the leaves, from low to high."""
         return tuple(node for node, column in enumerate(self.column) if column == _LEAF)
 
+    def path(self, leaf: int) -> str:
+        """The tests that lead to a leaf: ``vx <= 0.5 ∧ vy > 1``; ``always`` if it is the root."""
+        tests: list[str] = []
+        node = leaf
+        while node > 0:
+            parent = next(p for p in range(node) if node in (self.below[p], self.above[p]))
+            op = "<=" if self.below[parent] == node else ">"
+            tests.append(f"{self.columns[self.column[parent]]} {op} {self.threshold[parent]:.6g}")
+            node = parent
+        return " ∧ ".join(reversed(tests)) or "always"
+
     def rules(self) -> tuple[str, ...]:
         """One readable line per leaf, tests first: ``vy <= 0.25 -> yes (12 : 0)``."""
-        return tuple(self._walk(0, ()))
+        answers = (self._answer(leaf) for leaf in self.leaves)
+        return tuple(
+            f"{self.path(leaf)} -> {answer}" for leaf, answer in zip(self.leaves, answers, strict=True)
+        )
 
-    def _walk(self, node: int, tests: tuple[str, ...]) -> list[str]:
-        if self.column[node] == _LEAF:
-            answer = "yes" if self.says_yes(node) else "no"
-            counts = f"({self.positive[node]:g} : {self.negative[node]:g})"
-            return [f"{' ∧ '.join(tests) or 'always'} -> {answer} {counts}"]
-        name, threshold = self.columns[self.column[node]], self.threshold[node]
-        below = self._walk(self.below[node], (*tests, f"{name} <= {threshold:.6g}"))
-        return below + self._walk(self.above[node], (*tests, f"{name} > {threshold:.6g}"))
+    def _answer(self, leaf: int) -> str:
+        word = "yes" if self.says_yes(leaf) else "no"
+        return f"{word} ({self.positive[leaf]:g} : {self.negative[leaf]:g})"
 
     def __str__(self) -> str:
         return "\n".join(self.rules())

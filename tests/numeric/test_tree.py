@@ -22,8 +22,8 @@ def test_threshold_lies_midway_in_the_gap() -> None:
 
 
 def test_cut_beside_a_run_of_identical_values_is_found() -> None:
-    # The original sorted by (value, class) and looked only between neighbours of different class; a run of zeros of
-    # both classes could hide the cut at its end.
+    # The original sorted by (value, class) and looked only between neighbours of different class; a run of
+    # zeros of both classes could hide the cut at its end.
     x = np.array([[0.0]] * 10 + [[0.4]] * 5 + [[0.5]] * 5)
     positive = np.array([True] * 8 + [False] * 2 + [False] * 10)
     tree = learn_tree(x, positive)

@@ -1,0 +1,131 @@
+"""Arrays that share their rows and grow: by doubling in rows, as needed along other named axes."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Column", "Columns"]
+
+_FIRST_CAPACITY: Final = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """Element type, the named axes after the row axis, and what unset elements hold."""
+
+    dtype: str
+    axes: tuple[str, ...] = ()
+    fill: float | int | bool = 0
+
+
+class Columns:
+    """Named arrays of shape ``(size, *axes)``; ``columns[name]`` is a view of the rows in use.
+
+    Parameters
+    ----------
+    columns
+        Description of each array.
+    sizes
+        Length of every named axis to begin with.
+    """
+
+    def __init__(self, columns: Mapping[str, Column], sizes: Mapping[str, int]) -> None:
+        self.columns = dict(columns)
+        self.sizes = dict(sizes)
+        self.size = 0
+        self._arrays = {name: self._empty(name, _FIRST_CAPACITY) for name in self.columns}
+
+    def __len__(self) -> int:
+        return self.size
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self._arrays[name][: self.size]
+
+    def __setitem__(self, name: str, value: NDArray[Any]) -> None:
+        """Replace a whole array; its axes may change length, its rows may not."""
+        column = self.columns[name]
+        self.sizes |= dict(zip(column.axes, value.shape[1:], strict=True))
+        self._arrays[name] = self._empty(name, self._capacity())
+        self._arrays[name][: self.size] = value
+
+    def append(self) -> int:
+        """Add a row of fill values; its number."""
+        if self.size == self._capacity():
+            self._rebuild(2 * self.size)
+        self.size += 1
+        row = self.size - 1
+        for name, column in self.columns.items():
+            self._arrays[name][row] = column.fill
+        return row
+
+    def write(self, row: int, values: Mapping[str, Any]) -> None:
+        """Set one row's arrays, growing axes as needed; elements that a smaller value leaves get the fill."""
+        arrays = {name: np.asarray(value) for name, value in values.items()}
+        self._grow(arrays)
+        for name, value in arrays.items():
+            target = self._arrays[name]
+            if value.shape != target.shape[1:]:
+                target[row] = self.columns[name].fill
+            place: tuple[Any, ...] = (row, *[slice(length) for length in value.shape])
+            target[place] = value
+
+    def keep(self, rows: NDArray[np.intp]) -> None:
+        """Keep only these rows, in this order."""
+        for array in self._arrays.values():
+            array[: len(rows)] = array[rows]
+        self.size = len(rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON-able dictionary; arrays in base64, booleans packed eight to a byte."""
+        packed = {name: _encode(self[name]) for name in self.columns}
+        return {"size": self.size, "sizes": dict(self.sizes), "arrays": packed}
+
+    def load(self, data: Mapping[str, Any]) -> None:
+        """Restore what `to_dict` gave; the columns must be the same."""
+        self.size, self.sizes = int(data["size"]), dict(data["sizes"])
+        capacity = max(_FIRST_CAPACITY, self.size)
+        for name in self.columns:
+            self._arrays[name] = self._empty(name, capacity)
+            self[name][...] = _decode(data["arrays"][name], self[name])
+
+    def _capacity(self) -> int:
+        return len(next(iter(self._arrays.values())))
+
+    def _empty(self, name: str, capacity: int) -> NDArray[Any]:
+        column = self.columns[name]
+        return np.full(
+            (capacity, *(self.sizes[axis] for axis in column.axes)), column.fill, dtype=column.dtype
+        )
+
+    def _grow(self, values: Mapping[str, NDArray[Any]]) -> None:
+        before = dict(self.sizes)
+        for name, value in values.items():
+            for axis, length in zip(self.columns[name].axes, value.shape, strict=True):
+                self.sizes[axis] = max(self.sizes[axis], length)
+        if self.sizes != before:
+            self._rebuild(self._capacity())
+
+    def _rebuild(self, capacity: int) -> None:
+        for name, old in list(self._arrays.items()):
+            new = self._empty(name, capacity)
+            new[tuple(slice(min(a, b)) for a, b in zip(old.shape, new.shape, strict=True))] = old[:capacity]
+            self._arrays[name] = new
+
+
+def _encode(array: NDArray[Any]) -> str:
+    packed = np.packbits(array) if array.dtype == np.bool_ else array
+    return base64.b64encode(np.ascontiguousarray(packed).tobytes()).decode("ascii")
+
+
+def _decode(text: str, like: NDArray[Any]) -> NDArray[Any]:
+    raw = base64.b64decode(text)
+    if like.dtype == np.bool_:
+        bits = np.unpackbits(np.frombuffer(raw, dtype=np.uint8), count=like.size)
+        return bits.astype(np.bool_).reshape(like.shape)
+    return np.frombuffer(raw, dtype=like.dtype).reshape(like.shape)

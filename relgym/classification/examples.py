@@ -1,0 +1,177 @@
+"""What a classifier is shown: one object's relational situation and numbers at one time step (§3.4.2)."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.errors import ConfigError, ObservationError
+
+__all__ = ["NOISE", "Bools", "Example", "ExampleBatch", "Floats", "Vocabulary", "difference", "mode_value"]
+
+Bools: TypeAlias = NDArray[np.bool_]
+Floats: TypeAlias = NDArray[np.float64]
+
+NOISE = -1
+"""Stands for "no mode" wherever an example's mode is asked for (§3.2.1)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """Names of everything that examples of one target hold, in the order of their arrays.
+
+    Parameters
+    ----------
+    relations
+        Binary relations (R).
+    unary
+        Unary relations (U), object types among them.
+    pair
+        Real-valued features of the target and another object (F), printed ``name(A, B)``.
+    own
+        Real-valued features of the target alone or of objects without a body (A).
+    contact
+        Those names that are contact facts, which the thesis didn't have.
+
+    Raises
+    ------
+    ConfigError
+        A name occurs twice or is reserved for mode functions (``F3``, ``F1 - F3``).
+    """
+
+    relations: tuple[str, ...]
+    unary: tuple[str, ...]
+    pair: tuple[str, ...] = ()
+    own: tuple[str, ...] = ()
+    contact: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        names = Counter((*self.relations, *self.unary, *self.pair, *self.own))
+        twice = sorted(name for name, count in names.items() if count > 1)
+        reserved = sorted(name for name in names if re.fullmatch(r"F\d+( - F\d+)?", name))
+        if twice or reserved:
+            raise ConfigError(
+                "names of relations and features must differ from one another and from mode functions' "
+                f"(F0, F1, ...); rename {twice + reserved}"
+            )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON-able dictionary."""
+        names = ("relations", "unary", "pair", "own")
+        return {name: list(getattr(self, name)) for name in names} | {"contact": sorted(self.contact)}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Vocabulary:
+        """Inverse of `to_dict`."""
+        names = {name: tuple(value) for name, value in data.items() if name != "contact"}
+        return cls(contact=frozenset(data["contact"]), **names)
+
+
+@dataclass(frozen=True, slots=True)
+class Example:
+    """One example of one target, with K objects; K may differ between examples.
+
+    Parameters
+    ----------
+    table
+        Truth of every binary relation for every ordered pair of objects, shape ``(R, K, K)``.
+    unary
+        Truth of every unary relation, shape ``(U, K)``.
+    close
+        The target and all objects that touch it, or else the nearest one, shape ``(K,)``: the context
+        (§3.4.2).
+    pair
+        Features of (target, other), shape ``(K, F)``; NaN where undefined.
+    own
+        The target's own features, shape ``(A,)``; NaN where undefined.
+    target
+        Index of the object whose behaviour is classified: FOIL's A.
+    key
+        Identifies the relational state whatever the order of objects; examples are kept per mode and key.
+    row
+        Where the example came from (a row of the model's history); -1 for a query.
+    """
+
+    table: Bools
+    unary: Bools
+    close: Bools
+    pair: Floats
+    own: Floats
+    target: int = 0
+    key: bytes = b""
+    row: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class ExampleBatch:
+    """Examples with the same objects: as `Example`, each array with a leading axis of length n.
+
+    `unary` and others may be broadcast views (``np.broadcast_to``): nothing is written to.
+    """
+
+    table: Bools
+    unary: Bools
+    close: Bools
+    pair: Floats
+    own: Floats
+    target: int = 0
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def __getitem__(self, index: int) -> Example:
+        i = index
+        return Example(self.table[i], self.unary[i], self.close[i], self.pair[i], self.own[i], self.target)
+
+    @classmethod
+    def of(cls, example: Example) -> ExampleBatch:
+        """A batch of one."""
+        return cls.stack([example])
+
+    @classmethod
+    def stack(cls, examples: Sequence[Example]) -> ExampleBatch:
+        """A batch of examples that share number of objects and target index."""
+        return cls(
+            np.stack([e.table for e in examples]),
+            np.stack([e.unary for e in examples]),
+            np.stack([e.close for e in examples]),
+            np.stack([e.pair for e in examples]),
+            np.stack([e.own for e in examples]),
+            examples[0].target,
+        )
+
+
+def check_example(vocabulary: Vocabulary, example: Example) -> None:
+    """Raise `ObservationError` where an example's shapes don't follow the vocabulary."""
+    k = example.table.shape[-1]
+    expected = {
+        "table": (len(vocabulary.relations), k, k),
+        "unary": (len(vocabulary.unary), k),
+        "close": (k,),
+        "pair": (k, len(vocabulary.pair)),
+        "own": (len(vocabulary.own),),
+    }
+    for name, shape in expected.items():
+        if getattr(example, name).shape != shape:
+            raise ObservationError(
+                f"example {example.row}: expected {name} of shape {shape} for {k} objects, "
+                f"got {getattr(example, name).shape}; build it with the relations that the vocabulary names"
+            )
+    if not 0 <= example.target < k:
+        raise ObservationError(f"example {example.row}: target {example.target} is none of its {k} objects")
+
+
+def mode_value(mode: int) -> str:
+    """Name under which a mode's prediction enters clauses and trees."""
+    return f"F{mode}"
+
+
+def difference(i: int, j: int) -> str:
+    """Name of the difference of two modes' predictions."""
+    return f"F{i} - F{j}"

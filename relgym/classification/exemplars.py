@@ -1,0 +1,281 @@
+"""The bounded memory of classified examples that classifiers learn from.
+
+Most time steps share a relational state, so a few examples per (mode, relational state) say as much as all of
+them, as long as those near a threshold stay. Kept are: examples that contradicted a classifier, and a
+deterministic reservoir of the others, weighted so that the weights of a state's examples add up to the number
+seen.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.columns import Column, Columns
+from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabulary, check_example
+from relgym.config import ClassificationConfig
+
+__all__ = ["Exemplars"]
+
+_UNDEFINED: Final = float("nan")
+_MASK64: Final = (1 << 64) - 1
+_COLUMNS: Final = {
+    "table": Column("bool", ("R", "K", "K2")),
+    "unary": Column("bool", ("U", "K")),
+    "exists": Column("bool", ("K",)),
+    "close": Column("bool", ("K",)),
+    "pair": Column("float64", ("K", "F"), _UNDEFINED),
+    "own": Column("float64", ("A",), _UNDEFINED),
+    "target": Column("int64"),
+    "row": Column("int64"),
+    "assigned": Column("int64", (), NOISE),
+    "hard": Column("bool"),
+    "cell": Column("int64"),
+    "fits": Column("bool", ("M",)),
+    "values": Column("float64", ("M",), _UNDEFINED),
+    "roles": Column("int64", ("P",), -1),
+}
+
+
+@dataclass(slots=True)
+class _Cell:
+    """All examples of one mode in one relational state."""
+
+    assigned: int
+    key: bytes
+    count: float = 0.0
+    members: list[int] = field(default_factory=list)
+
+
+class Exemplars:
+    """Classified examples of one target, in slots 0 .. len - 1.
+
+    Parameters
+    ----------
+    vocabulary
+        Names of what the examples hold.
+    config
+        Bounds.
+
+    Attributes
+    ----------
+    modes
+        Ids of the modes, in the order of the columns of ``columns["fits"]`` and ``columns["values"]``.
+    columns
+        The arrays: everything an `Example` holds, its restriction to the close objects (``close_...``),
+        ``assigned`` (mode id or `NOISE`), ``fits`` (which modes' functions explain it), ``values`` (what they
+        predict; NaN where a mode's roles can't be filled), ``roles`` (object playing each role of its mode;
+        -1 for none).
+    version
+        Changes with every change of content.
+
+    Notes
+    -----
+    Cost of `add`: O(R K^2), some 20 µs; no randomness: the reservoir's choices are hashes of key and count.
+    """
+
+    def __init__(self, vocabulary: Vocabulary, config: ClassificationConfig) -> None:
+        self.vocabulary = vocabulary
+        self.config = config
+        self.modes: tuple[int, ...] = ()
+        lengths = {
+            "R": vocabulary.relations,
+            "U": vocabulary.unary,
+            "F": vocabulary.pair,
+            "A": vocabulary.own,
+        }
+        sizes = {name: len(names) for name, names in lengths.items()}
+        self.columns = Columns(_COLUMNS, sizes | {"K": 1, "K2": 1, "M": 0, "P": 0})
+        self.version = 0
+        self._cells: list[_Cell] = []
+        self._index: dict[tuple[int, bytes], int] = {}
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """History row of the example in each slot."""
+        return self.columns["row"]
+
+    @property
+    def assigned(self) -> NDArray[np.int64]:
+        """Mode that the example in each slot was assigned to."""
+        return self.columns["assigned"]
+
+    def add(
+        self,
+        example: Example,
+        assigned: int,
+        fits: Bools,
+        values: Floats,
+        *,
+        hard: bool = False,
+        roles: Sequence[int] = (),
+    ) -> int | None:
+        """Offer an example; its slot if it was kept.
+
+        Parameters
+        ----------
+        example
+            The example.
+        assigned
+            The mode it was assigned to, or `NOISE`.
+        fits, values
+            Which modes explain it, and what they predict, shape ``(len(modes),)``.
+        hard
+            Whether it contradicted a classifier; such examples are preferred.
+        roles
+            Object playing each role of the assigned mode.
+        """
+        check_example(self.vocabulary, example)
+        cell = self._cells[number := self._cell(assigned, example.key)]
+        cell.count += 1
+        slot = self._room(cell, hard)
+        if slot is None:
+            return None
+        self.version += 1
+        self.columns.write(
+            slot,
+            {
+                "table": example.table,
+                "unary": example.unary,
+                "exists": np.ones(len(example.close), dtype=np.bool_),
+                "close": example.close,
+                "pair": example.pair,
+                "own": example.own,
+                "target": example.target,
+                "row": example.row,
+                "assigned": assigned,
+                "hard": hard,
+                "cell": number,
+                "fits": fits,
+                "values": values,
+                "roles": np.asarray(roles, dtype=np.int64),
+            },
+        )
+        return slot
+
+    def set_modes(
+        self,
+        modes: Sequence[int],
+        assigned: NDArray[np.integer[Any]],
+        fits: Bools,
+        values: Floats,
+        roles: NDArray[np.integer[Any]] | None = None,
+    ) -> None:
+        """Re-label all exemplars after the modes changed.
+
+        Parameters
+        ----------
+        modes
+            Ids of the modes there are now.
+        assigned
+            New mode of each slot, shape ``(n,)``.
+        fits, values
+            Which modes explain it, and what they predict, shape ``(n, len(modes))``.
+        roles
+            Object playing each role of the new mode, -1 for none, shape ``(n, most roles)``; default: as
+            before.
+        """
+        weights, keys = self.weights(), [self._cells[c].key for c in self.columns["cell"].tolist()]
+        self.modes = tuple(modes)
+        self.columns["fits"], self.columns["values"] = fits, values
+        self.columns["assigned"] = np.asarray(assigned)
+        if roles is not None:
+            self.columns["roles"] = np.asarray(roles)
+        self._cells, self._index = [], {}
+        for slot, key in enumerate(keys):
+            cell = self._cells[number := self._cell(int(assigned[slot]), key)]
+            cell.members.append(slot)
+            cell.count += float(weights[slot])
+            self.columns["cell"][slot] = number
+        self._trim()
+        self.version += 1
+
+    def weights(self) -> Floats:
+        """How many seen examples each slot stands for: 1 if hard, an equal share of the rest otherwise."""
+        cell, hard = self.columns["cell"], self.columns["hard"]
+        counts = np.array([c.count for c in self._cells])
+        kept = np.bincount(cell, minlength=len(counts))
+        hards = np.bincount(cell[hard], minlength=len(counts))
+        soft = kept - hards
+        share = np.where(soft > 0, (counts - hards) / np.maximum(soft, 1), counts / np.maximum(kept, 1))
+        weights: Floats = np.where(hard & (soft[cell] > 0), 1.0, share[cell])
+        return weights
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON-able dictionary of the whole content."""
+        cells = [[c.assigned, c.key.hex(), c.count, c.members] for c in self._cells]
+        return {"modes": list(self.modes), "columns": self.columns.to_dict(), "cells": cells}
+
+    def load(self, data: dict[str, Any]) -> None:
+        """Restore what `to_dict` gave."""
+        self.modes = tuple(data["modes"])
+        self.columns.load(data["columns"])
+        cells = [
+            (assigned, bytes.fromhex(key), count, members) for assigned, key, count, members in data["cells"]
+        ]
+        self._cells = [_Cell(assigned, key, count, list(members)) for assigned, key, count, members in cells]
+        self._index = {(cell.assigned, cell.key): i for i, cell in enumerate(self._cells)}
+        self.version += 1
+
+    def _cell(self, assigned: int, key: bytes) -> int:
+        number = self._index.setdefault((assigned, key), len(self._cells))
+        if number == len(self._cells):
+            self._cells.append(_Cell(assigned, key))
+        return number
+
+    def _cap(self, cell: _Cell) -> int:
+        return self.config.noise_per_state if cell.assigned == NOISE else self.config.exemplars_per_state
+
+    def _room(self, cell: _Cell, hard: bool) -> int | None:
+        """A slot for a new example of this cell, or none if the reservoir passes it over."""
+        if len(cell.members) < self._cap(cell):
+            if len(self) < self.config.max_exemplars:
+                cell.members.append(slot := self.columns.append())
+                return slot
+            crowded = max(self._cells, key=lambda c: len(c.members))
+            if len(cell.members) < len(crowded.members):
+                slot = crowded.members.pop(self._victim(crowded))
+                cell.members.append(slot)
+                return slot
+        is_hard = self.columns["hard"]
+        soft = [i for i, slot in enumerate(cell.members) if not is_hard[slot]]
+        if hard:
+            return cell.members[self._victim(cell)]
+        # Algorithm R, with a hash for a random number: the k-th example enters with probability size / k.
+        position = _hash(cell.key, cell.count) % max(int(cell.count) - (len(cell.members) - len(soft)), 1)
+        return cell.members[soft[position]] if position < len(soft) else None
+
+    def _victim(self, cell: _Cell) -> int:
+        """Position of the member to give up: any that isn't hard, or else any."""
+        is_hard = self.columns["hard"]
+        soft = [i for i, slot in enumerate(cell.members) if not is_hard[slot]]
+        candidates = soft or list(range(len(cell.members)))
+        return candidates[_hash(cell.key, cell.count) % len(candidates)]
+
+    def _trim(self) -> None:
+        """Bring cells that grew by re-labelling (noise that became a mode) back to their bound."""
+        for cell in self._cells:
+            while len(cell.members) > self._cap(cell):
+                cell.members.pop(self._victim(cell))
+        kept = sorted(slot for cell in self._cells for slot in cell.members)
+        if len(kept) < len(self):
+            new = {slot: i for i, slot in enumerate(kept)}
+            self.columns.keep(np.array(kept, dtype=np.intp))
+            for cell in self._cells:
+                cell.members = [new[slot] for slot in cell.members]
+
+
+def _hash(key: bytes, count: float) -> int:
+    """A number that looks random, the same in every process (splitmix64 of key and count)."""
+    x = (zlib.crc32(key) + int(count) * 0x9E3779B97F4A7C15) & _MASK64
+    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & _MASK64
+    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & _MASK64
+    return x ^ (x >> 31)

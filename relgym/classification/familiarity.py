@@ -1,0 +1,132 @@
+"""Has anything like this been seen? What classifiers look at, whatever the order and number of objects.
+
+An object is described by the relations that clauses use: its own, those to the target, and which described
+objects it stands in which relation to. A situation is the *set* of these descriptions, because clauses don't
+count objects: ten more boxes beside the track make no new situation, a box on top of a third one may.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.binary import BinaryClassifier
+from relgym.classification.examples import Bools, Example, ExampleBatch, Vocabulary
+from relgym.classification.plans import Key
+from relgym.classification.views import Context, View
+
+__all__ = ["Familiarity", "Used", "situations", "used_by"]
+
+Used: TypeAlias = tuple[tuple[Context, tuple[int, ...], tuple[int, ...]], ...]
+"""Per context: columns of the binary and of the unary relations that clauses use."""
+
+_Hashes: TypeAlias = NDArray[np.uint64]
+
+_GOLDEN: Final = np.uint64(0x9E3779B97F4A7C15)
+_NOTHING: Final = np.uint64(0)
+
+
+class Familiarity:
+    """Remembers which situations were seen, as far as a set of classifiers can tell them apart.
+
+    Parameters
+    ----------
+    used
+        What the classifiers look at.
+    seen
+        Situations seen so far.
+    """
+
+    def __init__(self, used: Used, seen: Iterable[int]) -> None:
+        self.used = used
+        self.seen = set(seen)
+        self._known: dict[Key, bool] = {}
+
+    def is_seen(self, example: Example, key: Key) -> bool:
+        """Whether an example's situation was seen; answers are kept by `key` (`Planner.key`)."""
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = self._situation(example) in self.seen
+        return found
+
+    def is_seen_batch(self, view: View) -> Bools:
+        """The same for many examples, shape ``(n,)``."""
+        seen = np.fromiter(self.seen, dtype=np.uint64, count=len(self.seen))
+        return np.isin(situations(view, self.used), seen)
+
+    def add(self, example: Example, key: Key) -> None:
+        """Remember an example's situation."""
+        if not self._known.get(key, False):
+            self.seen.add(self._situation(example))
+            self._known.clear()
+            self._known[key] = True
+
+    def _situation(self, example: Example) -> int:
+        view = View.of_batch(ExampleBatch.of(example), (), np.empty((1, 0)))
+        return int(situations(view, self.used)[0])
+
+
+def used_by(classifiers: Iterable[BinaryClassifier], vocabulary: Vocabulary) -> Used:
+    """Columns of all relations that the clauses of some classifiers use."""
+    names: dict[Context, set[str]] = {}
+    for classifier in classifiers:
+        literals = [literal for clause in classifier.definition.clauses for literal in clause]
+        names.setdefault(classifier.context, set()).update(literal.relation for literal in literals)
+    return tuple(
+        (context, _columns(vocabulary.relations, names[context]), _columns(vocabulary.unary, names[context]))
+        for context in sorted(names)
+    )
+
+
+def situations(view: View, used: Used) -> _Hashes:
+    """A number per example that stands for its situation, shape ``(n,)``; equal for equal situations.
+
+    Cost: O(n K^2 log K).
+    """
+    result = np.zeros(len(view), dtype=np.uint64)
+    for context, relations, unary in used:
+        exists = view.close if context == "touching" else view.exists
+        result = _mix(result + _situation(view, exists, list(relations), list(unary)))
+    return result
+
+
+def _situation(view: View, exists: Bools, relations: list[int], unary: list[int]) -> _Hashes:
+    n, k = exists.shape
+    rows = np.arange(n)
+    table = np.moveaxis(view.table[:, relations], 1, -1)  # (n, K, K, r)
+    towards, back = table[rows, :, view.target], table[rows, view.target]
+    self_ = np.arange(k) == view.target[:, None]
+    own = np.moveaxis(view.unary[:, unary], 1, -1)
+    described = _hash_bits(np.concatenate([own, towards, back, self_[:, :, None]], axis=-1))
+    among = _hash_bits(table)  # (n, K, K): how each object stands to each other one
+    pairs = _mix(among + described[:, None, :])
+    neighbours = _set_hash(np.where(exists[:, None, :], pairs, _NOTHING))
+    return _set_hash(np.where(exists, _mix(described + neighbours), _NOTHING))
+
+
+def _columns(known: tuple[str, ...], names: set[str]) -> tuple[int, ...]:
+    return tuple(column for column, name in enumerate(known) if name in names)
+
+
+def _hash_bits(bits: Bools) -> _Hashes:
+    """One number per row of the last axis."""
+    weights = _mix(np.arange(1, bits.shape[-1] + 1, dtype=np.uint64) * _GOLDEN)
+    return _mix((bits * weights).sum(axis=-1, dtype=np.uint64) + _GOLDEN)
+
+
+def _set_hash(members: _Hashes) -> _Hashes:
+    """Hash of the set of non-zero numbers along the last axis."""
+    ordered = np.sort(members, axis=-1)
+    ordered[..., 1:][ordered[..., 1:] == ordered[..., :-1]] = _NOTHING
+    total: _Hashes = ordered.sum(axis=-1, dtype=np.uint64)
+    return total
+
+
+def _mix(x: _Hashes) -> _Hashes:
+    """Scramble 64 bits (splitmix64); sums and products wrap around."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))

@@ -1,0 +1,176 @@
+"""Learning one pair: FOIL in both contexts and polarities, then trees where clauses err (§3.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.binary import BinaryClassifier, majority, tree_columns, tree_features
+from relgym.classification.examples import Bools, Floats
+from relgym.classification.views import Context, Scope, View
+from relgym.config import ClassificationConfig
+from relgym.logic.clause import Clause, Definition
+from relgym.logic.csp import matches
+from relgym.logic.foil import FoilConfig, learn, learn_both
+from relgym.numeric.tree import DecisionTree, learn_tree
+
+__all__ = ["Lesson", "foil_config", "learn_pair"]
+
+_SHORT: Final = 3  # a faultless definition of so few literals isn't challenged by the other context
+_BITS: Final = 1e-9  # description lengths closer than this are equal
+
+_Rows = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """What one pair of modes is to be learned from.
+
+    Parameters
+    ----------
+    view
+        All examples.
+    rows
+        Those that teach this pair, shape ``(n,)``.
+    is_i
+        Whether each shows the pair's first mode, shape ``(n,)``.
+    weights
+        How many seen examples each stands for, shape ``(n,)``.
+    """
+
+    view: View
+    rows: _Rows
+    is_i: Bools
+    weights: Floats
+
+    @property
+    def counts(self) -> tuple[float, float]:
+        """Weight of the first and of the second mode's examples."""
+        return float(self.weights[self.is_i].sum()), float(self.weights[~self.is_i].sum())
+
+    def balanced(self, exponent: float) -> Lesson:
+        """The same lesson, classes weighted by their share to the power of ``-exponent``, total unchanged."""
+        total = sum(self.counts)
+        if not exponent or not all(self.counts):
+            return self
+        factors = [(count / total) ** -exponent for count in self.counts]
+        weights = self.weights * np.where(self.is_i, *factors)
+        return Lesson(self.view, self.rows, self.is_i, weights * (total / weights.sum()))
+
+
+def foil_config(config: ClassificationConfig) -> FoilConfig:
+    """FOIL's settings."""
+    return FoilConfig(
+        max_literals=config.max_literals,
+        max_clauses=config.max_clauses,
+        max_new_variables=config.max_new_variables,
+        beam=config.beam,
+        numeric=config.numeric_literals,
+        choice=config.literal_choice,
+        min_precision=config.min_precision,
+        mdl=config.mdl,
+    )
+
+
+def learn_pair(
+    i: int, j: int, lesson: Lesson, scope: Scope, config: ClassificationConfig
+) -> BinaryClassifier:
+    """Learn to tell mode `i` from mode `j`.
+
+    With examples of one mode only there is nothing to tell: the result has no clause and votes for that mode.
+    """
+    if not all(lesson.counts):
+        return majority(i, j, scope, lesson.counts)
+    taught = lesson.balanced(config.class_balance)
+    contexts: Sequence[Context] = ("touching", "all") if config.context == "auto" else (config.context,)
+    best: tuple[Context, Definition] | None = None
+    work = 0
+    for context in contexts:
+        found = _define(taught, context, scope, config)
+        work += found.work
+        if best is None or found.bits < best[1].bits - _BITS:  # ties: touching
+            best = context, found
+        if found.errors == 0 and sum(map(len, found.clauses)) <= _SHORT:
+            break
+    assert best is not None
+    classifier = _with_trees(BinaryClassifier(i, j, scope, *best, work=work), taught, config)
+    classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
+    return classifier
+
+
+def _define(lesson: Lesson, context: Context, scope: Scope, config: ClassificationConfig) -> Definition:
+    facts = lesson.view.facts(context, scope)
+    tuples, is_i, weights = lesson.view.tuples(lesson.rows), lesson.is_i, lesson.weights
+    method = learn_both if config.both_polarities else learn
+    found: Definition = method(
+        facts,
+        tuples[is_i],
+        tuples[~is_i],
+        pos_weights=weights[is_i],
+        neg_weights=weights[~is_i],
+        config=foil_config(config),
+    )
+    return found
+
+
+def _with_trees(found: BinaryClassifier, lesson: Lesson, config: ClassificationConfig) -> BinaryClassifier:
+    """Add decision trees where clauses, or the fall-through, err too often (§3.4.4)."""
+    view, facts = lesson.view, lesson.view.facts(found.context, found.scope)
+    positive = lesson.is_i != found.definition.negated
+    open_ = np.arange(len(lesson.rows))
+    trees: list[DecisionTree | None] = []
+    for clause in found.definition.clauses:
+        hit = matches(clause, facts, view.tuples(lesson.rows[open_]))
+        here = open_[hit]
+        wrong = here[~positive[here]]
+        tree = None
+        if _rate(lesson, wrong, here, ~positive) > config.clause_tree_threshold:
+            tree = _tree(found, clause, lesson, here, positive, config)
+        if tree is not None:
+            features = tree_features(view, found.scope, found.context, clause, lesson.rows[here])
+            here = here[tree.predict_batch(features)]
+        trees.append(tree)
+        open_ = np.setdiff1d(open_, here)
+    last = None
+    if _rate(lesson, open_[positive[open_]], open_, positive) > config.fall_through_tree_threshold:
+        last = _tree(found, None, lesson, open_, positive, config)
+    return BinaryClassifier(
+        found.i, found.j, found.scope, found.context, found.definition, tuple(trees), last, work=found.work
+    )
+
+
+def _rate(lesson: Lesson, wrong: _Rows, here: _Rows, suffering: Bools) -> float:
+    """Share of errors among the examples decided here, or in the class that suffers them if larger.
+
+    The second makes rare modes count: 20 among 16,000 are no share to speak of, but may be all there are.
+    """
+    w = lesson.weights
+    errors = float(w[wrong].sum())
+    return max(errors / max(float(w[here].sum()), 1e-300), errors / max(float(w[suffering].sum()), 1e-300))
+
+
+def _tree(
+    found: BinaryClassifier,
+    clause: Clause | None,
+    lesson: Lesson,
+    here: _Rows,
+    positive: Bools,
+    config: ClassificationConfig,
+) -> DecisionTree | None:
+    """A tree for the examples at one stage; none if it would always give the same answer."""
+    columns = tree_columns(found.scope, 1 if clause is None else clause.variables)
+    if not columns:
+        return None
+    tree = learn_tree(
+        tree_features(lesson.view, found.scope, found.context, clause, lesson.rows[here]),
+        positive[here],
+        weights=lesson.weights[here],
+        columns=columns,
+        min_leaf=config.tree_min_leaf,
+        max_depth=config.tree_max_depth,
+    )
+    return tree if len({tree.says_yes(leaf) for leaf in tree.leaves}) == 2 else None

@@ -1,0 +1,368 @@
+"""Which mode holds? One-against-one voting of binary classifiers, learned one example at a time (§3.4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.binary import VOTE_UNIT, BinaryClassifier
+from relgym.classification.examples import NOISE, Bools, Example, ExampleBatch, Floats, Vocabulary
+from relgym.classification.exemplars import Exemplars
+from relgym.classification.familiarity import Familiarity, situations, used_by
+from relgym.classification.learning import Lesson
+from relgym.classification.pairs import PairState, lesson_of, pair_labels
+from relgym.classification.plans import Planner
+from relgym.classification.ranking import Ranking, RankingBatch, Verdict, verdict
+from relgym.classification.views import Scope, View
+from relgym.config import ClassificationConfig
+
+__all__ = ["ModeClassifier"]
+
+
+class ModeClassifier:
+    """Ranks modes by the votes of all pairs' classifiers.
+
+    Parameters
+    ----------
+    vocabulary
+        Names of what examples hold.
+    config
+        Settings.
+
+    Attributes
+    ----------
+    exemplars
+        The examples it remembers.
+    counts
+        Examples seen of each mode, by id.
+
+    Notes
+    -----
+    Online use: `observe` every example, `sync` when the modes change, `refresh` with a budget of work now and
+    then. Agreeing examples only update counts; a pair becomes stale when an example contradicts it (design
+    §5). All votes are integers, so that `rank` and `rank_batch` agree bit for bit whatever the order of
+    summation.
+    """
+
+    def __init__(self, vocabulary: Vocabulary, config: ClassificationConfig) -> None:
+        self.vocabulary = vocabulary
+        self.config = config
+        self.exemplars = Exemplars(vocabulary, config)
+        self.counts: dict[int, float] = {}
+        self._pairs: dict[tuple[int, int], PairState] = {}
+        self._view: tuple[int, View, Floats] | None = None
+        self._seen: Familiarity | None = None
+        self._reset_caches()
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """Mode ids, in the order in which `values` and `fits` are given."""
+        return self.exemplars.modes
+
+    @property
+    def classifiers(self) -> tuple[BinaryClassifier, ...]:
+        """All pairs' classifiers, in the order of their mode ids."""
+        return tuple(pair.classifier for pair in self._pairs.values())
+
+    @property
+    def stale(self) -> tuple[tuple[int, int], ...]:
+        """Pairs that wait to be learned anew, the most contradicted first."""
+        return tuple(p.modes for p in sorted(self._pairs.values(), key=lambda p: p.urgency) if p.stale)
+
+    # --- asking
+    # -----------------------------------------------------------------------------------------------
+
+    def rank(self, example: Example, values: Sequence[float]) -> Ranking:
+        """Rank the modes for one example.
+
+        Parameters
+        ----------
+        example
+            The example.
+        values
+            What each mode's function predicts, in the order of `modes`; NaN where its roles can't be filled.
+        """
+        if not self.modes:
+            return Ranking((), (), 0.0, False)
+        outcomes = self._planner.outcomes(example, values)
+        scores = [0] * len(self.modes)
+        for (a, b), votes, outcome in zip(self._places, self._votes, outcomes, strict=True):
+            for_a, for_b = votes[outcome]
+            scores[a] += for_a
+            scores[b] += for_b
+        modes, counts = self.modes, self.counts
+        order = sorted(range(len(modes)), key=lambda m: (-scores[m], -counts[modes[m]], modes[m]))
+        best, rest = order[0], order[1:]
+        margin = (scores[best] - scores[rest[0]]) / VOTE_UNIT if rest else math.inf
+        familiar = self._fired(modes[best], outcomes) or self._is_familiar(example)
+        return Ranking(
+            tuple([modes[m] for m in order]), tuple([scores[m] / VOTE_UNIT for m in order]), margin, familiar
+        )
+
+    def rank_batch(self, batch: ExampleBatch, values: Floats) -> RankingBatch:
+        """Rank the modes for n examples; equal to `rank` of each. `values` has shape ``(n, len(modes))``."""
+        n, m = len(batch), len(self.modes)
+        if not m:
+            none = np.empty((n, 0))
+            return RankingBatch(none.astype(np.int64), none, np.zeros(n), np.zeros(n, dtype=np.bool_))
+        view = View.of_batch(batch, self.modes, np.asarray(values, dtype=np.float64))
+        scores, fired = self._scores_batch(view)
+        by_tie = sorted(range(m), key=lambda k: (-self.counts[self.modes[k]], self.modes[k]))
+        order = np.array(by_tie)[np.argsort(-scores[:, by_tie], axis=1, kind="stable")]
+        ranked = np.take_along_axis(scores, order, axis=1)
+        margin = (ranked[:, 0] - ranked[:, 1]) / VOTE_UNIT if m > 1 else np.full(n, math.inf)
+        familiar = fired[np.arange(n), order[:, 0]]
+        unsure = np.flatnonzero(~familiar)
+        if len(unsure):
+            familiar[unsure] = self._familiarity().is_seen_batch(view.take(unsure))
+        return RankingBatch(np.array(self.modes)[order], ranked / VOTE_UNIT, margin, familiar)
+
+    def explain(self, example: Example, values: Sequence[float]) -> list[Verdict]:
+        """How the winner fared against every other mode, in the order of the ranking."""
+        ranking = self.rank(example, values)
+        if not ranking.modes:
+            return []
+        best, found = ranking.modes[0], {}
+        for classifier, outcome in zip(
+            self.classifiers, self._planner.outcomes(example, values), strict=True
+        ):
+            if best in (classifier.i, classifier.j):
+                found[classifier.j if best == classifier.i else classifier.i] = verdict(classifier, outcome)
+        return [found[mode] for mode in ranking.modes[1:]]
+
+    # --- learning
+    # ---------------------------------------------------------------------------------------------
+
+    def observe(
+        self,
+        example: Example,
+        assigned: int,
+        fits: Bools,
+        values: Floats,
+        *,
+        roles: Sequence[int] = (),
+        hard: bool = False,
+    ) -> int:
+        """Take in one classified example; the number of pairs that it contradicts.
+
+        Parameters
+        ----------
+        example
+            The example.
+        assigned
+            Mode it was assigned to, or `NOISE`.
+        fits
+            Which modes' functions explain it, in the order of `modes`.
+        values
+            What they predict.
+        roles
+            Object playing each role of the assigned mode.
+        hard
+            Whether to prefer the example in memory even if it contradicts no pair (say, a role classifier).
+
+        Notes
+        -----
+        Learns nothing (that is `refresh`); cost some 100 µs.
+        """
+        wrong = 0
+        if assigned != NOISE:
+            self.counts[assigned] = self.counts.get(assigned, 0.0) + 1.0
+            wrong = self._count(example, assigned, fits, values)
+        self.exemplars.add(example, assigned, fits, values, hard=hard or wrong > 0, roles=roles)
+        if self._seen is not None:
+            self._seen.add(example, self._planner.key(example))
+        return wrong
+
+    def sync(
+        self,
+        modes: Sequence[int],
+        assigned: NDArray[np.integer[Any]],
+        fits: Bools,
+        values: Floats,
+        roles: NDArray[np.integer[Any]] | None = None,
+    ) -> None:
+        """Follow a change of the modes: re-label all exemplars, drop pairs of modes that are gone.
+
+        Parameters
+        ----------
+        modes
+            Ids of the modes there are now.
+        assigned
+            Mode of the example in every slot of `exemplars` (see ``exemplars.rows``), shape ``(n,)``.
+        fits, values
+            Shape ``(n, len(modes))``.
+        roles
+            Object playing each role of the assigned mode, -1 for none, shape ``(n, most roles)``; default: as
+            before.
+
+        Notes
+        -----
+        Only pairs whose examples changed labels, or whose functions moved, are checked; only those that now
+        err more than they did become stale.
+        """
+        modes, before = tuple(modes), self._labels()
+        old = dict(zip(self.modes, self.exemplars.columns["values"].T.copy(), strict=True))
+        moved = {m for at, m in enumerate(modes) if m in old and not _same(old[m], values[:, at])}
+        keep = self.config.ambiguous == "keep"
+        unchanged = {
+            pair
+            for pair, labels in before.items()
+            if set(pair) <= set(modes)
+            and not set(pair) & moved
+            and np.array_equal(labels, pair_labels(assigned, fits, modes, *pair, keep))
+        }
+        self.exemplars.set_modes(modes, assigned, fits, values, roles)
+        weights = self.exemplars.weights()
+        self.counts = {m: float(weights[self.exemplars.assigned == m].sum()) for m in modes}
+        self._update_pairs(unchanged)
+        self._reset_caches()
+
+    def refresh(self, budget: float = math.inf) -> int:
+        """Learn stale pairs anew, the most contradicted first, until the budget is spent; the work spent.
+
+        Work is counted in FOIL's units (tuples x candidate literals), never in time: the result is the same
+        on any machine. A pair is finished once begun, so one call can overdraw the budget.
+        """
+        spent = 0
+        for modes in self.stale:
+            if spent >= budget:
+                break
+            spent += self._pairs[modes].refresh(self._lesson(*modes), self.config)
+        if spent:
+            self._pairs_changed()
+        return spent
+
+    # --- state
+    # ------------------------------------------------------------------------------------------------
+
+    def to_dict(self, *, exemplars: bool = True) -> dict[str, Any]:
+        """Plain JSON-able dictionary; without exemplars the classifier can answer but not go on learning."""
+        return {
+            "vocabulary": self.vocabulary.to_dict(),
+            "modes": list(self.modes),
+            "counts": [[mode, count] for mode, count in sorted(self.counts.items())],
+            "pairs": [pair.to_dict() for pair in self._pairs.values()],
+            "seen": sorted(self._familiarity().seen),
+            "exemplars": self.exemplars.to_dict() if exemplars else None,
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], config: ClassificationConfig) -> ModeClassifier:
+        """Inverse of `to_dict`."""
+        self = cls(Vocabulary.from_dict(data["vocabulary"]), config)
+        if data["exemplars"] is not None:
+            self.exemplars.load(data["exemplars"])
+        else:
+            self.exemplars.modes = tuple(data["modes"])
+        self.counts = {int(mode): float(count) for mode, count in data["counts"]}
+        for plain in data["pairs"]:
+            i, j = int(plain["classifier"]["i"]), int(plain["classifier"]["j"])
+            self._pairs[i, j] = PairState.from_dict(plain, self._scope(i, j))
+        self._reset_caches()
+        self._seen = Familiarity(used_by(self._classifiers, self.vocabulary), data["seen"])
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Caches are rebuilt on demand; leaving them out keeps pickles and copies small.
+        kept = {"vocabulary", "config", "exemplars", "counts", "_pairs"}
+        return {name: value for name, value in self.__dict__.items() if name in kept} | {"_view": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._reset_caches()
+
+    # --- inside
+    # -----------------------------------------------------------------------------------------------
+
+    def _count(self, example: Example, assigned: int, fits: Bools, values: Floats) -> int:
+        outcomes = self._planner.outcomes(example, np.asarray(values).tolist())
+        keep, wrong = self.config.ambiguous == "keep", 0
+        explained = dict(zip(self.modes, np.asarray(fits).tolist(), strict=True))
+        for at, ((i, j), pair) in enumerate(self._pairs.items()):
+            if assigned not in (i, j) or (explained[j if assigned == i else i] and not keep):
+                continue
+            wrong += pair.observe(outcomes[at], assigned == i, self.config.relearn_growth)
+            self._votes[at] = pair.classifier.votes(self.config.votes)
+        return wrong
+
+    def _scores_batch(self, view: View) -> tuple[NDArray[np.int64], Bools]:
+        """Votes of every mode, and whether a clause spoke for it, both of shape ``(n, M)``."""
+        rows = np.arange(len(view))
+        scores = np.zeros((len(view), len(self.modes)), dtype=np.int64)
+        fired = np.zeros(scores.shape, dtype=np.bool_)
+        for (a, b), votes, classifier in zip(self._places, self._votes, self.classifiers, strict=True):
+            outcome = classifier.decide_batch(view, rows)
+            gained = np.array(votes, dtype=np.int64)[outcome]
+            scores[:, a] += gained[:, 0]
+            scores[:, b] += gained[:, 1]
+            last = len(classifier.definition.clauses)
+            spoke = np.array([o.stage < last for o in classifier.outcomes])
+            fired[:, a if classifier.positive == classifier.i else b] |= spoke[outcome]
+        return scores, fired
+
+    def _fired(self, mode: int, outcomes: Sequence[int]) -> bool:
+        """Whether a clause of some pair spoke for a mode."""
+        for classifier, outcome in zip(self._classifiers, outcomes, strict=True):
+            if classifier.positive == mode:
+                if classifier.outcomes[outcome].stage < len(classifier.definition.clauses):
+                    return True
+        return False
+
+    def _is_familiar(self, example: Example) -> bool:
+        return self._familiarity().is_seen(example, self._planner.key(example))
+
+    def _familiarity(self) -> Familiarity:
+        if self._seen is None:
+            used = used_by(self._classifiers, self.vocabulary)
+            view, _ = self._current_view()
+            self._seen = Familiarity(used, situations(view, used).tolist())
+        return self._seen
+
+    def _current_view(self) -> tuple[View, Floats]:
+        version = self.exemplars.version
+        if self._view is None or self._view[0] != version:
+            self._view = version, View.of_exemplars(self.exemplars), self.exemplars.weights()
+        return self._view[1], self._view[2]
+
+    def _lesson(self, i: int, j: int) -> Lesson:
+        view, weights = self._current_view()
+        return lesson_of(self.exemplars, view, weights, i, j, self.config.ambiguous == "keep")
+
+    def _labels(self) -> dict[tuple[int, int], Any]:
+        fits, keep = self.exemplars.columns["fits"], self.config.ambiguous == "keep"
+        return {p: pair_labels(self.exemplars.assigned, fits, self.modes, *p, keep) for p in self._pairs}
+
+    def _scope(self, i: int, j: int) -> Scope:
+        return Scope.of(self.vocabulary, self.config, (i, j))
+
+    def _update_pairs(self, unchanged: Iterable[tuple[int, int]]) -> None:
+        pairs = {}
+        for i, j in combinations(sorted(self.modes), 2):
+            pair = self._pairs.get((i, j))
+            if pair is None:
+                pair = PairState.new(i, j, self._scope(i, j), self._lesson(i, j))
+            elif (i, j) not in unchanged:
+                pair.check(self._lesson(i, j))
+            pairs[i, j] = pair
+        self._pairs = pairs
+
+    def _reset_caches(self) -> None:
+        self._planner = Planner(self.vocabulary, self.modes)
+        self._places = [(self.modes.index(i), self.modes.index(j)) for i, j in self._pairs]
+        self._pairs_changed()
+
+    def _pairs_changed(self) -> None:
+        self._classifiers = self.classifiers
+        self._votes = [c.votes(self.config.votes) for c in self._classifiers]
+        self._planner.set_pairs(self._classifiers)
+        self._seen = None
+
+
+def _same(a: Floats, b: Floats) -> bool:
+    """Whether a function's values moved by no more than rounding."""
+    return bool(np.allclose(a, b, rtol=1e-9, atol=1e-12, equal_nan=True))

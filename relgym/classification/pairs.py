@@ -1,0 +1,138 @@
+"""One pair of modes over time: its classifier, and whether that has become stale (design §5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from relgym.classification.binary import BinaryClassifier, majority
+from relgym.classification.exemplars import Exemplars
+from relgym.classification.learning import Lesson, learn_pair
+from relgym.classification.repair import mend
+from relgym.classification.views import Scope, View
+from relgym.config import ClassificationConfig
+
+__all__ = ["PairState", "lesson_of"]
+
+
+@dataclass(slots=True)
+class PairState:
+    """The classifier of modes `i` < `j`, and what happened since it was learned.
+
+    Parameters
+    ----------
+    classifier
+        The current classifier.
+    seen
+        Examples of either mode that taught the pair so far.
+    learned
+        `seen` when the classifier was learned.
+    errors
+        Weight of examples that it got wrong when it was learned or mended.
+    contradictions
+        Examples that contradicted it since.
+    mended
+        Whether it was mended since it was learned.
+    stale
+        Whether it waits to be learned anew.
+    """
+
+    classifier: BinaryClassifier
+    seen: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    learned: tuple[float, float] = (0.0, 0.0)
+    errors: float = 0.0
+    contradictions: float = 0.0
+    mended: bool = False
+    stale: bool = False
+
+    @classmethod
+    def new(cls, i: int, j: int, scope: Scope, lesson: Lesson) -> PairState:
+        """A pair that hasn't been learned yet; it votes for the mode with more examples."""
+        seen = list(lesson.counts)
+        return cls(majority(i, j, scope, seen), seen, errors=min(seen), stale=min(seen) > 0)
+
+    @property
+    def modes(self) -> tuple[int, int]:
+        """The two mode ids."""
+        return self.classifier.i, self.classifier.j
+
+    @property
+    def urgency(self) -> tuple[float, float, tuple[int, int]]:
+        """Sorting key: the most contradicted first, then the one with most examples of its rarer mode."""
+        return -self.contradictions, -min(self.seen), self.modes
+
+    def observe(self, outcome: int, is_i: bool, growth: float) -> bool:
+        """Count one more example; whether it contradicts the classifier."""
+        self.seen[not is_i] += 1.0
+        wrong = self.classifier.for_i[outcome] != is_i
+        self.classifier.count(outcome, is_i)
+        self.contradictions += wrong
+        # A faultless definition learned whole is only confirmed by agreeing examples, however many.
+        imperfect = self.errors > 0 or self.mended
+        grown = imperfect and min(self.seen) >= growth * max(min(self.learned), 1.0)
+        self.stale = self.stale or self.contradictions > self.errors or (wrong and self.unlearned) or grown
+        return wrong
+
+    @property
+    def unlearned(self) -> bool:
+        """Whether the pair has seen at most one of its modes when it was learned."""
+        return min(self.learned) == 0
+
+    def check(self, lesson: Lesson) -> None:
+        """Count everything anew after examples changed labels; stale if the errors became more."""
+        self.seen = list(lesson.counts)
+        errors = self.classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
+        self.contradictions = max(self.contradictions, errors - self.errors)
+        self.stale = self.stale or errors > self.errors or (self.unlearned and min(self.seen) > 0)
+
+    def refresh(self, lesson: Lesson, config: ClassificationConfig) -> int:
+        """Mend the classifier or learn it anew; the work spent."""
+        found, work = None, 0
+        grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
+        if config.repair and not grown:
+            found = mend(self.classifier, lesson, self.errors, config)
+            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses))
+        self.mended = found is not None
+        if found is None:
+            found = learn_pair(*self.modes, lesson, self.classifier.scope, config)
+            self.learned = lesson.counts
+            right = np.array(found.for_i)[found.decide_batch(lesson.view, lesson.rows)] == lesson.is_i
+            self.errors = float(lesson.weights[~right].sum())
+        self.classifier, self.seen = found, list(lesson.counts)
+        self.contradictions, self.stale = 0.0, False
+        return work + found.work
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON-able dictionary."""
+        names = ("seen", "errors", "contradictions", "mended", "stale")
+        plain = {name: getattr(self, name) for name in names}
+        return plain | {"learned": list(self.learned), "classifier": self.classifier.to_dict()}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], scope: Scope) -> PairState:
+        """Inverse of `to_dict`."""
+        names = ("seen", "errors", "contradictions", "mended", "stale")
+        plain = {name: data[name] for name in names}
+        plain["seen"] = list(plain["seen"])
+        first, second = data["learned"]
+        return cls(BinaryClassifier.from_dict(data["classifier"], scope), learned=(first, second), **plain)
+
+
+def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, keep: bool) -> Lesson:
+    """The exemplars that teach a pair: those of either mode that the other doesn't explain as well.
+
+    With `keep`, those too that both explain (the thesis' arbitrary labels).
+    """
+    labels = pair_labels(exemplars.assigned, exemplars.columns["fits"], exemplars.modes, i, j, keep)
+    rows = np.flatnonzero(labels)
+    return Lesson(view, rows, labels[rows] > 0, weights[rows])
+
+
+def pair_labels(assigned: Any, fits: Any, modes: tuple[int, ...], i: int, j: int, keep: bool) -> Any:
+    """1 where an example shows mode `i`, -1 where it shows `j`, 0 where it teaches the pair nothing."""
+    fits_i, fits_j = (fits[:, modes.index(mode)] | False for mode in (i, j))
+    if keep:
+        fits_i, fits_j = np.zeros_like(fits_i), np.zeros_like(fits_j)
+    return ((assigned == i) & ~fits_j).astype(np.int8) - ((assigned == j) & ~fits_i)

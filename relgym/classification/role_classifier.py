@@ -1,0 +1,301 @@
+"""Which object plays which role? First-order descriptions of the objects that a mode reads (§3.5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.examples import Example, Vocabulary
+from relgym.classification.exemplars import Exemplars
+from relgym.classification.learning import foil_config
+from relgym.classification.views import Scope, View
+from relgym.config import ClassificationConfig
+from relgym.logic.clause import Coverage, Definition
+from relgym.logic.csp import World, satisfiable
+from relgym.logic.foil import learn
+
+__all__ = ["RoleClassifier", "RoleDescription", "RoleKind"]
+
+_MOST_ANSWERS: Final = 4096
+_Rows: TypeAlias = NDArray[np.int64]
+_Places: TypeAlias = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class RoleKind:
+    """What makes two roles interchangeable: the same type and the same weights (§3.2.3).
+
+    Parameters
+    ----------
+    type
+        The objects' type: a unary relation of the vocabulary.
+    weights
+        (property, weight) pairs of the mode's function.
+    """
+
+    type: str
+    weights: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(slots=True)
+class RoleDescription:
+    """What is known of the objects that play one kind of role.
+
+    Parameters
+    ----------
+    kind
+        The kind.
+    places
+        Positions of the roles of this kind.
+    definition
+        ``fulfils(A, B)``: B plays the role for target A; none: any object of the type does.
+    """
+
+    kind: RoleKind
+    places: _Places
+    definition: Definition | None = None
+
+    def score(self, world: World, target: int, candidate: int) -> float | None:
+        """Log-odds that a candidate plays the role; none if nothing speaks for it."""
+        if self.definition is None:
+            return 0.0
+        for clause, coverage in zip(self.definition.clauses, self.definition.coverage, strict=True):
+            if satisfiable(clause, world, (target, candidate)):
+                return _log_odds(coverage)
+        missed = self.definition.uncovered
+        # Only a description that missed some of its own objects leaves room for others.
+        return _log_odds(missed) if missed.positives > 0 else None
+
+    def __str__(self) -> str:
+        rule = f"any {self.kind.type}" if self.definition is None else str(self.definition)
+        return f"{self.kind.type}: {rule}"
+
+
+class RoleClassifier:
+    """Finds the objects that play the roles of one mode, the target's own role left aside.
+
+    Parameters
+    ----------
+    vocabulary
+        Names of what examples hold.
+    kinds
+        Kind of every role; roles of equal kind are interchangeable and share one description.
+    config
+        Settings.
+
+    Notes
+    -----
+    Descriptions use all relations, whatever the context of mode classifiers is (§3.5), and no numbers.
+    Negative examples are the other objects of the role's type in the same example; if there never are any,
+    any object of the type will do. Unlike the original, which went through the roles greedily, all roles are
+    assigned together, so that none takes an object that only another one could.
+    """
+
+    def __init__(
+        self, vocabulary: Vocabulary, kinds: Sequence[RoleKind], config: ClassificationConfig
+    ) -> None:
+        self.vocabulary = vocabulary
+        self.kinds = tuple(kinds)
+        self.config = config
+        full = Scope.of(vocabulary, config)
+        self._scope = Scope(full.relations, full.unary, (), ())
+        self.descriptions = tuple(
+            RoleDescription(kind, tuple(at for at, other in enumerate(self.kinds) if other == kind))
+            for kind in sorted(set(self.kinds))
+        )
+        self.seen = 0.0
+        self.learned = 0.0
+        self.errors = 0.0
+        self.contradictions = 0.0
+        self.stale = bool(self.kinds)
+        self._answers: dict[tuple[Any, ...], _Places | None] = {}
+
+    # --- asking
+    # -----------------------------------------------------------------------------------------------
+
+    def assign(self, example: Example, order: Sequence[int] | None = None) -> _Places | None:
+        """Object playing each role, or none if some role can't be filled.
+
+        Parameters
+        ----------
+        example
+            The example.
+        order
+            All object indices, the ones to prefer first where nothing else decides; default: ascending.
+
+        Notes
+        -----
+        The assignment with the highest sum of log-odds, no object twice. Answers are kept per relational
+        state.
+        """
+        rank = None if order is None else tuple(order)
+        key = (example.target, example.table.tobytes(), example.unary.tobytes(), rank)
+        if key not in self._answers:
+            if len(self._answers) >= _MOST_ANSWERS:
+                self._answers.clear()
+            self._answers[key] = self._search(example, rank or tuple(range(example.table.shape[-1])))
+        return self._answers[key]
+
+    def describe(self) -> list[str]:
+        """One line per kind of role, as in Figure 3.8."""
+        return [str(description) for description in self.descriptions]
+
+    # --- learning
+    # ---------------------------------------------------------------------------------------------
+
+    def observe(self, example: Example, roles: Sequence[int]) -> bool:
+        """Take in who played the roles of one example of the mode; whether that contradicts the descriptions.
+
+        Learns nothing (that is `refresh`).
+        """
+        if not self.kinds:
+            return False
+        self.seen += 1.0
+        wrong = not self._same(self.assign(example), roles)
+        self.contradictions += wrong
+        grown = self.errors > 0 and self.seen >= self.config.relearn_growth * max(self.learned, 1.0)
+        self.stale = self.stale or self.contradictions > self.errors or grown or self._has_choice(example)
+        return wrong
+
+    def refresh(self, exemplars: Exemplars, mode: int) -> int:
+        """Learn the descriptions anew from a mode's exemplars if they are stale; the work spent."""
+        roles = exemplars.columns["roles"][:, : len(self.kinds)]
+        rows = np.flatnonzero((exemplars.assigned == mode) & (roles >= 0).all(axis=1))
+        if not self.stale or not len(rows) or roles.shape[1] < len(self.kinds):
+            return 0
+        view, weights = View.of_exemplars(exemplars), exemplars.weights()
+        work = sum(self._learn(description, view, rows, roles, weights) for description in self.descriptions)
+        self._answers.clear()
+        self.learned, self.seen = float(weights[rows].sum()), max(self.seen, float(weights[rows].sum()))
+        definitions = [d.definition for d in self.descriptions if d.definition is not None]
+        self.errors = sum(definition.errors for definition in definitions)
+        self.contradictions, self.stale = 0.0, False
+        return work
+
+    # --- state
+    # ------------------------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON-able dictionary."""
+        names = ("seen", "learned", "errors", "contradictions", "stale")
+        return {
+            **{name: getattr(self, name) for name in names},
+            "kinds": [[kind.type, [list(term) for term in kind.weights]] for kind in self.kinds],
+            "definitions": [d.definition and d.definition.to_dict() for d in self.descriptions],
+        }
+
+    @classmethod
+    def from_dict(
+        cls, data: dict[str, Any], vocabulary: Vocabulary, config: ClassificationConfig
+    ) -> RoleClassifier:
+        """Inverse of `to_dict`."""
+        kinds = [RoleKind(t, tuple((str(p), float(w)) for p, w in weights)) for t, weights in data["kinds"]]
+        self = cls(vocabulary, kinds, config)
+        for description, plain in zip(self.descriptions, data["definitions"], strict=True):
+            description.definition = plain and Definition.from_dict(plain)
+        for name in ("seen", "learned", "errors", "contradictions", "stale"):
+            setattr(self, name, data[name])
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_answers": {}}
+
+    # --- inside
+    # -----------------------------------------------------------------------------------------------
+
+    def _learn(
+        self, description: RoleDescription, view: View, rows: _Rows, roles: _Rows, weights: Any
+    ) -> int:
+        """Learn one description: its objects against the others of their type (§3.5)."""
+        positives: list[tuple[int, int, int]] = []
+        negatives: list[tuple[int, int, int]] = []
+        type_row = view.unary[:, self.vocabulary.unary.index(description.kind.type)]
+        for row in rows.tolist():
+            target = int(view.target[row])
+            players = {int(roles[row, place]) for place in description.places}
+            for each in np.flatnonzero(type_row[row] & view.exists[row]).tolist():
+                if each != target:
+                    (positives if each in players else negatives).append((row, target, each))
+        if not negatives:
+            description.definition = None
+            return 0
+        for_, against = np.array(positives, dtype=np.int64), np.array(negatives, dtype=np.int64)
+        description.definition = learn(
+            view.facts("all", self._scope),
+            for_,
+            against,
+            pos_weights=weights[for_[:, 0]],
+            neg_weights=weights[against[:, 0]],
+            config=foil_config(self.config),
+        )
+        return description.definition.work
+
+    def _search(self, example: Example, order: _Places) -> _Places | None:
+        """Joint search over all kinds for the assignment with the highest score."""
+        v = self.vocabulary
+        relations = dict(zip(v.relations, example.table, strict=True)) | dict(
+            zip(v.unary, example.unary, strict=True)
+        )
+        world = World(relations, np.ones(len(order), dtype=np.bool_))
+        options = []
+        for description in self.descriptions:
+            is_type = example.unary[v.unary.index(description.kind.type)]
+            scored = [
+                (score, -at, each)
+                for at, each in enumerate(order)
+                if is_type[each] and each != example.target
+                if (score := description.score(world, example.target, each)) is not None
+            ]
+            # All others together can take no more objects than there are roles: the best few are enough.
+            options.append(sorted(scored, reverse=True)[: len(self.kinds)])
+        best: tuple[float, _Places] | None = None
+        for total, chosen in _assignments(self.descriptions, options, frozenset()):
+            if best is None or total > best[0] + 1e-12:
+                best = total, tuple(each for _, each in sorted(chosen))
+        return None if best is None else best[1]
+
+    def _same(self, found: _Places | None, roles: Sequence[int]) -> bool:
+        """Whether two assignments agree up to exchanges of interchangeable roles."""
+        if found is None:
+            return False
+        return all(
+            {found[at] for at in d.places} == {roles[at] for at in d.places} for d in self.descriptions
+        )
+
+    def _has_choice(self, example: Example) -> bool:
+        """Whether there are more objects of a type than roles, and no description to choose by."""
+        for description in self.descriptions:
+            if description.definition is None:
+                of_type = example.unary[self.vocabulary.unary.index(description.kind.type)].copy()
+                of_type[example.target] = False
+                if of_type.sum() > len(description.places):
+                    return True
+        return False
+
+
+def _assignments(
+    descriptions: Sequence[RoleDescription],
+    options: Sequence[Sequence[tuple[float, int, int]]],
+    taken: frozenset[int],
+) -> Iterator[tuple[float, list[tuple[int, int]]]]:
+    """(score, [(role, object), ...]) of all ways to fill all roles without using an object twice."""
+    if not descriptions:
+        yield 0.0, []
+        return
+    free = [option for option in options[0] if option[2] not in taken]
+    for chosen in combinations(free, len(descriptions[0].places)):
+        players = [each for _, _, each in sorted(chosen, key=lambda option: -option[1])]
+        mine = list(zip(descriptions[0].places, players, strict=True))
+        score = sum(score for score, _, _ in chosen)
+        for rest, others in _assignments(descriptions[1:], options[1:], taken | set(players)):
+            yield score + rest, mine + others
+
+
+def _log_odds(coverage: Coverage) -> float:
+    return math.log((coverage.positives + 1.0) / (coverage.negatives + 1.0))
