@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -60,7 +59,6 @@ class _Search:
 
     waiting: int = 0
     failures: int = 0
-    seen: int = field(default=0)
 
 
 class ModeClusterer:
@@ -115,6 +113,8 @@ class ModeClusterer:
     @property
     def modes(self) -> tuple[Mode, ...]:
         """All modes but noise, by id."""
+        if not self._size:
+            return tuple(c.mode for _, c in sorted(self.clusters.items()))
         counts = np.bincount(self.labels, minlength=self._next_id)
         return tuple(c.mode.with_examples(int(counts[i])) for i, c in sorted(self.clusters.items()))
 
@@ -169,9 +169,10 @@ class ModeClusterer:
 
     def _append(self, table: ExampleTable, row: int, y: float) -> int:
         if self._size == len(self._y):
-            self._y = np.pad(self._y, (0, self._size))
-            self._label = np.pad(self._label, (0, self._size))
-            self._rows = np.pad(self._rows, (0, self._size))
+            room = (0, max(256, self._size))
+            self._y = np.pad(self._y, room)
+            self._label = np.pad(self._label, room)
+            self._rows = np.pad(self._rows, room)
         self._y[self._size], self._rows[self._size] = y, row
         self._label[self._size] = NOISE
         self._size += 1
@@ -379,15 +380,33 @@ class ModeClusterer:
 
     # ------------------------------------------------------------------ saving
     def to_json(self) -> dict[str, Any]:
-        """The modes and the noise scale; examples are kept elsewhere."""
-        return {"sigma": self.scale.sigma, "next_id": self._next_id, "modes": [m.to_json() for m in self.modes]}
+        """Everything but the examples."""
+        return {
+            "sigma": self.scale.sigma,
+            "next_id": self._next_id,
+            "largest": self._largest,
+            "modes": [m.to_json() for m in self.modes],
+            "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
+            "searches": [[i, s.waiting, s.failures] for i, s in sorted(self._searches.items())],
+            "random": self._rng.bit_generator.state,
+        }
 
-    def restore(self, data: dict[str, Any]) -> None:
-        """Take over what `to_json` wrote."""
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """The examples: target values, modes and rows."""
+        return {"y": self.y, "labels": self.labels, "rows": self.rows}
+
+    def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+        """Take over what `to_json` and `to_arrays` wrote; without arrays there are no examples."""
         self.scale = replace(self.scale, sigma=float(data["sigma"]))
         self._next_id = int(data["next_id"])
-        modes: Iterable[Mode] = (Mode.from_json(self.target, m) for m in data["modes"])
-        self.clusters = {m.id: Cluster(m, fitted=max(1, m.examples)) for m in modes}
+        self._largest = float(data["largest"])
+        modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}
+        self.clusters = {int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]}
+        self._searches = {int(i): _Search(int(w), int(f)) for i, w, f in data["searches"]}
+        self._rng.bit_generator.state = data["random"]
+        if arrays:
+            self._y, self._label, self._rows = arrays["y"].copy(), arrays["labels"].copy(), arrays["rows"].copy()
+            self._size = len(self._y)
 
 
 def _simpler(mode: Mode, rival: Mode) -> bool:

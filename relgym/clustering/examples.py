@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
+from relgym.scene.objects import ObjectType
 
 __all__ = ["ExampleTable"]
 
@@ -26,6 +30,7 @@ class ExampleTable:
         self._x = np.zeros((256, 0))
         self._signature = np.zeros(256, dtype=np.int32)
         self._stratum = np.zeros(256, dtype=np.int32)
+        self._bodies = np.zeros((256, 0), dtype=np.int16)
         self._size = 0
 
     def __len__(self) -> int:
@@ -46,6 +51,11 @@ class ExampleTable:
         """Number of every row's relational state, shape ``(n,)``: rows with the same number look alike."""
         return self._stratum[: self._size]
 
+    @property
+    def bodies(self) -> NDArray[np.int16]:
+        """Number of the body in each slot of every row, shape ``(n, most slots)``; -1 for bodiless objects."""
+        return self._bodies[: self._size]
+
     def signature_id(self, signature: SlotSignature) -> int:
         """Number of the signature; a new one is taken up."""
         if (known := self._ids.get(signature)) is None:
@@ -54,18 +64,52 @@ class ExampleTable:
             missing = len(signature.columns) - self._x.shape[1]
             if missing > 0:
                 self._x = np.pad(self._x, ((0, 0), (0, missing)))
+            missing = len(signature.types) - self._bodies.shape[1]
+            if missing > 0:
+                self._bodies = np.pad(self._bodies, ((0, 0), (0, missing)), constant_values=-1)
         return known
 
-    def add(self, signature: SlotSignature, row: NDArray[np.float64], stratum: bytes) -> int:
-        """Append one row and return its number; amortised O(width)."""
+    def add(self, signature: SlotSignature, row: NDArray[np.float64], stratum: bytes, bodies: Sequence[int]) -> int:
+        """Append one row and return its number; amortised O(width).
+
+        Parameters
+        ----------
+        signature, row
+            Types of the slots, and the columns they give.
+        stratum
+            Key of the relational state.
+        bodies
+            Number of the body in each slot; -1 for a bodiless object.
+        """
         number = self.signature_id(signature)
         if self._size == len(self._x):
-            grow = ((0, len(self._x)), (0, 0))
+            grow = ((0, max(256, len(self._x))), (0, 0))
             self._x = np.pad(self._x, grow)
             self._signature = np.pad(self._signature, grow[0])
             self._stratum = np.pad(self._stratum, grow[0])
+            self._bodies = np.pad(self._bodies, grow)
         self._x[self._size, : len(row)] = row
         self._signature[self._size] = number
         self._stratum[self._size] = self._strata.setdefault(stratum, len(self._strata))
+        self._bodies[self._size, : len(bodies)] = bodies
         self._size += 1
         return self._size - 1
+
+    def to_json(self) -> dict[str, Any]:
+        """Signatures and relational states; the rows are in `to_arrays`."""
+        signatures = [[[t.name for t in s.types], [list(g) for g in s.given]] for s in self.signatures]
+        return {"signatures": signatures, "strata": [key.hex() for key in self._strata]}
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """The rows, their signatures and their strata."""
+        return {"x": self.x, "signature": self.signature_ids, "stratum": self.strata, "bodies": self.bodies}
+
+    def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]], types: dict[str, ObjectType]) -> None:
+        """Take over what `to_json` and `to_arrays` wrote."""
+        for names, given in data["signatures"]:
+            pairs = tuple((str(t), str(p)) for t, p in given)
+            self.signature_id(SlotSignature(tuple(types[name] for name in names), pairs))
+        self._strata = {bytes.fromhex(key): k for k, key in enumerate(data["strata"])}
+        self._x, self._size = arrays["x"].copy(), len(arrays["x"])
+        self._signature, self._stratum = arrays["signature"].copy(), arrays["stratum"].copy()
+        self._bodies = arrays["bodies"].copy()

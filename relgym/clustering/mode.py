@@ -23,6 +23,11 @@ class Role:
     type: str
     terms: tuple[tuple[str, float], ...]
 
+    @property
+    def kind(self) -> tuple[str, tuple[tuple[str, float], ...]]:
+        """What makes roles interchangeable: type and weights, the latter to nine digits."""
+        return self.type, tuple((prop, float(f"{weight:.9g}")) for prop, weight in self.terms)
+
 
 @dataclass(frozen=True, slots=True)
 class Mode:

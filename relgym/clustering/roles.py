@@ -85,10 +85,16 @@ class Binding:
         best = errors.min(axis=1)
         return best, np.argmax(errors <= best[:, None] + slack, axis=1)
 
+    @property
+    def slots(self) -> NDArray[np.intp]:
+        """Slot of every role but the target's under each assignment, shape ``(a, roles)``."""
+        table = np.tile(np.array(self.forced, dtype=np.intp), (len(self.assignments), 1))
+        table[:, table[0] < 0] = self.assignments
+        return table
+
     def roles_of(self, assignment: int) -> tuple[int, ...]:
         """Slot of every role but the target's under the given row of `assignments`."""
-        rest = iter(int(s) for s in self.assignments[assignment])
-        return tuple(slot if slot >= 0 else next(rest) for slot in self.forced)
+        return tuple(int(s) for s in self.slots[assignment])
 
 
 def bind(mode: Mode, signature: SlotSignature) -> Binding | None:
@@ -125,7 +131,7 @@ def _assignments(roles: list[Role], by_type: dict[str, tuple[int, ...]]) -> Iter
         if k == len(roles):
             yield done
             return
-        least = done[-1] if k and roles[k] == roles[k - 1] else -1
+        least = done[-1] if k and roles[k].kind == roles[k - 1].kind else -1
         for slot in by_type[roles[k].type]:
             if slot > least and slot not in done:
                 yield from extend((*done, slot))

@@ -2,41 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.examples import NOISE as UNKNOWN
+from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.mode_classifier import ModeClassifier
-from relgym.classification.role_classifier import RoleClassifier
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
-from relgym.clustering.em import Cluster
+from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
-from relgym.model.perception import Situation
-from relgym.model.prediction import OUTCOMES, Outcome
-from relgym.scene.objects import Target
+from relgym.model.casting import Casting
+from relgym.model.perception import Percept, Situation
+from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.scene.objects import SceneLayout, Target
 
-__all__ = ["PropertyModel", "Verdict"]
+__all__ = ["PropertyModel", "Verdict", "bodies_of"]
+
+_PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE = (
+    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE)
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a property model says of n examples: arrays of shape ``(n,)``.
-
-    `objects` lists, for each example, the object index of every role of its mode.
-    """
+    """What a property model says of n examples: arrays of shape ``(n,)``; NaN where it predicts nothing."""
 
     values: NDArray[np.float64]
     modes: NDArray[np.int64]
     outcomes: NDArray[np.int8]
     margins: NDArray[np.float64]
-    objects: list[tuple[int, ...]]
 
 
 class PropertyModel:
@@ -50,6 +50,11 @@ class PropertyModel:
         Names of what its classifiers are shown.
     config
         Free parameters.
+
+    Attributes
+    ----------
+    clusterer, classifier, casting
+        The learners of modes, of their preconditions and of who plays their roles.
     """
 
     def __init__(self, target: Target, vocabulary: Vocabulary, config: ModelConfig) -> None:
@@ -57,18 +62,26 @@ class PropertyModel:
         self.config = config
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
         self.classifier = ModeClassifier(vocabulary, config.classification)
-        self.roles: dict[int, RoleClassifier] = {}
+        self.casting = Casting(vocabulary, config.classification)
         self._bindings: dict[tuple[int, int], Binding | None] = {}
-        self._functions: dict[int, Mode] = {}
 
     @property
     def modes(self) -> tuple[Mode, ...]:
         """All modes but noise, by id."""
         return self.clusterer.modes
 
+    def mode(self, number: int) -> Mode:
+        """The mode of that id."""
+        return self.clusterer.clusters[number].mode
+
     # ------------------------------------------------------------------ learning
     def learn_one(
-        self, table: ExampleTable, row: int, y: float, situation: Situation, example: Example
+        self,
+        table: ExampleTable,
+        row: int,
+        y: float,
+        situation: Situation,
+        example: Example,
     ) -> ClusterReport:
         """Take up one example: cluster it, then let the classifiers see where it belongs.
 
@@ -79,19 +92,248 @@ class PropertyModel:
         y
             The property's next value.
         situation, example
-            How the target object is situated; `situation` of a single scene.
+            How the target object is situated, in a single scene.
         """
         report = self.clusterer.learn_one(table, row, y)
         if report.changed:
-            self._relabel(table)
+            self._follow(table)
         number = len(self.clusterer.y) - 1
-        fits = np.array([i in report.fits for i in self._ids], dtype=bool)
-        values = self._values(situation, table.x[row : row + 1])[0]
-        roles = self._played(table, number, report.mode, situation)
+        seen = replace(example, row=number)
+        fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
+        values = np.array(self._values_one(situation.signature, table.x[row].tolist()))
         assigned = UNKNOWN if report.mode == NOISE else report.mode
-        seen = Example(
-            example.table, example.unary, example.close, example.pair, example.own, example.target, example.key, number
-        )
-        self.classifier.observe(seen, assigned, fits, values, roles=roles)
-        self._observe_roles(report.mode, seen, roles)
+        played = self._played(table, np.array([number]), report.mode)[0].tolist()
+        self.classifier.observe(seen, assigned, fits, values, roles=played)
+        if played:
+            self.casting.observe(self.mode(report.mode), seen, played)
         return report
+
+    def refresh(self, budget: int | None) -> int:
+        """Re-learn stale classifiers within a budget of work (None: all); returns the work spent."""
+        left = float("inf") if budget is None else budget
+        spent = self.classifier.refresh(left)
+        return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
+
+    def _follow(self, table: ExampleTable) -> None:
+        """The set of modes changed: what the classifiers remember is labelled anew."""
+        self._bindings.clear()
+        numbers = self.classifier.exemplars.rows.astype(np.intp)
+        ids, fits = self.clusterer.fits(table, numbers)
+        values = self._values_many(table, self.clusterer.rows[numbers], ids)
+        labels = self.clusterer.labels[numbers].astype(np.int64)
+        self.classifier.sync(ids, np.where(labels == NOISE, UNKNOWN, labels), fits, values)
+        self.casting.sync({m.id: m for m in self.modes})
+        self._recast(table)
+
+    def _recast(self, table: ExampleTable) -> None:
+        """Write down anew who plays the roles of the remembered examples' modes."""
+        numbers = self.classifier.exemplars.rows.astype(np.intp)
+        labels = self.clusterer.labels[numbers]
+        roles = self.classifier.exemplars.columns["roles"]
+        roles[:] = -1
+        for mode in np.unique(labels[labels != NOISE]):
+            part = np.flatnonzero(labels == mode)
+            played = self._played(table, numbers[part], int(mode))
+            width = min(played.shape[1], roles.shape[1])
+            roles[part, :width] = played[:, :width]
+
+    def _values_many(
+        self, table: ExampleTable, rows: NDArray[np.integer], ids: tuple[int, ...]
+    ) -> NDArray[np.float64]:
+        """What the modes predict on rows of the table, shape ``(n, len(ids))``; NaN where roles are open."""
+        values = np.full((len(rows), len(ids)), np.nan)
+        signatures = table.signature_ids[rows]
+        for number in np.unique(signatures):
+            part = np.flatnonzero(signatures == number)
+            values[part] = self._values(table.signatures[int(number)], table.x[rows[part]], ids)
+        return values
+
+    # ------------------------------------------------------------------ functions and roles
+    def _binding(self, signature: SlotSignature, mode: int) -> Binding | None:
+        key = (id(signature), mode)
+        if key not in self._bindings:
+            self._bindings[key] = bind(self.mode(mode), signature)
+        return self._bindings[key]
+
+    def _values(
+        self, signature: SlotSignature, x: NDArray[np.float64], ids: tuple[int, ...]
+    ) -> NDArray[np.float64]:
+        values = np.full((len(x), len(ids)), np.nan)
+        for k, mode in enumerate(ids):
+            binding = self._binding(signature, mode)
+            if binding is not None and not binding.open:
+                values[:, k] = binding.values(x)[:, 0]
+        return values
+
+    def _values_one(self, signature: SlotSignature, x: list[float]) -> list[float]:
+        values = []
+        for mode in self.classifier.modes:
+            binding = self._binding(signature, mode)
+            known = binding is not None and not binding.open
+            values.append(binding.value(x) if known and binding is not None else float("nan"))
+        return values
+
+    def _played(self, table: ExampleTable, numbers: NDArray[np.intp], mode: int) -> NDArray[np.int64]:
+        """Bodies in a mode's embodied roles, by the assignment that fits each example best (§3.2.4).
+
+        Shape ``(n, roles)``.
+        """
+        if mode == NOISE or not self.casting.embodied(self.mode(mode)):
+            return np.zeros((len(numbers), 0), dtype=np.int64)
+        roles = self.mode(mode).open_roles
+        chosen = [k for k, role in enumerate(roles) if role in self.casting.embodied(self.mode(mode))]
+        rows, y = self.clusterer.rows[numbers], self.clusterer.y[numbers]
+        cluster, scale = self.clusterer.clusters[mode], self.clusterer.scale
+        _, assignment = cluster.errors(table, rows, y, scale)
+        played = np.full((len(numbers), len(chosen)), -1, dtype=np.int64)
+        signatures = table.signature_ids[rows]
+        for number in np.unique(signatures):
+            binding = cluster.binding(table, int(number))
+            if binding is None:
+                continue
+            part = np.flatnonzero(signatures == number)
+            slots = binding.slots[assignment[part]][:, chosen]
+            played[part] = np.take_along_axis(table.bodies[rows[part]], slots, axis=1)
+        return played
+
+    def _cast(
+        self, mode: int, binding: Binding, example: Example, order: NDArray[np.intp], layout: SceneLayout
+    ) -> tuple[int, ...] | None:
+        """Slots of the objects in a mode's open roles, by the role classifiers; None if they can't be filled."""
+        bodies = bodies_of(order, layout)
+        place = {body: slot for slot, body in enumerate(bodies) if body >= 0}
+        played = self.casting.assign(self.mode(mode), example, tuple(place))
+        if played is None:
+            return None
+        cast = iter(played)
+        slots = []
+        for role, forced in zip(self.mode(mode).open_roles, binding.forced, strict=True):
+            embodied = role.type in self.casting.vocabulary.unary
+            body = next(cast) if embodied else -1
+            if forced < 0:
+                if not embodied:
+                    return None
+                slots.append(place[body])
+        return tuple(slots)
+
+    # ------------------------------------------------------------------ prediction (§3.6)
+    def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
+        """Predict for one object of a single scene; the caller fills in names.
+
+        Parameters
+        ----------
+        percept
+            The scene.
+        index
+            The object.
+        following
+            Next values predicted so far, shape ``(width,)``.
+        """
+        situation = percept.situation(index)
+        nothing = Prediction("", "", float("nan"), Outcome.NO_MODE)
+        if not self.classifier.modes:
+            return nothing
+        x = percept.rows(index, following[None])[0].tolist()
+        example = replace(situation.examples[0], key=situation.keys[0])
+        ranking = self.classifier.rank(example, self._values_one(situation.signature, x))
+        if self.config.abstain and not ranking.familiar and len(self.classifier.modes) > 1:
+            return replace(nothing, outcome=Outcome.OUTSIDE)
+        layout = percept.layout
+        for place, mode in enumerate(ranking.modes):
+            binding = self._binding(situation.signature, mode)
+            if binding is None:
+                continue
+            slots: tuple[int, ...] | None = ()
+            if binding.open:
+                slots = self._cast(mode, binding, example, situation.order[0], layout)
+            if slots is None:
+                continue
+            rest = iter(slots)
+            played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
+            roles = tuple(layout.names[situation.order[0, s]] for s in played)
+            margin = ranking.margin if place == 0 else 0.0
+            return Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
+        return replace(nothing, outcome=Outcome.NO_ROLES)
+
+    def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
+        """Predict for one object of n scenes; bit for bit what `predict_one` gives.
+
+        Parameters
+        ----------
+        percept
+            The scenes.
+        index
+            The object.
+        following
+            Next values predicted so far, shape ``(n, width)``.
+        """
+        n = len(percept)
+        verdict = Verdict(
+            np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.full(n, _NO_MODE, dtype=np.int8), np.zeros(n)
+        )
+        modes = self.classifier.modes
+        if not modes:
+            return verdict
+        situation = percept.situation(index)
+        x = percept.rows(index, following)
+        ranking = self.classifier.rank_batch(situation.examples, self._values(situation.signature, x, modes))
+        verdict.outcomes[:] = _NO_ROLES
+        waiting = np.ones(n, dtype=bool)
+        if self.config.abstain and len(modes) > 1:
+            waiting = ranking.familiar.copy()
+            verdict.outcomes[~waiting] = _OUTSIDE
+        for place in range(len(modes)):
+            for mode in np.unique(ranking.modes[waiting, place]):
+                part = np.flatnonzero(waiting & (ranking.modes[:, place] == mode))
+                done, values = self._apply(int(mode), percept, situation, x, part)
+                verdict.values[done], verdict.modes[done] = values, mode
+                verdict.outcomes[done] = _PREDICTED
+                verdict.margins[done] = ranking.margin[done] if place == 0 else 0.0
+                waiting[done] = False
+            if not waiting.any():
+                break
+        return verdict
+
+    def _apply(
+        self, mode: int, percept: Percept, situation: Situation, x: NDArray[np.float64], part: NDArray[np.intp]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Those of the given examples whose roles can be filled, and the mode's values there."""
+        binding = self._binding(situation.signature, mode)
+        if binding is None:
+            return part[:0], np.empty(0)
+        if not binding.open:
+            return part, binding.values(x[part])[:, 0]
+        done, values = [], []
+        for i in part:
+            example = replace(situation.examples[int(i)], key=situation.keys[int(i)])
+            slots = self._cast(mode, binding, example, situation.order[i], percept.layout)
+            if slots is not None:
+                done.append(i)
+                values.append(binding.value(x[i].tolist(), slots))
+        return np.array(done, dtype=np.intp), np.array(values)
+
+    # ------------------------------------------------------------------ saving
+    def to_json(self, *, history: bool) -> dict[str, Any]:
+        """Plain data: modes, classifiers and roles; exemplars only with history."""
+        return {
+            "clusterer": self.clusterer.to_json(),
+            "classifier": self.classifier.to_dict(exemplars=history),
+            "casting": self.casting.to_json(),
+        }
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """What further learning needs beside `to_json`."""
+        return self.clusterer.to_arrays()
+
+    def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+        """Take over what `to_json` and `to_arrays` wrote."""
+        self.clusterer.restore(data["clusterer"], arrays)
+        self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
+        self.casting.restore(data["casting"])
+        self._bindings.clear()
+
+
+def bodies_of(order: NDArray[np.intp], layout: SceneLayout) -> tuple[int, ...]:
+    """Number of the body in each slot, -1 for bodiless objects."""
+    numbers = {index: body for body, index in enumerate(layout.bodies)}
+    return tuple(numbers.get(int(index), -1) for index in order)

@@ -16,7 +16,7 @@ from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, SchemaError
 from relgym.model.perception import Percept, Perception, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.property_model import PropertyModel, Verdict
+from relgym.model.property_model import PropertyModel, Verdict, bodies_of
 from relgym.model.storage import (
     read_model,
     schema_from_json,
@@ -189,12 +189,14 @@ class WorldModel:
         type_name = layout.types[index].name
         situation = percept.situation(index)
         table = self._tables[type_name]
-        row = table.add(situation.signature, percept.rows(index, following[None])[0], situation.keys[0])
+        x = percept.rows(index, following[None])[0]
+        bodies = bodies_of(situation.order[0], layout)
+        row = table.add(situation.signature, x, situation.keys[0], bodies)
         example = replace(situation.examples[0], key=situation.keys[0])
         for target in self.targets:
             if target.type == type_name:
                 y = float(following[layout.column(index, target.property)])
-                report = self._models[target].learn_one(table, row, y, situation, example, layout)
+                report = self._models[target].learn_one(table, row, y, situation, example)
                 parts[layout.names[index], target.property] = report
 
     def _refresh(self) -> int:
@@ -337,7 +339,7 @@ class WorldModel:
 
     def explain(self, scene: Scene) -> str:
         """Why this prediction: mode, function, roles, clause and rival of every target."""
-        from relgym.model.report import explain
+        from relgym.model.explain import explain
 
         return explain(self, scene)
 

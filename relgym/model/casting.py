@@ -1,0 +1,93 @@
+"""Who plays the roles of a target's modes: one role classifier per mode that has any (§3.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from relgym.classification.examples import Example, Vocabulary
+from relgym.classification.exemplars import Exemplars
+from relgym.classification.role_classifier import RoleClassifier, RoleKind
+from relgym.clustering.mode import Mode, Role
+from relgym.config import ClassificationConfig
+
+__all__ = ["Casting"]
+
+
+class Casting:
+    """The role classifiers of one target, by mode.
+
+    Only roles of types with a body are cast; a bodiless object is alone of its type and needs no description.
+
+    Parameters
+    ----------
+    vocabulary
+        Names of what examples hold.
+    config
+        Free parameters of classification.
+
+    Attributes
+    ----------
+    classifiers
+        Mode id → its role classifier.
+    """
+
+    def __init__(self, vocabulary: Vocabulary, config: ClassificationConfig) -> None:
+        self.vocabulary = vocabulary
+        self.config = config
+        self.classifiers: dict[int, RoleClassifier] = {}
+
+    def embodied(self, mode: Mode) -> tuple[Role, ...]:
+        """Roles of a mode that bodies play, the target's own left aside."""
+        return tuple(role for role in mode.open_roles if role.type in self.vocabulary.unary)
+
+    def sync(self, modes: Mapping[int, Mode]) -> None:
+        """Follow a change of the modes: drop classifiers of those that are gone or have other roles."""
+        for number in sorted(self.classifiers):
+            if number not in modes or self.classifiers[number].kinds != self._kinds(modes[number]):
+                del self.classifiers[number]
+
+    def observe(self, mode: Mode, example: Example, roles: Sequence[int]) -> bool:
+        """Take in who played the roles of one example; whether that contradicts the descriptions."""
+        kinds = self._kinds(mode)
+        known = self.classifiers.get(mode.id)
+        if known is None or known.kinds != kinds:
+            known = self.classifiers[mode.id] = RoleClassifier(self.vocabulary, kinds, self.config)
+        return known.observe(example, roles)
+
+    def refresh(self, exemplars: Exemplars, budget: float) -> int:
+        """Learn stale descriptions anew until the budget is spent; the work spent."""
+        spent = 0
+        for number in sorted(self.classifiers):
+            if spent >= budget:
+                break
+            spent += self.classifiers[number].refresh(exemplars, number)
+        return spent
+
+    def assign(self, mode: Mode, example: Example, order: Sequence[int]) -> tuple[int, ...] | None:
+        """Bodies that play the mode's embodied roles, or None if some can't be filled.
+
+        Parameters
+        ----------
+        mode
+            The mode.
+        example
+            The query.
+        order
+            All bodies, those to prefer where nothing else decides first.
+        """
+        known = self.classifiers.get(mode.id)
+        return None if known is None else known.assign(example, order)
+
+    def to_json(self) -> list[Any]:
+        """Plain data."""
+        return [[number, c.to_dict()] for number, c in sorted(self.classifiers.items())]
+
+    def restore(self, data: list[Any]) -> None:
+        """Take over what `to_json` wrote."""
+        self.classifiers = {
+            int(number): RoleClassifier.from_dict(plain, self.vocabulary, self.config) for number, plain in data
+        }
+
+    def _kinds(self, mode: Mode) -> tuple[RoleKind, ...]:
+        return tuple(RoleKind(*role.kind) for role in self.embodied(mode))

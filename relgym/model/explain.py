@@ -1,0 +1,180 @@
+"""Why a model predicts what it predicts: mode, function, roles, deciding clause and rival, as records and as text."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from relgym.classification.examples import Example, ExampleBatch
+from relgym.classification.ranking import Verdict
+from relgym.classification.views import View
+from relgym.clustering.mode import Mode
+from relgym.logic.csp import solutions, world_of
+from relgym.model.prediction import Prediction
+from relgym.model.text import amount
+from relgym.scene.objects import Scene, SceneLayout
+
+if TYPE_CHECKING:
+    from relgym.model.property_model import PropertyModel
+    from relgym.model.world_model import WorldModel
+
+__all__ = ["Explanation", "Reason", "explain", "explanations"]
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why one mode was preferred to another one.
+
+    Attributes
+    ----------
+    rival
+        Id of the mode that was not chosen.
+    rival_value
+        What it would have predicted; NaN if its roles are open.
+    clause
+        The clause that decided; empty if none held and that decided.
+    objects
+        (variable, object name) of an assignment that makes the clause true, the target first.
+    tests
+        Numeric tests that had the last word (§3.4.4); empty if there were none.
+    winner
+        Id of the mode that this pair preferred.
+    correct, incorrect
+        Training examples that went the same way, of the winner and of its rival.
+    """
+
+    rival: int
+    rival_value: float
+    clause: str
+    objects: tuple[tuple[str, str], ...]
+    tests: str
+    winner: int
+    correct: float
+    incorrect: float
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """How the prediction of one property of one object came about.
+
+    Attributes
+    ----------
+    prediction
+        The prediction.
+    now
+        The property's present value.
+    mode
+        The mode that predicted it; none if no mode did.
+    digits
+        Significant digits in the text.
+    reasons
+        The mode against every other one, in the order of the ranking; the first is its strongest rival.
+    """
+
+    prediction: Prediction
+    now: float
+    mode: Mode | None
+    digits: int
+    reasons: tuple[Reason, ...]
+
+    def __str__(self) -> str:
+        p, d = self.prediction, self.digits
+        name = f"{p.object}.{p.property}"
+        if self.mode is None:
+            return f"{name}: {self.now:.{d}g} kept for want of a prediction\n  outcome   {p.outcome.value}"
+        lines = [f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"]
+        examples = amount(self.mode.examples, "training example")
+        lines.append(f"  mode      {self.mode.id}: {self.mode.formula(d)}  ({examples})")
+        lines.append(f"  roles     {self._roles(self.mode)}")
+        lines += self._because() if self.reasons else ["  because   no other mode is known"]
+        return "\n".join(lines)
+
+    def _roles(self, mode: Mode) -> str:
+        own, *others = self.prediction.roles
+        labels = mode.role_labels()[1:]
+        return ", ".join([own, *(f"{label} = {name}" for label, name in zip(labels, others, strict=True))])
+
+    def _because(self) -> list[str]:
+        reason = self.reasons[0]
+        lines = [f"  because   {_clause_text(reason)}"]
+        if reason.tests:
+            lines.append(f"            and {reason.tests}")
+        lines.append(
+            f"            in training that was right {reason.correct:,.0f} and wrong {reason.incorrect:,.0f} times"
+        )
+        value = "open roles" if math.isnan(reason.rival_value) else f"{reason.rival_value:.{self.digits}g}"
+        margin = self.prediction.margin
+        lines.append(f"  rival     mode {reason.rival}, which says {value}; margin {margin:.3g}")
+        return lines
+
+
+def explain(model: WorldModel, scene: Scene, *, digits: int = 7) -> str:
+    """Why the model predicts what it predicts for a scene, as text.
+
+    Raises
+    ------
+    ObservationError
+        NaN or infinity somewhere, or another schema.
+    """
+    found = explanations(model, scene, digits=digits)
+    if not found:
+        return "Nothing is predicted: the model has no targets yet, or the scene none of their objects."
+    return "\n\n".join(map(str, found))
+
+
+def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[Explanation, ...]:
+    """One explanation per target of every object, in causal order; as `explain`, for programs."""
+    prediction = model.predict_one(scene)
+    parts = iter(prediction.parts)
+    found = []
+    for target in model.targets:
+        part = model.property_model(target.type, target.property)
+        for index in scene.layout.of_type(target.type):
+            one = next(parts)
+            now = float(scene.vector[scene.layout.column(index, target.property)])
+            mode = part.mode(one.mode) if one.ok else None
+            reasons = () if mode is None else _reasons(model, part, scene, index, prediction.scene, mode.id)
+            found.append(Explanation(one, now, mode, digits, reasons))
+    return tuple(found)
+
+
+def _reasons(
+    model: WorldModel, part: PropertyModel, scene: Scene, index: int, following: Scene, chosen: int
+) -> tuple[Reason, ...]:
+    example = model.situation(scene, index).examples[0]
+    values = part.mode_values(model.percept(scene), index, following.vector)
+    by_mode = dict(zip(part.classifier.modes, values, strict=True))
+    reasons = []
+    for verdict in part.classifier.explain(example, values):
+        # Where a mode ranked higher can't fill its roles, its own pair with the chosen mode says why it led.
+        rival = verdict.rival if verdict.winner == chosen else verdict.winner
+        objects = _objects(part, example, values, verdict, scene.layout)
+        clause = "" if verdict.clause is None else str(verdict.clause)
+        counts = (verdict.correct, verdict.incorrect)
+        reasons.append(Reason(rival, by_mode[rival], clause, objects, verdict.tree, verdict.winner, *counts))
+    return tuple(reasons)
+
+
+def _objects(
+    part: PropertyModel, example: Example, values: list[float], verdict: Verdict, layout: SceneLayout
+) -> tuple[tuple[str, str], ...]:
+    """Names of the objects for which the deciding clause holds."""
+    if verdict.clause is None:
+        return ()
+    pair = {verdict.winner, verdict.rival}
+    classifier = next(c for c in part.classifier.classifiers if {c.i, c.j} == pair)
+    view = View.of_batch(ExampleBatch.of(example), part.classifier.modes, np.array([values]))
+    world = world_of(view.facts(classifier.context, classifier.scope), 0)
+    bound = next(solutions(verdict.clause, world, (example.target,)), ())
+    bodies = layout.bodies or (layout.index(layout.names[0]),)
+    return tuple((chr(ord("A") + k), layout.names[bodies[each]]) for k, each in enumerate(bound))
+
+
+def _clause_text(reason: Reason) -> str:
+    if not reason.clause:
+        return f"no clause holds that would speak for mode {reason.rival}"
+    where = ", ".join(f"{variable} = {name}" for variable, name in reason.objects)
+    return f"{reason.clause}, with {where}" if where else reason.clause

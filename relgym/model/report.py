@@ -1,0 +1,266 @@
+"""A world model as records and as text: tables 3.1-3.2 and 4.2-4.5, and the roles of Figure 3.8."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from relgym.classification.binary import BinaryClassifier
+from relgym.model.text import Cell, amount, indented, table, wrapped
+
+if TYPE_CHECKING:
+    from relgym.model.property_model import PropertyModel
+    from relgym.model.world_model import WorldModel
+
+__all__ = [
+    "ClauseRow",
+    "ModeRow",
+    "ModelReport",
+    "PairTable",
+    "RoleRow",
+    "TargetReport",
+    "describe",
+    "report",
+]
+
+_CLAUSE_WIDTH = 62
+"""Widest column of clauses, in characters; longer clauses continue on the next line."""
+
+_OTHERWISE = "otherwise"
+
+
+@dataclass(frozen=True, slots=True)
+class ModeRow:
+    """One row of Table 4.2.
+
+    Attributes
+    ----------
+    mode
+        Its id, by which predictions and clauses (``F3``) name it.
+    examples
+        Training examples that it explains and that were assigned to it.
+    function
+        Such as ``vx' = -0.9 vx``.
+    """
+
+    mode: int
+    examples: int
+    function: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClauseRow:
+    """One row of Table 4.3.
+
+    Attributes
+    ----------
+    clause
+        The clause; ``otherwise`` for the examples that no clause covers (the thesis' row "Negative").
+    correct, incorrect
+        Training examples that were decided here, rightly and wrongly.
+    tests
+        Leaves of the decision tree behind the clause (§3.4.4), one line each; empty if there is none.
+    """
+
+    clause: str
+    correct: float
+    incorrect: float
+    tests: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PairTable:
+    """One section of Table 4.3: how two modes are told apart.
+
+    Attributes
+    ----------
+    mode
+        The mode that the clauses speak for.
+    rival
+        The mode that holds otherwise.
+    rows
+        Clauses in the order in which they are tried.
+    """
+
+    mode: int
+    rival: int
+    rows: tuple[ClauseRow, ...]
+
+    @property
+    def performance(self) -> float:
+        """Share of the training examples that the pair gets right, "train perf."; 1 without any."""
+        right, wrong = (sum(n) for n in zip(*((r.correct, r.incorrect) for r in self.rows), strict=True))
+        return right / (right + wrong) if right + wrong > 0 else 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class RoleRow:
+    """One box of Figure 3.8.
+
+    Attributes
+    ----------
+    mode
+        Whose function reads the role.
+    roles
+        What the function calls the objects; several where they are interchangeable.
+    rule
+        What must hold of such an object B, A being the target.
+    """
+
+    mode: int
+    roles: tuple[str, ...]
+    rule: str
+
+
+@dataclass(frozen=True, slots=True)
+class TargetReport:
+    """All that is known of one target.
+
+    Attributes
+    ----------
+    target
+        Such as ``ball.vx``.
+    type
+        The target objects' type, clauses' variable A.
+    noise
+        Training examples that no mode explains.
+    modes, pairs, roles
+        The tables' rows; roles that any object of the type can play, for want of a choice, included.
+    """
+
+    target: str
+    type: str
+    noise: int
+    modes: tuple[ModeRow, ...]
+    pairs: tuple[PairTable, ...]
+    roles: tuple[RoleRow, ...]
+
+    @property
+    def examples(self) -> int:
+        """Number of training examples, noise included."""
+        return self.noise + sum(mode.examples for mode in self.modes)
+
+    def __str__(self) -> str:
+        if not self.modes:
+            return f"{self.target}: no mode learned yet, {amount(self.examples, 'example')}"
+        head = f"{self.target}: {amount(len(self.modes), 'mode')}, {amount(self.examples, 'example')}"
+        parts = [head, indented(_mode_table(self))]
+        if self.pairs:
+            parts.append(indented(_clause_table(self.pairs)))
+        if self.roles:
+            parts.append(indented(_role_table(self.roles)))
+        return "\n\n".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class ModelReport:
+    """A whole model as tables; its text is what `describe` returns."""
+
+    transitions: int
+    targets: tuple[TargetReport, ...]
+
+    def __str__(self) -> str:
+        if not self.targets:
+            return f"No targets yet: nothing changed in {amount(self.transitions, 'transition')}."
+        head = f"Learned from {amount(self.transitions, 'transition')}."
+        parts = [head, *(f"{'─' * 80}\n{target}" for target in self.targets)]
+        legend = _legend(self.targets)
+        return "\n\n".join([*parts, f"{'─' * 80}\n{legend}"] if legend else parts)
+
+
+def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
+    """Modes, clauses and roles of every target as records, for programs.
+
+    Parameters
+    ----------
+    model
+        The model; unchanged.
+    digits
+        Significant digits of coefficients.
+    """
+    parts = [model.property_model(target.type, target.property) for target in model.targets]
+    return ModelReport(model.seen, tuple(_target_report(part, digits) for part in parts))
+
+
+def describe(model: WorldModel, *, digits: int = 7) -> str:
+    """Modes, functions, clauses and roles of every target as text, for people."""
+    return str(report(model, digits=digits))
+
+
+def _target_report(part: PropertyModel, digits: int) -> TargetReport:
+    modes = tuple(ModeRow(m.id, m.examples, m.formula(digits)) for m in part.modes)
+    pairs = tuple(_pair_table(c) for c in part.classifier.classifiers)
+    return TargetReport(
+        str(part.target), part.target.type, part.clusterer.noise_examples, modes, pairs, _role_rows(part)
+    )
+
+
+def _pair_table(classifier: BinaryClassifier) -> PairTable:
+    trees = (*classifier.clause_trees, classifier.fall_through_tree)
+    rows = [
+        ClauseRow(name, right, wrong, () if tree is None else tree.rules())
+        for (name, right, wrong, _), tree in zip(classifier.describe(), trees, strict=True)
+    ]
+    rows[-1] = ClauseRow(_OTHERWISE, rows[-1].correct, rows[-1].incorrect, rows[-1].tests)
+    # §3.4.5: a negated definition's clauses describe mode j.
+    rival = classifier.i if classifier.positive == classifier.j else classifier.j
+    return PairTable(classifier.positive, rival, tuple(rows))
+
+
+def _role_rows(part: PropertyModel) -> tuple[RoleRow, ...]:
+    rows = []
+    for mode in part.modes:
+        labels = mode.role_labels()[1:]
+        for description in part.descriptions(mode.id):
+            kind = (description.kind.type, description.kind.weights)
+            alike = [
+                label
+                for label, role in zip(labels, mode.open_roles, strict=True)
+                if (role.type, role.terms) == kind
+            ]
+            rule = "any" if description.definition is None else str(description.definition)
+            rows.append(RoleRow(mode.id, tuple(alike), rule))
+    return tuple(rows)
+
+
+# ------------------------------------------------------------------ text
+def _mode_table(target: TargetReport) -> str:
+    share = 100.0 * target.noise / target.examples if target.examples else 0.0
+    rows: list[list[Cell]] = [[0, target.noise, f"noise: no mode explains these {share:.2g} %"]]
+    rows += [[m.mode, m.examples, m.function] for m in target.modes]
+    return table(["mode", "examples", "function"], rows)
+
+
+def _clause_table(pairs: tuple[PairTable, ...]) -> str:
+    """All pairs' clauses under one heading, so that the columns of all pairs line up."""
+    rows: list[list[Cell] | str] = []
+    for pair in pairs:
+        rows.append(f"mode {pair.mode}, not {pair.rival}  (training accuracy {pair.performance:.4f})")
+        for row in pair.rows:
+            first, *rest = wrapped(row.clause, _CLAUSE_WIDTH, " ∧ ")
+            rows.append([f"  {first}", round(row.correct), round(row.incorrect), "yes" if row.tests else "no"])
+            rows += [f"    {line}" for line in rest]
+            rows += [f"      {test}" for test in row.tests]
+    return table(["clauses", "correct", "incorrect", "tree"], rows)
+
+
+def _role_table(roles: tuple[RoleRow, ...]) -> str:
+    rows: list[list[Cell]] = [[r.mode, ", ".join(r.roles), r.rule] for r in roles]
+    return table(["mode", "role", "played by an object B such that"], rows)
+
+
+def _legend(targets: tuple[TargetReport, ...]) -> str:
+    """What the notation means, as far as it occurs."""
+    pairs = [pair for target in targets for pair in target.pairs]
+    text = " ".join(row.clause + " ".join(row.tests) for pair in pairs for row in pair.rows)
+    lines = []
+    if pairs:
+        lines += ["'mode i, not j': the first clause that holds speaks for mode i; otherwise mode j is meant."]
+        lines += ["A is the object whose property is predicted; other letters: there is such an object."]
+    if "*" in text:
+        lines.append("* is any object: ¬touching(A, *) says that A touches nothing.")
+    if "F" in text:
+        lines.append("F1 is what mode 1 would predict, F1 - F2 by how much two modes differ.")
+    if any(row.tests for pair in pairs for row in pair.rows):
+        lines.append("tree: numeric tests behind a clause, 'tests -> whether it speaks for i (examples of i : j)'.")
+    return "\n".join(lines)
