@@ -169,6 +169,18 @@ class Clause:
         """Return the clause with its literal number `index` replaced."""
         return Clause((*self.literals[:index], literal, *self.literals[index + 1 :]), self.arity)
 
+    def connected(self) -> Clause:
+        """Return the clause ordered for reading: a literal comes after one that shares a variable with it."""
+        waiting, ordered = list(self.literals), list[Literal]()
+        bound = set(range(self.arity))
+        while waiting:
+            ready = [each for each in waiting if not each.variables or bound & set(each.variables)]
+            ready = [each for each in ready if not each.negated or bound >= set(each.variables)] or waiting
+            ordered.append(ready[0])
+            bound |= set(ready[0].variables)
+            waiting.remove(ready[0])
+        return Clause.of(ordered, self.arity)
+
     def __iter__(self) -> Iterator[Literal]:
         return iter(self.literals)
 

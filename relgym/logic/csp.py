@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
+from relgym.logic.batch import decide, matches
 from relgym.logic.clause import ANY, Clause, Definition, Literal
-from relgym.logic.facts import Bool, Facts, Float, Int, compare
+from relgym.logic.facts import Bool, Facts, Float, compare
 
 __all__ = ["World", "decide", "holds", "matches", "satisfiable", "solutions", "world_of"]
-
-_CELLS = 1 << 22
-"""Upper bound of a boolean tensor's size in `matches`; larger batches are cut into pieces."""
 
 _Masks: TypeAlias = Any
 """Nested lists of bit masks, one level per fixed argument: Python has no type for "nested n times"."""
@@ -182,94 +180,3 @@ def _bits(mask: int) -> Iterator[int]:
         lowest = mask & -mask
         yield lowest.bit_length() - 1
         mask ^= lowest
-
-
-def matches(clause: Clause, facts: Facts, tuples: Int) -> Bool:
-    """Return for each tuple whether the clause holds.
-
-    Parameters
-    ----------
-    clause
-        What must hold.
-    facts
-        The worlds.
-    tuples
-        Integers of shape (n, 1 + arity): a world, then the objects of the target's arguments.
-
-    Returns
-    -------
-    Booleans of shape (n,).
-
-    Raises
-    ------
-    ConfigError
-        If the tuples have another width, or the facts don't know a literal's relation.
-
-    Notes
-    -----
-    Existential variables that share no literal are independent and never multiply. Cost: n x K^v per literal,
-    v the size of the largest set of connected existential variables.
-    """
-    if tuples.ndim != 2 or tuples.shape[1] != clause.arity + 1:
-        raise ConfigError(f"Expected tuples of shape (n, {clause.arity + 1}), got {tuples.shape}.")
-    truths = [(literal, facts.truth(literal)) for literal in clause.literals]
-    parts = _components(clause)
-    widest = max((len(variables) for variables, _ in parts), default=0)
-    step = max(1, _CELLS // max(facts.objects, 1) ** widest)
-    result = np.ones(len(tuples), dtype=np.bool_)
-    for start in range(0, len(tuples), step):
-        piece = tuples[start : start + step]
-        for variables, members in parts:
-            tests = [truths[index] for index in members]
-            result[start : start + step] &= _some_binding(variables, tests, facts, piece)
-    return result
-
-
-def decide(definition: Definition, facts: Facts, tuples: Int) -> Bool:
-    """Return for each tuple whether the definition is true of it, its polarity taken into account."""
-    result = np.zeros(len(tuples), dtype=np.bool_)
-    for clause in definition.clauses:
-        result |= matches(clause, facts, tuples)
-    return result ^ definition.negated
-
-
-def _components(clause: Clause) -> list[tuple[list[int], list[int]]]:
-    """Group literals connected by existential variables: pairs of (variables, indices of literals)."""
-    parts: list[tuple[set[int], list[int]]] = []
-    for index, literal in enumerate(clause.literals):
-        variables = {variable for variable in literal.variables if variable >= clause.arity}
-        members = [index]
-        for part in [part for part in parts if part[0] & variables]:
-            parts.remove(part)
-            variables |= part[0]
-            members += part[1]
-        parts.append((variables, members))
-    return [(sorted(variables), sorted(members)) for variables, members in parts]
-
-
-def _some_binding(
-    variables: Sequence[int], tests: Sequence[tuple[Literal, Bool]], facts: Facts, tuples: Int
-) -> Bool:
-    """Return for each tuple whether some objects for `variables` satisfy all `tests`."""
-    rank = 1 + len(variables)
-    exists = facts.exists[tuples[:, 0]]
-    binding = np.ones((len(tuples), *[facts.objects] * len(variables)), dtype=np.bool_)
-    for axis in range(1, rank):
-        binding &= exists.reshape(_shape(len(tuples), facts.objects, axis, rank))
-    columns = {
-        variable: tuples[:, 1 + variable].reshape(-1, *[1] * (rank - 1))
-        for variable in range(tuples.shape[1] - 1)
-    }
-    for axis, variable in enumerate(variables, start=1):
-        columns[variable] = np.arange(facts.objects).reshape(_shape(1, facts.objects, axis, rank))
-    worlds = tuples[:, 0].reshape(-1, *[1] * (rank - 1))
-    for literal, truth in tests:
-        index = [columns[variable] for variable in literal.variables]
-        if literal.relation in facts.relative:
-            index[0] = np.zeros_like(worlds)  # the target's own axis has length 1
-        binding &= truth[(worlds, *index)] != literal.negated
-    return np.asarray(binding.reshape(len(tuples), -1).any(axis=1))
-
-
-def _shape(length: int, objects: int, axis: int, rank: int) -> list[int]:
-    return [length, *[objects if place == axis else 1 for place in range(1, rank)]]

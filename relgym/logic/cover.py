@@ -1,0 +1,150 @@
+"""FOIL's outer loop: add clauses until the positive tuples are covered (Algorithm 2, lines 5 and 13-15)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from relgym.logic.candidates import Growing, Score, Weights
+from relgym.logic.clause import Clause, Coverage, Definition
+from relgym.logic.description import DescriptionLength
+from relgym.logic.facts import Bool, Float
+from relgym.logic.pruning import Problem, center_thresholds, prune
+from relgym.logic.search import Harvest, grow
+from relgym.logic.settings import FoilConfig
+from relgym.logic.tables import Tables
+
+__all__ = ["Cover"]
+
+_ATTEMPTS: Final = 8
+"""How many clauses of one search are pruned and judged before the search counts as fruitless."""
+
+_EPS: Final = 1e-7
+"""Weights below this are rounding."""
+
+_SHORT: Final = 3
+"""A definition without errors and of no more literals isn't tried to be told more briefly."""
+
+
+class Cover:
+    """One learning problem of one polarity.
+
+    Parameters
+    ----------
+    tables
+        The tuples. Both polarities share them.
+    weights
+        Shape (n,): their weights.
+    config
+        Search and acceptance.
+    swapped
+        Whether the tables' *second* class is the one to be described.
+    """
+
+    def __init__(self, tables: Tables, weights: Float, config: FoilConfig, swapped: bool = False) -> None:
+        positive = (np.arange(tables.size) < tables.split) != swapped
+        self._tables = tables
+        self._config = config
+        self._swapped = swapped
+        self._problem = Problem(tables.facts, tables.tuples, weights, positive)
+        self._length = DescriptionLength(len(tables.facts.relations) + len(tables.functions), tables.size)
+        self._harvests: dict[bytes, Harvest] = {}
+        self._work = 0
+
+    def swapped(self) -> Cover:
+        """Return the same problem with the classes exchanged (§3.4.5)."""
+        return Cover(self._tables, self._problem.weights, self._config, not self._swapped)
+
+    def solve(self) -> Definition:
+        """Learn the definition, see `foil.learn`."""
+        everything = self._problem.count(np.ones(self._tables.size, dtype=np.bool_))
+        if everything.positives <= 0 or everything.negatives <= 0:
+            # a single class: the clause without literals covers it
+            return self._definition([Clause((), self._tables.arity)] if everything.positives > 0 else [])
+        best = self._definition(self._clauses(pure=True))
+        simple = best.errors <= _EPS and sum(map(len, best.clauses)) <= _SHORT
+        if self._config.mdl and not simple:
+            other = self._definition(self._clauses(pure=False))
+            best = other if other.bits < best.bits - _EPS else best
+        return replace(best, work=self._work)
+
+    def _clauses(self, pure: bool) -> list[Clause]:
+        alive = np.ones(self._tables.size, dtype=np.bool_)
+        clauses: list[Clause] = []
+        while len(clauses) < self._config.max_clauses and self._problem.count(alive).positives > _EPS:
+            clause = next(self._acceptable(alive, pure), None)
+            if clause is None:
+                break
+            clauses.append(clause)
+            alive &= ~self._problem.matches(clause)
+        return self._without_redundant(clauses)
+
+    def _acceptable(self, alive: Bool, pure: bool) -> Iterator[Clause]:
+        """Yield, best first, the clauses that tell enough about the tuples left."""
+        problem = self._problem
+        rest = replace(problem, weights=np.where(alive | ~problem.positive, problem.weights, 0.0))
+        for growing in self._ranked(alive, pure)[:_ATTEMPTS]:
+            clause = prune(Clause.of(growing.literals, self._tables.arity), rest)
+            clause = center_thresholds(clause.connected(), rest)
+            covered = problem.count(alive & problem.matches(clause))
+            if self._accepts(clause, covered, problem.count(alive)):
+                yield clause
+
+    def _ranked(self, alive: Bool, pure: bool) -> list[Growing]:
+        key = alive.tobytes()
+        if key not in self._harvests:
+            weights = np.where(alive, self._problem.weights, 0.0)
+            split = self._tables.split
+            classes = Weights(weights[:split], weights[split:], self._swapped)
+            harvest = self._harvests[key] = grow(self._tables, classes, self._config)
+            self._work += harvest.work
+        whole = self._problem.count(alive)
+        information = Score(whole.positives, whole.negatives).information
+        keys = {}
+        for place, growing in enumerate(self._harvests[key].clauses):
+            left = Coverage(float(growing.left.positives), float(growing.left.negatives))
+            bits = self._length.literals(growing.literals, self._tables.arity)
+            clean = pure and left.negatives <= _EPS
+            value = left.positives * information - bits if clean else self._saving(bits, left, whole)
+            keys[place] = (not clean, -round(value, 7), round(bits, 7), place)
+        return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
+
+    def _saving(self, bits: float, covered: Coverage, whole: Coverage) -> float:
+        """Bits saved by a clause: labels listed before, less the clause and its exceptions listed after."""
+        rest = Coverage(whole.positives - covered.positives, whole.negatives - covered.negatives)
+        exceptions = self._length.exceptions
+        after = exceptions(covered.total, covered.negatives) + exceptions(rest.total, rest.positives)
+        return exceptions(whole.total, whole.positives) - after - bits
+
+    def _accepts(self, clause: Clause, covered: Coverage, whole: Coverage) -> bool:
+        if covered.positives <= covered.negatives + _EPS or covered.precision < self._config.min_precision:
+            return False
+        return not self._config.mdl or self._saving(self._length.clause(clause), covered, whole) > 0
+
+    def _without_redundant(self, clauses: list[Clause]) -> list[Clause]:
+        """Drop clauses, later ones first, without which there are no more errors than with them."""
+        matched = [self._problem.matches(clause) for clause in clauses]
+        for place in reversed(range(len(clauses))):
+            others = matched[:place] + matched[place + 1 :]
+            if others and self._errors(others) <= self._errors(matched) + _EPS:
+                matched, clauses = others, clauses[:place] + clauses[place + 1 :]
+        return clauses
+
+    def _errors(self, matched: Sequence[Bool]) -> float:
+        covered = np.logical_or.reduce(matched)
+        return self._problem.count(covered).negatives + self._problem.count(~covered).positives
+
+    def _definition(self, clauses: Sequence[Clause]) -> Definition:
+        left = np.ones(self._tables.size, dtype=np.bool_)
+        coverage = []
+        for clause in clauses:
+            matched = self._problem.matches(clause)
+            coverage.append(self._problem.count(left & matched))
+            left &= ~matched
+        covered, uncovered = self._problem.count(~left), self._problem.count(left)
+        bits = self._length.definition(clauses, covered, uncovered)
+        arity = self._tables.arity
+        return Definition(tuple(clauses), arity, False, tuple(coverage), uncovered, bits, self._work)

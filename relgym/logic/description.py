@@ -1,0 +1,64 @@
+"""Description length: what a clause costs to write down, and what its exceptions cost.
+
+A definition is worth having if telling it and then the tuples that it gets wrong takes fewer bits than
+telling all labels one by one. Rare positives are dear to list, so they earn a clause early; a flipped label
+is cheaper to list than any clause that would single it out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from relgym.logic.clause import Clause, Coverage, Literal
+
+__all__ = ["DescriptionLength"]
+
+_LOG2 = math.log(2.0)
+
+
+class DescriptionLength:
+    """Bits of clauses and exceptions, for one vocabulary.
+
+    Parameters
+    ----------
+    names
+        How many relations and numeric functions a literal chooses from.
+    values
+        How many thresholds a numeric literal chooses from.
+    """
+
+    def __init__(self, names: int, values: int) -> None:
+        self._name = math.log2(max(names, 1))
+        self._threshold = math.log2(max(values, 1) + 1.0)
+
+    def clause(self, clause: Clause) -> float:
+        """Return a clause's bits, see `literals`."""
+        return self.literals(clause.literals, clause.arity)
+
+    def literals(self, literals: Sequence[Literal], arity: int) -> float:
+        """Return a conjunction's bits: names, signs, arguments and thresholds; the order is free."""
+        bits, variables = 0.0, arity
+        for literal in literals:
+            # one argument is any variable so far, a new one or *
+            bits += 1.0 + self._name + len(literal.args) * math.log2(variables + 1.0)
+            bits += self._threshold if literal.op is not None else 0.0
+            variables = max(variables, max(literal.variables, default=-1) + 1)
+        return bits - math.lgamma(len(literals) + 1.0) / _LOG2
+
+    def clauses(self, clauses: Iterable[Clause]) -> float:
+        """Return the bits of several clauses, whose order is free too."""
+        costs = [self.clause(clause) for clause in clauses]
+        return max(sum(costs) - math.lgamma(len(costs) + 1.0) / _LOG2, 0.0)
+
+    @staticmethod
+    def exceptions(total: float, wrong: float) -> float:
+        """Return the bits to say which `wrong` of `total` tuples are exceptions; weights may be fractions."""
+        wrong = min(wrong, total)
+        subsets = math.lgamma(total + 1.0) - math.lgamma(wrong + 1.0) - math.lgamma(total - wrong + 1.0)
+        return math.log2(total + 1.0) + max(subsets, 0.0) / _LOG2
+
+    def definition(self, clauses: Iterable[Clause], covered: Coverage, uncovered: Coverage) -> float:
+        """Return the bits of a definition together with its false positives and false negatives."""
+        wrong = self.exceptions(covered.total, covered.negatives)
+        return self.clauses(clauses) + wrong + self.exceptions(uncovered.total, uncovered.positives)

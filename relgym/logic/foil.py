@@ -1,0 +1,132 @@
+"""FOIL: learn clauses that cover the positive tuples and not the negative ones (thesis §3.4.1).
+
+References
+----------
+J. R. Quinlan, "Learning logical definitions from relations", Machine Learning 5 (1990).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from relgym.errors import ConfigError
+from relgym.logic.clause import Definition
+from relgym.logic.cover import Cover
+from relgym.logic.facts import Facts, Float, Int
+from relgym.logic.settings import FoilConfig
+from relgym.logic.tables import Tables
+
+__all__ = ["FoilConfig", "learn", "learn_both"]
+
+
+def learn(
+    facts: Facts,
+    positives: Int,
+    negatives: Int,
+    *,
+    pos_weights: ArrayLike | None = None,
+    neg_weights: ArrayLike | None = None,
+    config: FoilConfig | None = None,
+) -> Definition:
+    """Learn a definition of the positive tuples (Algorithm 2).
+
+    Parameters
+    ----------
+    facts
+        Relations and numeric functions.
+    positives, negatives
+        Integers of shape (p, 1 + arity) and (q, 1 + arity): a world, then the objects of the target's
+        arguments.
+    pos_weights, neg_weights
+        How often each tuple counts, > 0; default 1. Group identical worlds and give them weights: cost goes
+        by tuples.
+    config
+        Search and acceptance.
+
+    Returns
+    -------
+    Without negatives the clause ``true``, without positives no clause at all. It never errs more often, by
+    weight, than "everything is negative".
+
+    Raises
+    ------
+    ConfigError
+        If shapes don't fit, a world or object doesn't exist, or a weight isn't positive and finite.
+
+    Notes
+    -----
+    Deviations from the thesis: clauses are found by beam search and FOIL's gain, not by negatives alone; all
+    tuples judge a clause, not a random quarter; a rejected clause doesn't end learning; description length
+    decides what is noise. Two strategies are tried, clauses without any negatives first and clauses that
+    compress best; the definition that takes fewer bits is kept.
+    Deterministic. Cost: see `search.grow`, per clause.
+    """
+    return _cover(facts, positives, negatives, pos_weights, neg_weights, config).solve()
+
+
+def learn_both(
+    facts: Facts,
+    positives: Int,
+    negatives: Int,
+    *,
+    pos_weights: ArrayLike | None = None,
+    neg_weights: ArrayLike | None = None,
+    config: FoilConfig | None = None,
+) -> Definition:
+    """Learn both polarities and keep the better one (§3.4.5).
+
+    Parameters, errors and cost are those of `learn`, the latter twice.
+
+    Returns
+    -------
+    Of the definition of the positives and that of the negatives (then `Definition.negated`) the one with
+    fewer errors; on ties the one with fewer bits, then the former. `Definition.work` is that of both.
+    """
+    task = _cover(facts, positives, negatives, pos_weights, neg_weights, config)
+    given = task.solve()
+    if given.errors <= 0 and sum(map(len, given.clauses)) <= 1:
+        return given  # one literal without errors: the other side can't be told more simply
+    other = task.swapped().solve()
+    work = given.work + other.work
+    if (round(other.errors, 7), round(other.bits, 7)) < (round(given.errors, 7), round(given.bits, 7)):
+        return replace(other, negated=True, work=work)
+    return replace(given, work=work)
+
+
+def _cover(
+    facts: Facts,
+    positives: Int,
+    negatives: Int,
+    pos_weights: ArrayLike | None,
+    neg_weights: ArrayLike | None,
+    config: FoilConfig | None,
+) -> Cover:
+    """Check the arguments and lay them out."""
+    config = config or FoilConfig()
+    positives, negatives = _checked(facts, positives, "positives"), _checked(facts, negatives, "negatives")
+    if positives.shape[1] != negatives.shape[1]:
+        raise ConfigError(f"Expected tuples of one width, got {positives.shape} and {negatives.shape}.")
+    weights = np.concatenate([_weights(pos_weights, positives), _weights(neg_weights, negatives)])
+    tables = Tables(facts, positives, negatives, config.max_new_variables, config.numeric)
+    return Cover(tables, weights, config)
+
+
+def _checked(facts: Facts, tuples: Int, what: str) -> Int:
+    tuples = np.asarray(tuples)
+    if tuples.ndim != 2 or tuples.shape[1] < 1 or not np.issubdtype(tuples.dtype, np.integer):
+        kind = f"{tuples.dtype} of shape {tuples.shape}"
+        raise ConfigError(f"{what}: expected integers of shape (n, 1 + arity), got {kind}.")
+    limits = np.array([facts.worlds, *[facts.objects] * (tuples.shape[1] - 1)])
+    if ((tuples < 0) | (tuples >= limits)).any():
+        raise ConfigError(f"{what}: expected a world and objects below {limits.tolist()}, got others.")
+    return tuples.astype(np.int64)
+
+
+def _weights(weights: ArrayLike | None, tuples: Int) -> Float:
+    found = np.ones(len(tuples)) if weights is None else np.asarray(weights, dtype=np.float64)
+    if found.shape != (len(tuples),) or not (np.isfinite(found) & (found > 0)).all():
+        raise ConfigError(f"Expected {len(tuples)} positive, finite weights, one per tuple; got {found!r}.")
+    return found

@@ -1,0 +1,144 @@
+"""FOIL's inner loop: grow a clause literal by literal, with alternatives (Algorithm 2, lines 6-12)."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.logic.candidates import Block, Counts, Growing, Score, Weights, blocks, extend
+from relgym.logic.settings import FoilConfig
+from relgym.logic.tables import Tables
+
+__all__ = ["Harvest", "grow"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Harvest:
+    """The clauses that a search came across, and what it cost in tuples x candidate literals."""
+
+    clauses: tuple[Growing, ...]
+    work: int
+
+
+def grow(tables: Tables, weights: Weights, config: FoilConfig) -> Harvest:
+    """Search for clauses that cover positives and few negatives.
+
+    Parameters
+    ----------
+    tables
+        The learning problem.
+    weights
+        What is left of it. Some positive must have a positive weight.
+    config
+        Beam, lookahead and limits.
+
+    Returns
+    -------
+    Every clause that was ever in the beam, shorter ones first; the caller chooses.
+
+    Notes
+    -----
+    Deviation from the thesis: Algorithm 2 is greedy. A beam, and beside it the clauses whose last literal
+    *connects* (it introduces a variable), find conjunctions whose first literal gains nothing by itself.
+    Among equal scores relations precede numeric literals, positive literals negated ones, fewer new variables
+    more, more positives fewer; then the alphabet decides.
+    Cost: depth x (beam + lookahead) x tuples x candidates x K^v.
+    """
+    everything = np.ones(tables.size, dtype=np.bool_)
+    positives, negatives = weights.total(everything)
+    score = Score(float(positives), float(negatives), config.choice)
+    beam = [Growing((), everything, Counts.of(everything, weights))]
+    pool: dict[bytes, Growing] = {}
+    work = 0
+    for depth in range(1, config.max_literals + 1):
+        found = _Candidates(tables, beam, weights, score, config.max_new_variables)
+        work += tables.size * found.size
+        lookahead = config.lookahead if depth < config.max_literals else 0
+        beam = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
+        beam = _promising(beam, pool.values())
+        if not beam:
+            break
+    return Harvest(tuple(pool.values()), work)
+
+
+def _new(children: Iterator[Growing], wanted: int, pool: dict[bytes, Growing]) -> list[Growing]:
+    """Take the first `wanted` clauses with other bindings than those in the pool, and add them to it."""
+    taken: list[Growing] = []
+    for child in itertools.islice(children, 4 * wanted):
+        if len(taken) == wanted:
+            break
+        key = child.bindings.tobytes()
+        if key not in pool:  # otherwise the same literals came in another order, or say the same
+            pool[key] = child
+            taken.append(child)
+    return taken
+
+
+def _promising(beam: Sequence[Growing], pool: Iterable[Growing]) -> list[Growing]:
+    """Leave out clauses that can't cover more positives without negatives than a clause already does."""
+    reached = max((float(each.left.positives) for each in pool if each.left.negatives <= 0), default=0.0)
+    return [each for each in beam if each.left.negatives > 0 and each.left.positives > reached]
+
+
+class _Candidates:
+    """All literals that may be added to any clause of the beam, as parallel arrays."""
+
+    def __init__(
+        self, tables: Tables, beam: Sequence[Growing], weights: Weights, score: Score, max_new: int
+    ) -> None:
+        self._tables = tables
+        self._blocks = [
+            (growing, block)
+            for growing in beam
+            for block in blocks(tables, growing, weights, score, max_new)
+            if block.templates
+        ]
+        self._ends = np.cumsum([len(block.templates) for _, block in self._blocks], dtype=np.int64)
+        self.size = int(self._ends[-1]) if self._blocks else 0
+        if self.size:
+            self._score = self._join(lambda _, block: score(block.counts))
+            self._positives = self._join(lambda _, block: np.round(block.counts.positives, 7))
+            self._negatives = self._join(lambda _, block: np.round(block.counts.negatives, 7))
+            self._introduced = self._join(lambda _, block: block.introduced)
+            self._useful = (self._positives > 0) & self._join(_changes)
+            names = self._join(lambda _, block: block.names)
+            negated = self._join(lambda _, block: np.full(len(block.templates), block.negated))
+            numeric = self._join(lambda _, block: np.full(len(block.templates), block.op is not None))
+            self._ties = (names, -self._positives, self._introduced, negated, numeric)
+
+    def _join(self, part: Callable[[Growing, Block], NDArray[Any]]) -> NDArray[Any]:
+        return np.concatenate([part(growing, block) for growing, block in self._blocks])
+
+    def best(self) -> Iterator[Growing]:
+        """Yield the clauses extended by one literal, best score first."""
+        return self._children(self._useful, (-self._score,)) if self.size else iter(())
+
+    def connecting(self) -> Iterator[Growing]:
+        """Yield the clauses extended by a literal with a new variable, those that lose least first."""
+        if not self.size:
+            return iter(())
+        return self._children(
+            self._useful & (self._introduced > 0), (-self._score, self._negatives, -self._positives)
+        )
+
+    def _children(self, mask: NDArray[np.bool_], keys: Sequence[NDArray[Any]]) -> Iterator[Growing]:
+        rows = np.flatnonzero(mask)
+        order = np.lexsort([key[rows] for key in (*self._ties, *keys)])
+        return (self._child(int(index)) for index in rows[order])
+
+    def _child(self, index: int) -> Growing:
+        place = int(np.searchsorted(self._ends, index, side="right"))
+        growing, block = self._blocks[place]
+        row = index - int(self._ends[place]) + len(block.templates)
+        return extend(self._tables, growing, block.literal(row), block.counts.take(row))
+
+
+def _changes(growing: Growing, block: Block) -> NDArray[np.bool_]:
+    """Which candidates introduce a variable or leave fewer bindings than there were."""
+    lost = growing.left.good + growing.left.bad - block.counts.good - block.counts.bad
+    return np.asarray((block.introduced > 0) | (lost > 1e-7))

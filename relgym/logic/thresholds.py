@@ -1,0 +1,103 @@
+"""Where a numeric literal may put its threshold.
+
+A cut between two values of the same class is never best (Fayyad and Irani 1992), so neighbouring values of
+one class form one *bin*. Counting then takes a histogram instead of a sort for every candidate clause.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.logic.facts import Float, Int
+
+__all__ = ["Bins", "bin_values", "simplest_between"]
+
+_MAX_BINS: Final = 128
+"""Finest histogram; where classes alternate more often, cuts are taken at every m-th boundary."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bins:
+    """Histogram bins of F functions.
+
+    Parameters
+    ----------
+    index
+        Shape (F, K, …, K, n): each value's bin; `count` where the value is undefined.
+    count
+        Number of bins B, that of the function that has most.
+    low, high
+        Shape (F, B): least and greatest value in each bin; NaN for bins that a function doesn't have.
+    """
+
+    index: NDArray[np.int32]
+    count: int
+    low: Float
+    high: Float
+
+    @property
+    def gaps(self) -> Float:
+        """Shape (F, B - 1): distance from one bin to the next, NaN behind a function's last bin."""
+        return self.low[:, 1:] - self.high[:, :-1]
+
+
+def bin_values(values: Float, split: int) -> Bins:
+    """Group each function's values so that every useful threshold lies between two groups.
+
+    Parameters
+    ----------
+    values
+        Shape (F, K, …, K, n); NaN where undefined.
+    split
+        The first `split` of the n tuples are positive.
+
+    Notes
+    -----
+    Cost: one sort per function.
+    """
+    positive = np.broadcast_to(np.arange(values.shape[-1]) < split, values.shape[1:]).ravel()
+    parts = [_bin_one(row.ravel(), positive) for row in values]
+    count = max(max((len(low) for _, low, _ in parts), default=0), 1)
+    low, high = np.full((len(parts), count), np.nan), np.full((len(parts), count), np.nan)
+    index = np.empty((len(parts), positive.size), dtype=np.int32)
+    for row, (bins, lows, highs) in enumerate(parts):
+        low[row, : len(lows)], high[row, : len(highs)] = lows, highs
+        index[row] = np.where(bins < 0, count, bins)
+    return Bins(index.reshape(values.shape), count, low, high)
+
+
+def _bin_one(values: Float, positive: NDArray[np.bool_]) -> tuple[Int, Float, Float]:
+    """Return each value's bin (-1 where undefined), and the bins' least and greatest values."""
+    bins = np.full(len(values), -1, dtype=np.int64)
+    defined = np.flatnonzero(np.isfinite(values))
+    if not defined.size:
+        return bins, np.empty(0), np.empty(0)
+    distinct, place = np.unique(values[defined], return_inverse=True)
+    good = np.bincount(place, positive[defined], len(distinct)) > 0
+    bad = np.bincount(place, ~positive[defined], len(distinct)) > 0
+    kind = good + 2 * bad  # 1: positives only, 2: negatives only, 3: both have this value
+    starts = np.flatnonzero((kind[1:] != kind[:-1]) | (kind[1:] == 3)) + 1
+    if len(starts) >= _MAX_BINS:
+        starts = starts[np.linspace(0, len(starts) - 1, _MAX_BINS - 1).round().astype(np.int64)]
+    bins[defined] = np.searchsorted(starts, place, side="right")
+    first = np.concatenate([[0], starts])
+    last = np.concatenate([starts, [len(distinct)]]) - 1
+    return bins, distinct[first], distinct[last]
+
+
+def simplest_between(low: float, high: float) -> float:
+    """Return the number with the fewest digits in the middle half of a gap, so that thresholds read well.
+
+    >>> simplest_between(-0.0231, 0.0107)
+    -0.006
+    """
+    middle, margin = low + (high - low) / 2, (high - low) / 4
+    for digits in range(1, 18):
+        number = float(f"{middle:.{digits}g}")
+        if low + margin <= number <= high - margin and low <= number < high:
+            return number
+    return middle if middle < high else low
