@@ -16,8 +16,8 @@ WORLD = ("x", "y", "z")
 class Axes:
     """The axes of a schema's geometry.
 
-    Canonical shapes are described along (first, up, depth): the depth axis is z when y is up and y otherwise, the
-    first axis is the remaining one. A planar schema leaves the depth axis out.
+    Canonical shapes are described along (first, up, depth): the depth axis is z when y is up and y
+    otherwise, the first axis is the remaining one. A planar schema leaves the depth axis out.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Relations between world-axis-aligned bounding boxes, as the original system defines them (its relations §2.2)."""
+"""Relations between world-axis-aligned bounding boxes, as the original system defines them."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ __all__ = ["ALIGN_MARGIN", "MIN_OVERLAP", "SIZE_RATIO", "box_relations"]
 _Pairs: TypeAlias = NDArray[np.bool_]
 
 ALIGN_MARGIN = 0.05
-"""Share of the smaller extent by which two boxes may overlap on an axis and still count as one beyond the other."""
+"""Share of the smaller extent by which one box may reach into another and still count as beyond it."""
 
 MIN_OVERLAP = 0.1
-"""Share of the upper body's extent that must lie over the lower one on every horizontal axis, for `on-top`."""
+"""Share of the upper body that must lie over the lower one on every horizontal axis, for `on-top`."""
 
 SIZE_RATIO = 1.1
 """How much longer the diagonal of the larger bounding box must be, for `smaller-than`."""

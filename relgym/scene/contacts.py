@@ -1,8 +1,8 @@
-"""What a pair of bodies' contact looks like: distance, normal and relative velocity, as numeric features of the pair.
+"""A pair of bodies' contact as numbers: distance, normal and relative velocity.
 
-A ball that bounces and a ball that leaves have the same spatial relations; the sign of the relative velocity along the
-contact normal tells them apart (§4.8's main failure). None of the features names an axis's or a surface's meaning: they
-hold for any pair of bodies. They are beyond the thesis (design §4).
+A ball that bounces and a ball that leaves have the same spatial relations; the sign of the relative
+velocity along the contact normal tells them apart (§4.8's main failure). None of the features names an
+axis's or a surface's meaning: they hold for any pair of bodies. They are beyond the thesis (design §4).
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ slip       tangential relative velocity: along t = (-n_y, n_x) in the plane, its
 APPROACH_EPS = 1e-9
 """Normal velocities up to this, in length per step, count as approaching.
 
-A sliding body's normal velocity is 0 up to rounding (1e-18), a leaving one's is of the order of the velocities
-(> 1e-4 in the envs here). Resting and sliding contacts must count, since they too decide the next velocity.
+A sliding body's normal velocity is 0 up to rounding (1e-18), a leaving one's is of the order of the
+velocities (> 1e-4 in the envs here). Resting and sliding contacts must count, since they too decide the
+next velocity.
 """
 
 

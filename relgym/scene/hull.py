@@ -20,13 +20,13 @@ _FLAT = 1e-9
 
 
 def check_polygon(corners: Sequence[tuple[float, float]]) -> bool:
-    """Check that corners, in order, form a strictly convex polygon; return whether they run counter-clockwise.
+    """Check that corners, in order, form a strictly convex polygon; return whether counter-clockwise.
 
     Raises
     ------
     ShapeError
-        Fewer than three corners, a corner on the line of its neighbours, an inward corner, or a curve that winds
-        round more than once; the message names the corner.
+        Fewer than three corners, a corner on the line of its neighbours, an inward corner, or a curve that
+        winds round more than once; the message names the corner.
     """
     points = _finite(corners, 2)
     if len(points) < 3:
@@ -88,7 +88,7 @@ def facets(corners: Sequence[tuple[float, float, float]]) -> Facets:
 
 
 def outline_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the corners of the convex hull of points in the plane, counter-clockwise (Andrew's monotone chain)."""
+    """Return the corners of points' convex hull, counter-clockwise (Andrew's monotone chain)."""
     ordered = sorted({(float(x), float(y)) for x, y in points})
     lower, upper = _chain(ordered), _chain(ordered[::-1])
     return np.array(lower[:-1] + upper[:-1])

@@ -1,9 +1,9 @@
 """What the world is made of: object types, the schema, scenes, transitions and learning targets (design §4).
 
-A *scene* is one state of the world: the objects that are present, each with its type's property vector. All of
-them share one flat float64 array, the thesis' state vector (§1.2.1): the concatenation of the property vectors in
-schema order. Which objects lie where in that array is the scene's `SceneLayout`, shared by all scenes with the same
-objects, so that a batch of scenes is simply a matrix.
+A *scene* is one state of the world: the objects that are present, each with its type's property vector. All
+of them share one flat float64 array, the thesis' state vector (§1.2.1): the concatenation of the property
+vectors in schema order. Which objects lie where in that array is the scene's `SceneLayout`, shared by all
+scenes with the same objects, so that a batch of scenes is simply a matrix.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Float2D: TypeAlias = NDArray[np.float64]
 """A float64 array with two axes; rows are examples or scenes."""
 
 POSE = ("px", "py", "pz", "rx", "ry", "rz", "sx", "sy", "sz")
-"""Position, rotation (Euler angles in radians, applied x, then y, then z) and full extents, of every body (§4.1)."""
+"""Position, rotation (radians, applied about x, then y, then z) and full extents of every body (§4.1)."""
 
 ACTION = "action"
 """Name of the bodiless object whose properties are the agent's output (§1.2.3)."""
@@ -95,8 +95,8 @@ class ObjectType:
         for name in named:
             if name not in self.properties:
                 raise SchemaError(
-                    f"type {self.name!r}: {name!r} is named as a pose, velocity or exogenous property but is not "
-                    f"among its properties {self.properties}; add it or correct the name"
+                    f"type {self.name!r}: {name!r} is named as a pose, velocity or exogenous property but "
+                    f"is not among its properties {self.properties}; add it or correct the name"
                 )
         for component in self.pose:
             if component not in POSE:
@@ -145,8 +145,8 @@ class Kinematics:
 class Target:
     """What one `PropertyModel` predicts: a property of all objects of a type.
 
-    `given` lists (type, property) pairs whose *next* values may enter the function: targets predicted before this
-    one. They appear as columns with a prime (``truck.vx'``).
+    `given` lists (type, property) pairs whose *next* values may enter the function: targets predicted
+    before this one. They appear as columns with a prime (``truck.vx'``).
     """
 
     type: str
@@ -166,8 +166,8 @@ class SceneSchema:
     types
         The object types.
     objects
-        ``(name, type name)`` of every object that may occur, in the order of the state vector. Names are Python
-        identifiers. They match objects across one step and mean nothing else.
+        ``(name, type name)`` of every object that may occur, in the order of the state vector. Names are
+        Python identifiers. They match objects across one step and mean nothing else.
     up
         The world axis that points up, ``"x"``, ``"y"`` or ``"z"``.
     planar
@@ -177,7 +177,8 @@ class SceneSchema:
     targets
         What to learn by default, in causal order; ``None``: every property that changes.
     action_scale
-        ``(property, low, high)``: the physical range that [-1, 1] of each component of the env's action stands for.
+        ``(property, low, high)``: the physical range that [-1, 1] of each component of the env's action
+        stands for.
     """
 
     types: tuple[ObjectType, ...]
@@ -320,7 +321,7 @@ class SceneLayout:
         return slice(start, start + len(self.types[index].properties))
 
     def column(self, index: int, prop: str) -> int:
-        """Column of one property of the `index`-th object; `QueryError` when its type has no such property."""
+        """Column of a property of the `index`-th object; `QueryError` when its type has no such property."""
         try:
             return self.offsets[index] + self.types[index].properties.index(prop)
         except ValueError:
@@ -356,7 +357,8 @@ class Scene:
     layout
         Which objects are present.
     vector
-        float64 array of shape ``(layout.width,)``, in units of the properties. It is made read-only, not copied.
+        float64 array of shape ``(layout.width,)``, in units of the properties. It is made read-only, not
+        copied.
     """
 
     __slots__ = ("layout", "schema", "vector")
@@ -426,11 +428,12 @@ def poses(layout: SceneLayout, vectors: Float2D) -> NDArray[np.float64]:
     """
     columns, constants = pose_columns(layout)
     padded = np.concatenate([vectors, np.broadcast_to(constants, (len(vectors), 2))], axis=1)
-    return padded[:, columns]
+    picked: NDArray[np.float64] = padded[:, columns]
+    return picked
 
 
 def pose_columns(layout: SceneLayout) -> tuple[NDArray[np.intp], Float1D]:
-    """Columns of `poses` in a state vector that the constants (0, 1) were appended to; cached on the layout."""
+    """Columns of `poses` in a state vector with the constants (0, 1) appended; cached on the layout."""
     cached = layout.__dict__.get("_pose_columns")
     if cached is None:
         columns = np.empty((len(layout.bodies), len(POSE)), dtype=np.intp)

@@ -4,10 +4,10 @@ Binary relations, for bodies A and B (`box_relations` has the exact definitions 
 
 =============== =============================================================================================
 intersect       signed distance <= `TOUCH_EPS`: touching or overlapping
-approaching     touching, at least one of the two types has a velocity, and they don't separate (`APPROACH_EPS`)
-on-top          A's bottom is about at B's top or above it, A lies over B by a tenth of its extent, and they touch
+approaching     touching, not separating (`APPROACH_EPS`), and at least one of the types has a velocity
+on-top          A's bottom is about at B's top, a tenth of A's extent lies over B, and they touch
 smaller-than    B's bounding box has a diagonal more than 1.1 times as long
-x-less-than     A is left of B, up to 5 % of the smaller extent; likewise y and z, except for a planar depth axis
+x-less-than     A is left of B, up to 5 % of the smaller extent; likewise y and z, but no depth axis
 x-greater-than  A is right of B
 x-aligned       neither
 =============== =============================================================================================
@@ -37,7 +37,7 @@ __all__ = ["TOUCH_EPS", "Extractor", "Relations", "unary"]
 TOUCH_EPS = 1e-9
 """Signed distance, in units of length, up to which two bodies touch (the original's threshold)."""
 
-_CHUNK = 60_000
+_CHUNK = 16_000
 """Pairs of bodies measured at a time: keeps intermediate arrays in the processor's cache."""
 
 _Table: TypeAlias = NDArray[np.bool_]
@@ -103,11 +103,11 @@ class Relations:
         return self.table[:, self.names.index(name)]
 
     def context(self, body: int) -> _Table:
-        """Return the target's close set: itself and what touches it, else the single nearest body; shape ``(n, K)``."""
+        """Return the target's close set (`close_set`), shape ``(n, K)``."""
         return close_set(self.relation("intersect")[:, body], self.distance[:, body], body)
 
     def normals(self, body: int) -> FloatArray:
-        """Return the unit normals that point from each other body to this one, shape ``(n, K, d)``; NaN for itself."""
+        """Return the unit normals from each other body to this one, shape ``(n, K, d)``; NaN for itself."""
         return self._normals(body).transpose(2, 1, 0)
 
     def contacts(self, body: int) -> FloatArray:
@@ -139,7 +139,7 @@ class Relations:
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """What extraction needs to know of a layout: columns of poses and velocities, index arrays, its geometry."""
+    """What extraction needs to know of a layout."""
 
     columns: NDArray[np.intp]  # (9, K) of a state vector with (0, 1) appended
     velocities: NDArray[np.intp]  # (d, K), likewise
@@ -151,8 +151,8 @@ class _Plan:
 class Extractor:
     """Extracts the relations of scenes; one per schema.
 
-    It holds nothing but caches: results depend on the scenes alone, and a scene's are the same bits alone and in any
-    batch. Pickles without its caches.
+    It holds nothing but caches: results depend on the scenes alone, and a scene's are the same bits alone
+    and in any batch. Pickles without its caches.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ class Extractor:
         names = tuple(layout.names[i] for i in layout.bodies)
         shapes = tuple(shape for i in layout.bodies if (shape := layout.types[i].shape) is not None)
         velocities = contacts.velocity_columns(layout, self.axes)
-        moves = (velocities >= 0).any(axis=0)
+        moves = np.asarray((velocities >= 0).any(axis=0))
         pairs = _Pairs.of(len(names))
         return _Plan(
             np.ascontiguousarray(pose_columns(layout)[0].T),

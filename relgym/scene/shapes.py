@@ -1,11 +1,13 @@
 """Canonical shapes of object types: one per type, of unit size; a scene's `sx sy sz` scale them.
 
-A shape lives in the schema, its size and pose in the observation (design §4). Canonical coordinates are scaled by the
-extents, rotated about the world axes by `rx`, then `ry`, then `rz` (R = Rz Ry Rx), and moved to the position. So
-`sx sy sz` are the full extents along x, y, z before the rotation, for every shape that fills the unit cube.
+A shape lives in the schema, its size and pose in the observation (design §4). Canonical coordinates are
+scaled by the extents, rotated about the world axes by `rx`, then `ry`, then `rz` (R = Rz Ry Rx), and moved
+to the position. So `sx sy sz` are the full extents along x, y, z before the rotation, for every shape that
+fills the unit cube.
 
-In a planar schema only the outline in the plane of the first axis and the up axis counts, turned about the depth axis;
-the other two rotations are ignored. The *first* axis is the one that is neither up nor depth: x unless x is up.
+In a planar schema only the outline in the plane of the first axis and the up axis counts, turned about the
+depth axis; the other two rotations are ignored. The *first* axis is the one that is neither up nor depth: x
+unless x is up.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ __all__ = ["Box", "ConvexPolyhedron", "Prism", "Shape", "Sphere", "Wedge", "outl
 class Sphere:
     """A ball of diameter 1 around the origin (a disc in a planar schema).
 
-    It stays round: a scene's diameter is `sx`, and extents that differ by more than 1e-9 of it raise `ShapeError`.
+    It stays round: a scene's diameter is `sx`, and extents that differ by more than 1e-9 of it raise
+    `ShapeError`.
     """
 
 
@@ -36,12 +39,12 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Wedge:
-    """Right-angled prism in the unit cube: vertical face at -1/2 on the first axis, slope descending to +1/2."""
+    """Right-angled prism in the unit cube: vertical face at -1/2 of the first axis, slope down to +1/2."""
 
 
 @dataclass(frozen=True, slots=True)
 class Prism:
-    """A convex polygon in the plane of the first axis and the up axis, extruded from -1/2 to 1/2 along the depth axis.
+    """A convex polygon in the plane of first and up axis, extruded from -1/2 to 1/2 along the depth axis.
 
     Parameters
     ----------
@@ -62,7 +65,8 @@ class ConvexPolyhedron:
     Parameters
     ----------
     vertices
-        Corners in any order. `ShapeError` where they lie in one plane or one isn't a corner of their convex hull.
+        Corners in any order. `ShapeError` where they lie in one plane or one isn't a corner of their convex
+        hull.
     """
 
     vertices: tuple[tuple[float, float, float], ...]

@@ -1,1 +1,1 @@
-"""Signed distances and contact normals between bodies: `arrays` (batched, exact) and `fcl` (scene by scene)."""
+"""Signed distances and contact normals of bodies: `arrays` (batched, exact), `fcl` (scene by scene)."""

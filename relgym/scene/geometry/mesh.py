@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 from relgym.scene.hull import facets
 from relgym.scene.shapes import ConvexPolyhedron, Shape, outline
 
-__all__ = ["Mesh", "mesh"]
+__all__ = ["Mesh", "mesh", "prism"]
 
 _PARALLEL = 1e-9
 """Sine below which two edges count as parallel."""
+
+_FLAT = 1e-9
+"""Distance from a face's plane, in extents, up to which a corner belongs to the face."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,17 +43,28 @@ class Mesh:
     edges: NDArray[np.intp]
     directions: NDArray[np.intp]
 
+    def rings(self) -> list[NDArray[np.intp]]:
+        """Corners of each face, counter-clockwise as seen from outside."""
+        rings = []
+        for normal, anchor in zip(self.normals, self.corners[self.anchors], strict=True):
+            unit = normal / np.linalg.norm(normal)
+            on = np.flatnonzero(np.abs((self.corners - anchor) @ unit) < _FLAT * np.ptp(self.corners))
+            spokes = self.corners[on] - self.corners[on].mean(axis=0)
+            across = np.cross(unit, spokes[0])
+            rings.append(on[np.argsort(np.arctan2(spokes @ across, spokes @ spokes[0]))])
+        return rings
+
 
 def mesh(shape: Shape, canonical: tuple[int, int, int]) -> Mesh:
     """Build the mesh of a canonical shape (not a sphere); `canonical` are the first, up and depth axes."""
     if isinstance(shape, ConvexPolyhedron):
         corners = np.array(shape.vertices, dtype=np.float64)
         return _mesh(corners, *facets(shape.vertices))
-    return _extruded(outline(shape), canonical)
+    return prism(outline(shape), canonical)
 
 
-def _extruded(polygon: NDArray[np.float64], canonical: tuple[int, int, int]) -> Mesh:
-    """Prism over a counter-clockwise polygon in (first, up), from -1/2 to 1/2 along the depth."""
+def prism(polygon: NDArray[np.float64], canonical: tuple[int, int, int]) -> Mesh:
+    """Build the prism over a counter-clockwise polygon in (first, up), from -1/2 to 1/2 along the depth."""
     count = len(polygon)
     near, far = np.arange(count), np.arange(count) + count
     corners = np.zeros((2 * count, 3))

@@ -1,8 +1,9 @@
 """Discs and convex polygons in the plane: signed distances and normals of many pairs in many scenes at once.
 
-All functions work on arrays of components first, pairs next and scenes last, and treat each pair of each scene on
-its own. `offset` is always the first body's position minus the second's, and the normal points from the second to the
-first. Every polygon is taken relative to its own position: a scene far from the origin loses no precision.
+All functions work on arrays of components first, pairs next and scenes last, and treat each pair of each
+scene on its own. `offset` is always the first body's position minus the second's, and the normal points
+from the second to the first. Every polygon is taken relative to its own position: a scene far from the
+origin loses no precision.
 """
 
 from __future__ import annotations
@@ -92,6 +93,11 @@ class Planar:
         return Polygons(turned[:, :count], turned[:, count:], lengths)
 
     @staticmethod
+    def corners(solids: Polygons) -> FloatArray:
+        """Corners relative to the positions, shape ``(2, V, B, n)``."""
+        return solids.starts
+
+    @staticmethod
     def bounds(solids: Polygons) -> tuple[FloatArray, FloatArray]:
         """Bounding boxes relative to the positions: lows and highs, each of shape ``(2, B, n)``."""
         return solids.starts.min(axis=1), solids.starts.max(axis=1)
@@ -102,15 +108,15 @@ class Planar:
     ) -> tuple[FloatArray, FloatArray]:
         """Signed distance and normal from discs to polygons; exact, inside and outside.
 
-        The edge whose line is farthest below the centre either holds the nearest point or ends in it, because the
-        direction to a nearest corner lies between the normals of the two edges that meet there.
+        The edge whose line is farthest below the centre either holds the nearest point or ends in it,
+        because the direction to a nearest corner lies between the normals of the two edges that meet there.
         """
         reach = offset[:, None] - solid.starts
         above = dot(solid.normals, reach)
         reach, normal, height, length = pick(above.argmax(axis=0), reach, solid.normals, above, solid.lengths)
         along = normal[0] * reach[1] - normal[1] * reach[0]
         foot = np.minimum(np.maximum(along, 0.0), length)
-        # Within an edge's strip the height is the distance; measured so, it has no square root's rounding near 0.
+        # Within an edge's strip the height is the distance; no square root rounds it near 0.
         corner = (foot != along) & (height > 0.0)
         spoke = np.stack([reach[0] + foot * normal[1], reach[1] - foot * normal[0]])
         far = norm(spoke)
@@ -119,7 +125,7 @@ class Planar:
 
     @staticmethod
     def solid_solid(offset: FloatArray, a: Polygons, b: Polygons) -> tuple[FloatArray, FloatArray]:
-        """Signed distance and normal between polygons: separating axes where they overlap, corners and edges apart."""
+        """Signed distance and normal of polygons: separating axes if they overlap, else nearest corners."""
         gaps = np.concatenate([_gaps(offset, a, b), _gaps(-offset, b, a)])
         normals = np.concatenate([b.normals, -a.normals], axis=1)
         depth, normal = pick(gaps.argmax(axis=0), gaps, normals)

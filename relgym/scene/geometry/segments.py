@@ -12,7 +12,7 @@ _PARALLEL = 1e-20
 """Squared sine below which two segments count as parallel: then either of them may supply the nearest end."""
 
 _SKEW = 1e-6
-"""Sine above which the cross product of two edges is a better normal than the line between their nearest points."""
+"""Sine above which two edges' cross product is a better normal than the line between nearest points."""
 
 
 def nearest_edges(

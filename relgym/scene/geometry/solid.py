@@ -1,7 +1,8 @@
 """Spheres and convex polyhedra in space: signed distances and normals of many pairs in many scenes at once.
 
-The conventions are those of `relgym.scene.geometry.planar`. Distances between polyhedra apart are found by trying all
-corner-face and edge-edge pairs: simple, exact, and cheap for the few corners that boxes and wedges have.
+The conventions are those of `relgym.scene.geometry.planar`. Distances between polyhedra apart are found by
+trying all corner-face and edge-edge pairs: simple, exact, and cheap for the few corners that boxes and
+wedges have.
 """
 
 from __future__ import annotations
@@ -94,6 +95,11 @@ class Solid:
         return Polyhedra(corners, normals, offsets, starts, edges, directions)
 
     @staticmethod
+    def corners(solids: Polyhedra) -> FloatArray:
+        """Corners relative to the positions, shape ``(3, V, B, n)``."""
+        return solids.corners
+
+    @staticmethod
     def bounds(solids: Polyhedra) -> tuple[FloatArray, FloatArray]:
         """Bounding boxes relative to the positions: lows and highs, each of shape ``(3, B, n)``."""
         return solids.corners.min(axis=1), solids.corners.max(axis=1)
@@ -116,7 +122,7 @@ class Solid:
 
     @staticmethod
     def solid_solid(offset: FloatArray, a: Polyhedra, b: Polyhedra) -> tuple[FloatArray, FloatArray]:
-        """Signed distance and normal between polyhedra: separating axes where they overlap, else nearest features."""
+        """Signed distance and normal of polyhedra: separating axes if they overlap, else nearest features."""
         distance, normal = _separation(offset, a, b)
         apart = distance > 0.0
         if apart.any():
@@ -126,7 +132,7 @@ class Solid:
 
 
 def _separation(offset: FloatArray, a: Polyhedra, b: Polyhedra) -> tuple[FloatArray, FloatArray]:
-    """Return the largest gap along all face normals and all crosses of edges, and its direction from b to a."""
+    """Return the largest gap along all face normals and crosses of edges, and its direction, b to a."""
     axes = cross(a.directions[:, :, None], b.directions[:, None])
     axes = axes.reshape(3, -1, *axes.shape[3:])
     sine = dot(axes, axes)
@@ -158,7 +164,7 @@ def _nearest(offset: FloatArray, a: Polyhedra, b: Polyhedra) -> tuple[FloatArray
     down, normal_b, over_b = _over_face(offset[:, None] + a.corners, b)
     up, normal_a, over_a = _over_face(b.corners - offset[:, None], a)
     skew, normal_e = nearest_edges(offset, a.starts, a.edges, b.starts, b.edges)
-    # No corner lies inside the other solid, but where they touch, rounding may make a height negative: take it.
+    # No corner lies inside the other solid, but rounding may make the height of a touching one negative.
     every = np.concatenate([np.where(over_b, down, np.inf), np.where(over_a, up, np.inf), skew])
     normals = np.concatenate([normal_b, -normal_a, normal_e], axis=1)
     distance, normal = pick(every.argmin(axis=0), every, normals)
@@ -166,9 +172,12 @@ def _nearest(offset: FloatArray, a: Polyhedra, b: Polyhedra) -> tuple[FloatArray
 
 
 def _over_face(points: FloatArray, solid: Polyhedra) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """For points ``(3, m, P, n)``: height over the farthest face below, its normal, and whether the foot lies on it.
+    """Return points' height over the farthest face below, its normal, and whether the foot lies on it.
 
-    A foot that is below every other face's plane lies on the face, which then is the polyhedron's nearest part.
+    Points have the shape ``(3, m, P, n)``.
+
+    A foot that is below every other face's plane lies on the face, which then is the polyhedron's nearest
+    part.
     """
     heights = dot(solid.normals[:, :, None], points[:, None]) - solid.offsets[:, None]
     shape = heights.shape[1:]
@@ -176,8 +185,7 @@ def _over_face(points: FloatArray, solid: Polyhedra) -> tuple[FloatArray, FloatA
     height, normal = pick(heights.argmax(axis=0), heights, normals)
     cosines = dot(solid.normals[:, :, None], normal[:, None])
     below = (heights - height * cosines <= 0.0) | (cosines > _SAME)
-    over: NDArray[np.bool_] = below.all(axis=0)
-    return height, normal, over.reshape(shape)
+    return height, normal, np.asarray(below.all(axis=0)).reshape(shape)
 
 
 def _padded(parts: Sequence[NDArray[np.float64]]) -> FloatArray:

@@ -1,8 +1,8 @@
-"""Arithmetic on arrays whose leading axis holds vector components, written out so that no bit depends on the batch.
+"""Arithmetic on arrays of vectors, components first, written out so that no bit depends on the batch.
 
-Geometry keeps components first and scenes last: ``(d, ..., n)``. Every sum is written out element by element. A BLAS
-product, `einsum` or `sum` may group terms differently for different batch sizes, and then a scene's result would
-depend on its company (design §4: single and batched prediction agree bit for bit).
+Geometry keeps components first and scenes last: ``(d, ..., n)``. Every sum is written out element by
+element. A BLAS product, `einsum` or `sum` may group terms differently for different batch sizes, and then a
+scene's result would depend on its company (design §4: single and batched prediction agree bit for bit).
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def rotate(matrix: Matrix, vectors: FloatArray) -> FloatArray:
 
 
 def pick(choice: NDArray[np.intp], *arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """From arrays ``([d,] m, P, n)``, take along the m axis the entry that `choice`, shape ``(P, n)``, names."""
+    """From arrays ``([d,] m, P, n)``, take the entry of the m axis that `choice`, ``(P, n)``, names."""
     size = choice.size
     flat = choice.ravel() * size + np.arange(size)
     out = []

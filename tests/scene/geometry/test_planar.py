@@ -28,7 +28,9 @@ def placed(x: float, y: float, sx: float = 1.0, sy: float = 1.0, turn: float = 0
     return [x, y, 7.0, 0.3, 0.4, turn, sx, sy, 9.0]
 
 
-def random_pose(rng: np.random.Generator, shapes: tuple[Shape, ...], n: int, spread: float = 1.2) -> np.ndarray:
+def random_pose(
+    rng: np.random.Generator, shapes: tuple[Shape, ...], n: int, spread: float = 1.2
+) -> np.ndarray:
     pose = np.zeros((n, len(shapes), 9))
     pose[..., :3] = rng.uniform(-spread, spread, (n, len(shapes), 3))
     pose[..., 3:6] = rng.uniform(-4.0, 4.0, (n, len(shapes), 3))
@@ -119,9 +121,7 @@ def test_tiny_gaps_keep_exact_distances_and_normals() -> None:
 
 
 def test_polyhedron_counts_as_its_outline() -> None:
-    octahedron = ConvexPolyhedron(
-        ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
-    )
+    octahedron = ConvexPolyhedron(((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)))
     rhombus = Prism(((1, 0), (0, 1), (-1, 0), (0, -1)))
     pose = random_pose(np.random.default_rng(2), (Sphere(), Box()), 50)
     for other in (Sphere(), Box()):

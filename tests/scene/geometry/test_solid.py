@@ -30,7 +30,9 @@ def measure(shapes: tuple[Shape, ...], pose: np.ndarray) -> Measured:
     return ArrayGeometry(SPACE, bodies).measure(np.ascontiguousarray(pose.transpose(2, 1, 0)))
 
 
-def random_pose(rng: np.random.Generator, shapes: tuple[Shape, ...], n: int, spread: float = 0.9) -> np.ndarray:
+def random_pose(
+    rng: np.random.Generator, shapes: tuple[Shape, ...], n: int, spread: float = 0.9
+) -> np.ndarray:
     pose = np.zeros((n, len(shapes), 9))
     pose[..., :3] = rng.uniform(-spread, spread, (n, len(shapes), 3))
     pose[..., 3:6] = rng.uniform(-4.0, 4.0, (n, len(shapes), 3))
@@ -42,7 +44,7 @@ def random_pose(rng: np.random.Generator, shapes: tuple[Shape, ...], n: int, spr
 
 
 def points(shape: Shape, pose: np.ndarray) -> np.ndarray:
-    """Corners of a placed shape, turned by scipy about the fixed axes x, then y, then z; a sphere's centre."""
+    """Corners of a placed shape, turned by scipy about the fixed axes x, y, z; a sphere's centre."""
     if isinstance(shape, Sphere):
         return pose[None, :3]
     local = mesh(shape, SPACE.canonical).corners * pose[6:]
@@ -59,7 +61,7 @@ def reach(shapes: tuple[Shape, ...], pose: np.ndarray) -> float:
 
 
 def least_norm(cloud: np.ndarray) -> float:
-    """Norm of the point of a convex hull that is nearest to the origin: min |V w|, w >= 0, sum w = 1 (a QP)."""
+    """Distance of a convex hull from the origin: min |V w|, w >= 0, sum w = 1 (a QP)."""
     weights, _ = nnls(np.vstack([cloud.T, np.ones(len(cloud))]), np.array([0.0, 0.0, 0.0, 1.0]))
     return float(np.linalg.norm(cloud.T @ weights) / weights.sum())
 
