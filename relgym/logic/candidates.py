@@ -159,9 +159,8 @@ class Block:
             threshold = simplest_between(float(self.gaps[0][row]), float(self.gaps[1][row]))
         return self.templates[row].literal(self.variables, self.fresh, self.negated, self.op, threshold)
 
-    @property
     def introduced(self) -> Int:
-        """How many new variables each candidate introduces, shape (C,)."""
+        """Return how many new variables each candidate introduces, shape (C,)."""
         if self.negated:
             return np.zeros(len(self.templates), dtype=np.int64)
         free = sum(variable >= self.fresh for variable in self.variables)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
@@ -58,25 +59,27 @@ class Cover:
         """Return the same problem with the classes exchanged (§3.4.5)."""
         return Cover(self._tables, self._problem.weights, self._config, not self._swapped)
 
-    def solve(self) -> Definition:
-        """Learn the definition, see `foil.learn`."""
+    def solve(self, limit: float = math.inf) -> Definition:
+        """Learn the definition, see `foil.learn`; its clauses take no more bits than `limit`."""
         everything = self._problem.count(np.ones(self._tables.size, dtype=np.bool_))
         if everything.positives <= 0 or everything.negatives <= 0:
             # a single class: the clause without literals covers it
             return self._definition([Clause((), self._tables.arity)] if everything.positives > 0 else [])
-        best = self._definition(self._clauses(pure=True))
-        simple = best.errors <= _EPS and sum(map(len, best.clauses)) <= _SHORT
-        if self._config.mdl and not simple:
-            other = self._definition(self._clauses(pure=False))
+        if not self._config.mdl:
+            return self._definition(self._clauses(True, math.inf))
+        best = self._definition(self._clauses(False, limit))
+        if best.errors > _EPS or sum(map(len, best.clauses)) > _SHORT:
+            other = self._definition(self._clauses(True, min(limit, best.bits)))
             best = other if other.bits < best.bits - _EPS else best
         return replace(best, work=self._work)
 
-    def _clauses(self, pure: bool) -> list[Clause]:
+    def _clauses(self, pure: bool, limit: float) -> list[Clause]:
+        """Add clauses, `pure` ones if any, until all is covered or they cost more bits than `limit`."""
         alive = np.ones(self._tables.size, dtype=np.bool_)
         clauses: list[Clause] = []
         while len(clauses) < self._config.max_clauses and self._problem.count(alive).positives > _EPS:
             clause = next(self._acceptable(alive, pure), None)
-            if clause is None:
+            if clause is None or self._length.clauses([*clauses, clause]) > limit:
                 break
             clauses.append(clause)
             alive &= ~self._problem.matches(clause)
@@ -99,7 +102,7 @@ class Cover:
             weights = np.where(alive, self._problem.weights, 0.0)
             split = self._tables.split
             classes = Weights(weights[:split], weights[split:], self._swapped)
-            harvest = self._harvests[key] = grow(self._tables, classes, self._config)
+            harvest = self._harvests[key] = grow(self._tables, classes, self._config, self._length)
             self._work += harvest.work
         whole = self._problem.count(alive)
         information = Score(whole.positives, whole.negatives).information
@@ -108,21 +111,14 @@ class Cover:
             left = Coverage(float(growing.left.positives), float(growing.left.negatives))
             bits = self._length.literals(growing.literals, self._tables.arity)
             clean = pure and left.negatives <= _EPS
-            value = left.positives * information - bits if clean else self._saving(bits, left, whole)
+            value = left.positives * information - bits if clean else self._length.saving(bits, left, whole)
             keys[place] = (not clean, -round(value, 7), round(bits, 7), place)
         return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
-
-    def _saving(self, bits: float, covered: Coverage, whole: Coverage) -> float:
-        """Bits saved by a clause: labels listed before, less the clause and its exceptions listed after."""
-        rest = Coverage(whole.positives - covered.positives, whole.negatives - covered.negatives)
-        exceptions = self._length.exceptions
-        after = exceptions(covered.total, covered.negatives) + exceptions(rest.total, rest.positives)
-        return exceptions(whole.total, whole.positives) - after - bits
 
     def _accepts(self, clause: Clause, covered: Coverage, whole: Coverage) -> bool:
         if covered.positives <= covered.negatives + _EPS or covered.precision < self._config.min_precision:
             return False
-        return not self._config.mdl or self._saving(self._length.clause(clause), covered, whole) > 0
+        return not self._config.mdl or self._length.saving(self._length.clause(clause), covered, whole) > 0
 
     def _without_redundant(self, clauses: list[Clause]) -> list[Clause]:
         """Drop clauses, later ones first, without which there are no more errors than with them."""

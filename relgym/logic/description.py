@@ -54,9 +54,17 @@ class DescriptionLength:
     @staticmethod
     def exceptions(total: float, wrong: float) -> float:
         """Return the bits to say which `wrong` of `total` tuples are exceptions; weights may be fractions."""
-        wrong = min(wrong, total)
+        total, wrong = max(total, 0.0), min(max(wrong, 0.0), total)
         subsets = math.lgamma(total + 1.0) - math.lgamma(wrong + 1.0) - math.lgamma(total - wrong + 1.0)
         return math.log2(total + 1.0) + max(subsets, 0.0) / _LOG2
+
+    def saving(self, bits: float, covered: Coverage, whole: Coverage) -> float:
+        """Return what a clause of so many bits saves: what is listed without it, less it and what is left."""
+        rest = Coverage(whole.positives - covered.positives, whole.negatives - covered.negatives)
+        after = self.exceptions(covered.total, covered.negatives) + self.exceptions(
+            rest.total, rest.positives
+        )
+        return self.exceptions(whole.total, whole.positives) - after - bits
 
     def definition(self, clauses: Iterable[Clause], covered: Coverage, uncovered: Coverage) -> float:
         """Return the bits of a definition together with its false positives and false negatives."""

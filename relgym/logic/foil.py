@@ -7,6 +7,7 @@ J. R. Quinlan, "Learning logical definitions from relations", Machine Learning 5
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -89,7 +90,8 @@ def learn_both(
     given = task.solve()
     if given.errors <= 0 and sum(map(len, given.clauses)) <= 1:
         return given  # one literal without errors: the other side can't be told more simply
-    other = task.swapped().solve()
+    # nothing beats a definition without errors but one of fewer bits
+    other = task.swapped().solve(given.bits if given.errors <= 0 else math.inf)
     work = given.work + other.work
     if (round(other.errors, 7), round(other.bits, 7)) < (round(given.errors, 7), round(given.bits, 7)):
         return replace(other, negated=True, work=work)

@@ -102,7 +102,10 @@ def _centered(clause: Clause, index: int, literal: Literal, problem: Problem) ->
 
 
 def _widest_cut(values: Float, inside: Bool, problem: Problem, below: bool) -> tuple[float, float] | None:
-    """Return the widest gap with no more negatives and no fewer positives inside than now."""
+    """Return the gap that divides best, and of equal ones the widest.
+
+    None of them may have more negatives or fewer positives inside than there are now.
+    """
     order = np.argsort(values if below else -values, kind="stable")
     order = order[np.isfinite(values[order]) & (problem.weights[order] > 0)]
     if order.size < 2:
@@ -116,6 +119,7 @@ def _widest_cut(values: Float, inside: Bool, problem: Problem, below: bool) -> t
     allowed = (gaps > 0) & (good >= now.positives - slack) & (bad <= now.negatives + slack)
     if not allowed.any():
         return None
-    place = int(np.argmax(np.where(allowed, gaps, -1.0)))
+    best = np.where(allowed, good - bad, -np.inf).max() - slack
+    place = int(np.argmax(np.where(allowed & (good - bad >= best), gaps, -1.0)))
     ends: Sequence[float] = sorted(values[order][place : place + 2].tolist())
     return ends[0], ends[1]

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.logic.candidates import Block, Counts, Growing, Score, Weights, blocks, extend
+from relgym.logic.clause import Coverage
+from relgym.logic.description import DescriptionLength
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 
@@ -25,7 +27,7 @@ class Harvest:
     work: int
 
 
-def grow(tables: Tables, weights: Weights, config: FoilConfig) -> Harvest:
+def grow(tables: Tables, weights: Weights, config: FoilConfig, length: DescriptionLength) -> Harvest:
     """Search for clauses that cover positives and few negatives.
 
     Parameters
@@ -36,6 +38,8 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig) -> Harvest:
         What is left of it. Some positive must have a positive weight.
     config
         Beam, lookahead and limits.
+    length
+        Bits of clauses; what can't pay for itself any more isn't grown.
 
     Returns
     -------
@@ -51,16 +55,19 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig) -> Harvest:
     """
     everything = np.ones(tables.size, dtype=np.bool_)
     positives, negatives = weights.total(everything)
-    score = Score(float(positives), float(negatives), config.choice)
+    whole = Coverage(float(positives), float(negatives))
+    score = Score(whole.positives, whole.negatives, config.choice)
     beam = [Growing((), everything, Counts.of(everything, weights))]
     pool: dict[bytes, Growing] = {}
     work = 0
     for depth in range(1, config.max_literals + 1):
-        found = _Candidates(tables, beam, weights, score, config.max_new_variables)
+        found = _Candidates(tables, beam, weights, score, config)
         work += tables.size * found.size
         lookahead = config.lookahead if depth < config.max_literals else 0
         beam = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
         beam = _promising(beam, pool.values())
+        if config.mdl:
+            beam = [each for each in beam if _may_pay(each, tables.arity, length, whole)]
         if not beam:
             break
     return Harvest(tuple(pool.values()), work)
@@ -85,31 +92,48 @@ def _promising(beam: Sequence[Growing], pool: Iterable[Growing]) -> list[Growing
     return [each for each in beam if each.left.negatives > 0 and each.left.positives > reached]
 
 
+def _may_pay(growing: Growing, arity: int, length: DescriptionLength, whole: Coverage) -> bool:
+    """Whether the clause would save bits if it lost its negatives for nothing."""
+    best = Coverage(float(growing.left.positives), 0.0)
+    return length.saving(length.literals(growing.literals, arity), best, whole) > 0
+
+
 class _Candidates:
     """All literals that may be added to any clause of the beam, as parallel arrays."""
 
     def __init__(
-        self, tables: Tables, beam: Sequence[Growing], weights: Weights, score: Score, max_new: int
+        self,
+        tables: Tables,
+        beam: Sequence[Growing],
+        weights: Weights,
+        score: Score,
+        config: FoilConfig,
     ) -> None:
         self._tables = tables
+        self._threshold_bits = float(np.log2(tables.size + 1.0)) if config.mdl else 0.0
         self._blocks = [
             (growing, block)
             for growing in beam
-            for block in blocks(tables, growing, weights, score, max_new)
+            for block in blocks(tables, growing, weights, score, config.max_new_variables)
             if block.templates
         ]
         self._ends = np.cumsum([len(block.templates) for _, block in self._blocks], dtype=np.int64)
         self.size = int(self._ends[-1]) if self._blocks else 0
         if self.size:
-            self._score = self._join(lambda _, block: score(block.counts))
+            self._score = self._join(lambda growing, block: score(block.counts) - self._price(growing, block))
             self._positives = self._join(lambda _, block: np.round(block.counts.positives, 7))
             self._negatives = self._join(lambda _, block: np.round(block.counts.negatives, 7))
-            self._introduced = self._join(lambda _, block: block.introduced)
+            self._introduced = self._join(lambda _, block: block.introduced())
             self._useful = (self._positives > 0) & self._join(_changes)
             names = self._join(lambda _, block: block.names)
             negated = self._join(lambda _, block: np.full(len(block.templates), block.negated))
             numeric = self._join(lambda _, block: np.full(len(block.templates), block.op is not None))
             self._ties = (names, -self._positives, self._introduced, negated, numeric)
+
+    def _price(self, growing: Growing, block: Block) -> float:
+        """Bits of the thresholds: a gain must pay for them, or numbers would stand in for plain relations."""
+        numeric = [each.op is not None for each in growing.literals]
+        return self._threshold_bits * (sum(numeric) + (block.op is not None))
 
     def _join(self, part: Callable[[Growing, Block], NDArray[Any]]) -> NDArray[Any]:
         return np.concatenate([part(growing, block) for growing, block in self._blocks])
@@ -119,11 +143,12 @@ class _Candidates:
         return self._children(self._useful, (-self._score,)) if self.size else iter(())
 
     def connecting(self) -> Iterator[Growing]:
-        """Yield the clauses extended by a literal with a new variable, those that lose least first."""
+        """Yield the clauses extended by a relation with a new variable, those that lose least first."""
         if not self.size:
             return iter(())
         return self._children(
-            self._useful & (self._introduced > 0), (-self._score, self._negatives, -self._positives)
+            self._useful & (self._introduced > 0) & ~self._ties[-1],
+            (-self._score, self._negatives, -self._positives),
         )
 
     def _children(self, mask: NDArray[np.bool_], keys: Sequence[NDArray[Any]]) -> Iterator[Growing]:
@@ -141,4 +166,4 @@ class _Candidates:
 def _changes(growing: Growing, block: Block) -> NDArray[np.bool_]:
     """Which candidates introduce a variable or leave fewer bindings than there were."""
     lost = growing.left.good + growing.left.bad - block.counts.good - block.counts.bad
-    return np.asarray((block.introduced > 0) | (lost > 1e-7))
+    return np.asarray((block.introduced() > 0) | (lost > 1e-7))

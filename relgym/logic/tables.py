@@ -30,7 +30,7 @@ _FIRST: Final = NEW - 1
 """Pattern code of the first existential variable; the second is one less, and so on."""
 
 
-@dataclass(frozen=True, slots=True, order=True)
+@dataclass(frozen=True, order=True)
 class Template:
     """A relation or function and a pattern for its arguments.
 
@@ -41,12 +41,12 @@ class Template:
     name: str
     slots: tuple[int, ...]
 
-    @property
+    @cached_property
     def existentials(self) -> int:
         """How many existing existential variables the pattern takes."""
         return sum(code < NEW for code in self.slots)
 
-    @property
+    @cached_property
     def fresh(self) -> int:
         """How many new variables the pattern introduces."""
         return sum(code == NEW for code in self.slots)
