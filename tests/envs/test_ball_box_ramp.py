@@ -169,7 +169,7 @@ def test_hand_worked_contacts_on_floor_ramp_and_corner() -> None:
 
 def test_a_state_of_six_balls_goes_on_in_a_fresh_env() -> None:
     # Contacts of several moving bodies leave hidden state in an engine with other settings (1e-4).
-    made = {"balls": 6, "objects": ("box", "ramp", "ramp"), "friction": 0.1}
+    made: dict[str, Any] = {"balls": 6, "objects": ("box", "ramp", "ramp"), "friction": 0.1}
     env, fresh = BallBoxRampEnv(**made), BallBoxRampEnv(**made)
     touched = 0
     for seed in range(3):

@@ -93,12 +93,12 @@ def test_observations_belong_to_the_caller(env_id: str) -> None:
 def test_vector_envs(env_id: str, mode: str, autoreset: AutoresetMode) -> None:
     made = gym.make_vec(env_id, 2, vectorization_mode=mode, vector_kwargs={"autoreset_mode": autoreset})
     single = scene_env(env_id)
-    observation, _ = made.reset(seed=[3, 4])
+    observation, _ = made.reset(seed=3)  # 3 and 4
     alone, _ = single.reset(seed=4)
-    action = np.zeros((2, *(made.single_action_space.shape or ())), dtype=made.single_action_space.dtype)
+    actions = made.action_space.sample()
     for _ in range(20):
-        observation, *_ = made.step(action)
-        alone, *_ = single.step(made.single_action_space.dtype.type(0) if not action[0].shape else action[0])
+        observation, *_ = made.step(actions)
+        alone, *_ = single.step(actions[1])
     for name, values in alone.items():
         np.testing.assert_array_equal(observation[name][1], values)
     made.close()

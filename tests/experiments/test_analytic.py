@@ -10,6 +10,9 @@ from relgym.experiments.analytic import AnalyticModes, Case, analytic_modes, con
 NORMALS = [(0.0, 1.0), (1.0, 0.0), (0.6, 0.8), (-0.6, 0.8)]
 
 
+Row = tuple[float, float, float]
+
+
 def functions(modes: AnalyticModes, axis: str) -> list[tuple[float, float, float]]:
     return sorted(
         (round(m.weights[0], 9) + 0.0, round(m.weights[1], 9) + 0.0, round(m.intercept, 12) + 0.0)
@@ -28,7 +31,7 @@ def test_experiment_1_has_the_functions_of_table_4_2() -> None:
 
 def test_experiment_2_has_the_functions_of_table_4_9_and_those_it_lacks() -> None:
     modes = analytic_modes(45.0, 0.95, 0.2)
-    table = [
+    table: list[Row] = [
         (1, -0.39, 1.96e-4),
         (1, 0.39, -1.96e-4),
         (1, 0, 0),

@@ -15,7 +15,7 @@ from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks, truck_blocks
 
 Row = tuple[float, float, float]
 
-# Weights of v_x and v_y, and the intercept. C and G are 1.9 and 9.8e-4 times sin 30 cos 30 (0.823 and 4.24e-4).
+# Weights of v_x and v_y, and the intercept. C and G are 1.9 and 9.8e-4 times sin 30 cos 30.
 C, G = 0.82272413359521, 4.243524478543749e-4
 
 TABLE_4_2: dict[str, dict[str, Row]] = {
