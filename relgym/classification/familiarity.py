@@ -26,6 +26,7 @@ Used: TypeAlias = tuple[tuple[Context, tuple[int, ...], tuple[int, ...]], ...]
 _Hashes: TypeAlias = NDArray[np.uint64]
 
 _GOLDEN: Final = np.uint64(0x9E3779B97F4A7C15)
+_MOST_ANSWERS: Final = 8192
 _NOTHING: Final = np.uint64(0)
 
 
@@ -46,9 +47,11 @@ class Familiarity:
         self._known: dict[Key, bool] = {}
 
     def is_seen(self, example: Example, key: Key) -> bool:
-        """Whether an example's situation was seen; answers are kept by `key` (`Planner.key`)."""
+        """Whether an example's situation was seen; answers are kept by `key` (`Plan.key`)."""
         found = self._known.get(key)
         if found is None:
+            if len(self._known) >= _MOST_ANSWERS:
+                self._known.clear()
             found = self._known[key] = self._situation(example) in self.seen
         return found
 

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.classification.binary import VOTE_UNIT, BinaryClassifier
+from relgym.classification.binary import BinaryClassifier
 from relgym.classification.examples import NOISE, Bools, Example, ExampleBatch, Floats, Vocabulary
 from relgym.classification.exemplars import Exemplars
 from relgym.classification.familiarity import Familiarity, situations, used_by
 from relgym.classification.learning import Lesson
 from relgym.classification.pairs import PairState, lesson_of, pair_labels
-from relgym.classification.plans import Planner
-from relgym.classification.ranking import Ranking, RankingBatch, Verdict, verdict
+from relgym.classification.ranking import Ranking, RankingBatch, Verdict
 from relgym.classification.views import Scope, View
+from relgym.classification.voting import Voting
 from relgym.config import ClassificationConfig
 
 __all__ = ["ModeClassifier"]
@@ -74,8 +74,7 @@ class ModeClassifier:
         """Pairs that wait to be learned anew, the most contradicted first."""
         return tuple(p.modes for p in sorted(self._pairs.values(), key=lambda p: p.urgency) if p.stale)
 
-    # --- asking
-    # -----------------------------------------------------------------------------------------------
+    # ----- asking -----
 
     def rank(self, example: Example, values: Sequence[float]) -> Ranking:
         """Rank the modes for one example.
@@ -87,56 +86,18 @@ class ModeClassifier:
         values
             What each mode's function predicts, in the order of `modes`; NaN where its roles can't be filled.
         """
-        if not self.modes:
-            return Ranking((), (), 0.0, False)
-        outcomes = self._planner.outcomes(example, values)
-        scores = [0] * len(self.modes)
-        for (a, b), votes, outcome in zip(self._places, self._votes, outcomes, strict=True):
-            for_a, for_b = votes[outcome]
-            scores[a] += for_a
-            scores[b] += for_b
-        modes, counts = self.modes, self.counts
-        order = sorted(range(len(modes)), key=lambda m: (-scores[m], -counts[modes[m]], modes[m]))
-        best, rest = order[0], order[1:]
-        margin = (scores[best] - scores[rest[0]]) / VOTE_UNIT if rest else math.inf
-        familiar = self._fired(modes[best], outcomes) or self._is_familiar(example)
-        return Ranking(
-            tuple([modes[m] for m in order]), tuple([scores[m] / VOTE_UNIT for m in order]), margin, familiar
-        )
+        return self._voting.rank(example, values, self.counts, self._familiarity())
 
     def rank_batch(self, batch: ExampleBatch, values: Floats) -> RankingBatch:
         """Rank the modes for n examples; equal to `rank` of each. `values` has shape ``(n, len(modes))``."""
-        n, m = len(batch), len(self.modes)
-        if not m:
-            none = np.empty((n, 0))
-            return RankingBatch(none.astype(np.int64), none, np.zeros(n), np.zeros(n, dtype=np.bool_))
-        view = View.of_batch(batch, self.modes, np.asarray(values, dtype=np.float64))
-        scores, fired = self._scores_batch(view)
-        by_tie = sorted(range(m), key=lambda k: (-self.counts[self.modes[k]], self.modes[k]))
-        order = np.array(by_tie)[np.argsort(-scores[:, by_tie], axis=1, kind="stable")]
-        ranked = np.take_along_axis(scores, order, axis=1)
-        margin = (ranked[:, 0] - ranked[:, 1]) / VOTE_UNIT if m > 1 else np.full(n, math.inf)
-        familiar = fired[np.arange(n), order[:, 0]]
-        unsure = np.flatnonzero(~familiar)
-        if len(unsure):
-            familiar[unsure] = self._familiarity().is_seen_batch(view.take(unsure))
-        return RankingBatch(np.array(self.modes)[order], ranked / VOTE_UNIT, margin, familiar)
+        return self._voting.rank_batch(batch, values, self.counts, self._familiarity())
 
     def explain(self, example: Example, values: Sequence[float]) -> list[Verdict]:
         """How the winner fared against every other mode, in the order of the ranking."""
         ranking = self.rank(example, values)
-        if not ranking.modes:
-            return []
-        best, found = ranking.modes[0], {}
-        for classifier, outcome in zip(
-            self.classifiers, self._planner.outcomes(example, values), strict=True
-        ):
-            if best in (classifier.i, classifier.j):
-                found[classifier.j if best == classifier.i else classifier.i] = verdict(classifier, outcome)
-        return [found[mode] for mode in ranking.modes[1:]]
+        return self._voting.verdicts(example, values, ranking.modes)
 
-    # --- learning
-    # ---------------------------------------------------------------------------------------------
+    # ----- learning -----
 
     def observe(
         self,
@@ -169,13 +130,12 @@ class ModeClassifier:
         -----
         Learns nothing (that is `refresh`); cost some 100 µs.
         """
-        wrong = 0
+        wrong, seen = 0, self._familiarity()  # before anything changes: must not depend on who asked when
         if assigned != NOISE:
             self.counts[assigned] = self.counts.get(assigned, 0.0) + 1.0
             wrong = self._count(example, assigned, fits, values)
         self.exemplars.add(example, assigned, fits, values, hard=hard or wrong > 0, roles=roles)
-        if self._seen is not None:
-            self._seen.add(example, self._planner.key(example))
+        seen.add(example, self._voting.key(example))
         return wrong
 
     def sync(
@@ -237,8 +197,7 @@ class ModeClassifier:
             self._pairs_changed()
         return spent
 
-    # --- state
-    # ------------------------------------------------------------------------------------------------
+    # ----- state -----
 
     def to_dict(self, *, exemplars: bool = True) -> dict[str, Any]:
         """Plain JSON-able dictionary; without exemplars the classifier can answer but not go on learning."""
@@ -264,7 +223,7 @@ class ModeClassifier:
             i, j = int(plain["classifier"]["i"]), int(plain["classifier"]["j"])
             self._pairs[i, j] = PairState.from_dict(plain, self._scope(i, j))
         self._reset_caches()
-        self._seen = Familiarity(used_by(self._classifiers, self.vocabulary), data["seen"])
+        self._seen = Familiarity(used_by(self.classifiers, self.vocabulary), data["seen"])
         return self
 
     def __getstate__(self) -> dict[str, Any]:
@@ -276,49 +235,22 @@ class ModeClassifier:
         self.__dict__.update(state)
         self._reset_caches()
 
-    # --- inside
-    # -----------------------------------------------------------------------------------------------
+    # ----- inside -----
 
     def _count(self, example: Example, assigned: int, fits: Bools, values: Floats) -> int:
-        outcomes = self._planner.outcomes(example, np.asarray(values).tolist())
+        outcomes = self._voting.outcomes(example, np.asarray(values).tolist())
         keep, wrong = self.config.ambiguous == "keep", 0
         explained = dict(zip(self.modes, np.asarray(fits).tolist(), strict=True))
         for at, ((i, j), pair) in enumerate(self._pairs.items()):
             if assigned not in (i, j) or (explained[j if assigned == i else i] and not keep):
                 continue
             wrong += pair.observe(outcomes[at], assigned == i, self.config.relearn_growth)
-            self._votes[at] = pair.classifier.votes(self.config.votes)
+            self._voting.recount(at)
         return wrong
-
-    def _scores_batch(self, view: View) -> tuple[NDArray[np.int64], Bools]:
-        """Votes of every mode, and whether a clause spoke for it, both of shape ``(n, M)``."""
-        rows = np.arange(len(view))
-        scores = np.zeros((len(view), len(self.modes)), dtype=np.int64)
-        fired = np.zeros(scores.shape, dtype=np.bool_)
-        for (a, b), votes, classifier in zip(self._places, self._votes, self.classifiers, strict=True):
-            outcome = classifier.decide_batch(view, rows)
-            gained = np.array(votes, dtype=np.int64)[outcome]
-            scores[:, a] += gained[:, 0]
-            scores[:, b] += gained[:, 1]
-            last = len(classifier.definition.clauses)
-            spoke = np.array([o.stage < last for o in classifier.outcomes])
-            fired[:, a if classifier.positive == classifier.i else b] |= spoke[outcome]
-        return scores, fired
-
-    def _fired(self, mode: int, outcomes: Sequence[int]) -> bool:
-        """Whether a clause of some pair spoke for a mode."""
-        for classifier, outcome in zip(self._classifiers, outcomes, strict=True):
-            if classifier.positive == mode:
-                if classifier.outcomes[outcome].stage < len(classifier.definition.clauses):
-                    return True
-        return False
-
-    def _is_familiar(self, example: Example) -> bool:
-        return self._familiarity().is_seen(example, self._planner.key(example))
 
     def _familiarity(self) -> Familiarity:
         if self._seen is None:
-            used = used_by(self._classifiers, self.vocabulary)
+            used = used_by(self.classifiers, self.vocabulary)
             view, _ = self._current_view()
             self._seen = Familiarity(used, situations(view, used).tolist())
         return self._seen
@@ -352,14 +284,11 @@ class ModeClassifier:
         self._pairs = pairs
 
     def _reset_caches(self) -> None:
-        self._planner = Planner(self.vocabulary, self.modes)
-        self._places = [(self.modes.index(i), self.modes.index(j)) for i, j in self._pairs]
+        self._voting = Voting(self.vocabulary, self.modes, self.config.votes)
         self._pairs_changed()
 
     def _pairs_changed(self) -> None:
-        self._classifiers = self.classifiers
-        self._votes = [c.votes(self.config.votes) for c in self._classifiers]
-        self._planner.set_pairs(self._classifiers)
+        self._voting.set_pairs(self.classifiers)
         self._seen = None
 
 

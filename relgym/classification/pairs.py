@@ -72,7 +72,7 @@ class PairState:
         # A faultless definition learned whole is only confirmed by agreeing examples, however many.
         imperfect = self.errors > 0 or self.mended
         grown = imperfect and min(self.seen) >= growth * max(min(self.learned), 1.0)
-        self.stale = self.stale or self.contradictions > self.errors or (wrong and self.unlearned) or grown
+        self.stale = self.stale or self.contradictions > self.errors or grown
         return wrong
 
     @property
@@ -132,7 +132,5 @@ def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, ke
 
 def pair_labels(assigned: Any, fits: Any, modes: tuple[int, ...], i: int, j: int, keep: bool) -> Any:
     """1 where an example shows mode `i`, -1 where it shows `j`, 0 where it teaches the pair nothing."""
-    fits_i, fits_j = (fits[:, modes.index(mode)] | False for mode in (i, j))
-    if keep:
-        fits_i, fits_j = np.zeros_like(fits_i), np.zeros_like(fits_j)
+    fits_i, fits_j = (fits[:, modes.index(mode)] & (not keep) for mode in (i, j))
     return ((assigned == i) & ~fits_j).astype(np.int8) - ((assigned == j) & ~fits_i)

@@ -21,7 +21,7 @@ from relgym.logic.clause import ANY, Clause, Literal
 from relgym.logic.csp import World, solutions
 from relgym.numeric.tree import DecisionTree
 
-__all__ = ["Key", "Planner"]
+__all__ = ["Key", "Plan", "Planner"]
 
 Key: TypeAlias = tuple[int, bytes, bytes, bytes]
 """Target, close objects, binary and unary relations of an example."""
@@ -72,7 +72,13 @@ class _Pair:
 
 
 @dataclass(slots=True)
-class _Plan:
+class Plan:
+    """What a relational state leaves open: per pair an outcome's number, or the stages to try.
+
+    `key` identifies the state, as far as pairs can see it.
+    """
+
+    key: Key
     worlds: dict[Context, World]
     objects: dict[Context, tuple[int, ...]]
     target: int
@@ -109,7 +115,7 @@ class Planner:
         self._pairs: list[_Pair] = []
         self._version = 0
         self._everything = False
-        self._plans: dict[Key, _Plan] = {}
+        self._plans: dict[Key, Plan] = {}
 
     def set_pairs(self, classifiers: Sequence[BinaryClassifier]) -> None:
         """Set the pairs, in order; those that are the same objects as before keep what is known of them."""
@@ -131,33 +137,30 @@ class Planner:
         values
             What the modes' functions predict for it, in the order of `modes`.
         """
-        plan = self._plan(example)
+        return self.run(self.plan(example), example, values)
+
+    def run(self, plan: Plan, example: Example, values: Sequence[float]) -> list[int]:
+        """The same, for a caller that has the example's plan already."""
         scalars = [*example.own.tolist(), *values]
         pair = example.pair.tolist()
         return [stage if isinstance(stage, int) else _run(stage, scalars, pair) for stage in plan.stages]
 
-    def key(self, example: Example) -> Key:
-        """Identifies what pairs can see of an example's relations, objects in their order."""
-        return self._key(example)[0]
-
-    def _key(self, example: Example) -> tuple[Key, Bools, Bools]:
+    def plan(self, example: Example) -> Plan:
+        """The plan of an example's relational state, objects in their order."""
         close, table, unary = example.close, example.table, example.unary
         if not self._everything:
             table, unary = table & (close[:, None] & close), unary & close
-        return (example.target, close.tobytes(), table.tobytes(), unary.tobytes()), table, unary
-
-    def _plan(self, example: Example) -> _Plan:
-        key, table, unary = self._key(example)
+        key = (example.target, close.tobytes(), table.tobytes(), unary.tobytes())
         plan = self._plans.get(key)
         if plan is None:
             if len(self._plans) >= _MOST_PLANS:
                 self._plans.clear()
-            plan = self._plans[key] = self._new_plan(table, unary, example.close, example.target)
+            plan = self._plans[key] = self._new_plan(key, table, unary, close)
         if plan.version != self._version:
             self._update(plan)
         return plan
 
-    def _new_plan(self, table: Bools, unary: Bools, close: Bools, target: int) -> _Plan:
+    def _new_plan(self, key: Key, table: Bools, unary: Bools, close: Bools) -> Plan:
         v = self.vocabulary
         # Copies: a query's arrays may be views of a large batch that should not be kept alive.
         relations = dict(zip(v.relations, table.copy(), strict=True)) | dict(
@@ -166,9 +169,9 @@ class Planner:
         exists: dict[Context, Bools] = {"touching": close.copy(), "all": np.ones(len(close), dtype=np.bool_)}
         worlds = {context: World(relations | {_SOME: mask}, mask) for context, mask in exists.items()}
         objects = {context: tuple(np.flatnonzero(mask).tolist()) for context, mask in exists.items()}
-        return _Plan(worlds, objects, target)
+        return Plan(key, worlds, objects, target=key[0])
 
-    def _update(self, plan: _Plan) -> None:
+    def _update(self, plan: Plan) -> None:
         """Work out anew the stages of pairs that changed since the plan was last used."""
         versions = [pair.version for pair in self._pairs]
         if len(plan.versions) != len(versions):
@@ -212,7 +215,7 @@ def _relational(clause: Clause) -> Clause:
     return Clause(tuple(literals), clause.arity)
 
 
-def _stages(plan: _Plan, pair: _Pair) -> int | list[_Alternative]:
+def _stages(plan: Plan, pair: _Pair) -> int | list[_Alternative]:
     """The outcome, if relations alone decide; else the stages to try."""
     context = pair.classifier.context
     world, found = plan.worlds[context], []

@@ -76,6 +76,7 @@ class Ranking:
     scores: tuple[float, ...]
     margin: float
     familiar: bool
+    seen: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +87,12 @@ class RankingBatch:
     scores: Floats
     margin: Floats
     familiar: Bools
+    seen: Bools
 
     def __len__(self) -> int:
         return len(self.margin)
 
     def __getitem__(self, index: int) -> Ranking:
         modes, scores = tuple(self.modes[index].tolist()), tuple(self.scores[index].tolist())
-        return Ranking(modes, scores, float(self.margin[index]), bool(self.familiar[index]))
+        familiar, seen = bool(self.familiar[index]), bool(self.seen[index])
+        return Ranking(modes, scores, float(self.margin[index]), familiar, seen)

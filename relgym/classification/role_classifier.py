@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from collections.abc import Sequence
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -14,67 +11,17 @@ from numpy.typing import NDArray
 from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.exemplars import Exemplars
 from relgym.classification.learning import foil_config
+from relgym.classification.roles import Places, RoleDescription, RoleKind, fillings
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
-from relgym.logic.clause import Coverage, Definition
-from relgym.logic.csp import World, satisfiable
+from relgym.logic.clause import Definition
+from relgym.logic.csp import World
 from relgym.logic.foil import learn
 
-__all__ = ["RoleClassifier", "RoleDescription", "RoleKind"]
+__all__ = ["RoleClassifier", "RoleKind"]
 
 _MOST_ANSWERS: Final = 4096
 _Rows: TypeAlias = NDArray[np.int64]
-_Places: TypeAlias = tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True, order=True)
-class RoleKind:
-    """What makes two roles interchangeable: the same type and the same weights (§3.2.3).
-
-    Parameters
-    ----------
-    type
-        The objects' type: a unary relation of the vocabulary.
-    weights
-        (property, weight) pairs of the mode's function.
-    """
-
-    type: str
-    weights: tuple[tuple[str, float], ...] = ()
-
-
-@dataclass(slots=True)
-class RoleDescription:
-    """What is known of the objects that play one kind of role.
-
-    Parameters
-    ----------
-    kind
-        The kind.
-    places
-        Positions of the roles of this kind.
-    definition
-        ``fulfils(A, B)``: B plays the role for target A; none: any object of the type does.
-    """
-
-    kind: RoleKind
-    places: _Places
-    definition: Definition | None = None
-
-    def score(self, world: World, target: int, candidate: int) -> float | None:
-        """Log-odds that a candidate plays the role; none if nothing speaks for it."""
-        if self.definition is None:
-            return 0.0
-        for clause, coverage in zip(self.definition.clauses, self.definition.coverage, strict=True):
-            if satisfiable(clause, world, (target, candidate)):
-                return _log_odds(coverage)
-        missed = self.definition.uncovered
-        # Only a description that missed some of its own objects leaves room for others.
-        return _log_odds(missed) if missed.positives > 0 else None
-
-    def __str__(self) -> str:
-        rule = f"any {self.kind.type}" if self.definition is None else str(self.definition)
-        return f"{self.kind.type}: {rule}"
 
 
 class RoleClassifier:
@@ -114,12 +61,11 @@ class RoleClassifier:
         self.errors = 0.0
         self.contradictions = 0.0
         self.stale = bool(self.kinds)
-        self._answers: dict[tuple[Any, ...], _Places | None] = {}
+        self._answers: dict[tuple[Any, ...], Places | None] = {}
 
-    # --- asking
-    # -----------------------------------------------------------------------------------------------
+    # ----- asking -----
 
-    def assign(self, example: Example, order: Sequence[int] | None = None) -> _Places | None:
+    def assign(self, example: Example, order: Sequence[int] | None = None) -> Places | None:
         """Object playing each role, or none if some role can't be filled.
 
         Parameters
@@ -146,8 +92,7 @@ class RoleClassifier:
         """One line per kind of role, as in Figure 3.8."""
         return [str(description) for description in self.descriptions]
 
-    # --- learning
-    # ---------------------------------------------------------------------------------------------
+    # ----- learning -----
 
     def observe(self, example: Example, roles: Sequence[int]) -> bool:
         """Take in who played the roles of one example of the mode; whether that contradicts the descriptions.
@@ -178,8 +123,7 @@ class RoleClassifier:
         self.contradictions, self.stale = 0.0, False
         return work
 
-    # --- state
-    # ------------------------------------------------------------------------------------------------
+    # ----- state -----
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON-able dictionary."""
@@ -206,8 +150,7 @@ class RoleClassifier:
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_answers": {}}
 
-    # --- inside
-    # -----------------------------------------------------------------------------------------------
+    # ----- inside -----
 
     def _learn(
         self, description: RoleDescription, view: View, rows: _Rows, roles: _Rows, weights: Any
@@ -236,7 +179,7 @@ class RoleClassifier:
         )
         return description.definition.work
 
-    def _search(self, example: Example, order: _Places) -> _Places | None:
+    def _search(self, example: Example, order: Places) -> Places | None:
         """Joint search over all kinds for the assignment with the highest score."""
         v = self.vocabulary
         relations = dict(zip(v.relations, example.table, strict=True)) | dict(
@@ -254,13 +197,13 @@ class RoleClassifier:
             ]
             # All others together can take no more objects than there are roles: the best few are enough.
             options.append(sorted(scored, reverse=True)[: len(self.kinds)])
-        best: tuple[float, _Places] | None = None
-        for total, chosen in _assignments(self.descriptions, options, frozenset()):
+        best: tuple[float, Places] | None = None
+        for total, chosen in fillings(self.descriptions, options, frozenset()):
             if best is None or total > best[0] + 1e-12:
                 best = total, tuple(each for _, each in sorted(chosen))
         return None if best is None else best[1]
 
-    def _same(self, found: _Places | None, roles: Sequence[int]) -> bool:
+    def _same(self, found: Places | None, roles: Sequence[int]) -> bool:
         """Whether two assignments agree up to exchanges of interchangeable roles."""
         if found is None:
             return False
@@ -277,25 +220,3 @@ class RoleClassifier:
                 if of_type.sum() > len(description.places):
                     return True
         return False
-
-
-def _assignments(
-    descriptions: Sequence[RoleDescription],
-    options: Sequence[Sequence[tuple[float, int, int]]],
-    taken: frozenset[int],
-) -> Iterator[tuple[float, list[tuple[int, int]]]]:
-    """(score, [(role, object), ...]) of all ways to fill all roles without using an object twice."""
-    if not descriptions:
-        yield 0.0, []
-        return
-    free = [option for option in options[0] if option[2] not in taken]
-    for chosen in combinations(free, len(descriptions[0].places)):
-        players = [each for _, _, each in sorted(chosen, key=lambda option: -option[1])]
-        mine = list(zip(descriptions[0].places, players, strict=True))
-        score = sum(score for score, _, _ in chosen)
-        for rest, others in _assignments(descriptions[1:], options[1:], taken | set(players)):
-            yield score + rest, mine + others
-
-
-def _log_odds(coverage: Coverage) -> float:
-    return math.log((coverage.positives + 1.0) / (coverage.negatives + 1.0))

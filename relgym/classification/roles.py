@@ -1,0 +1,92 @@
+"""Kinds of roles, what is known of their players, and the ways to fill all roles at once (§3.5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TypeAlias
+
+from relgym.logic.clause import Coverage, Definition
+from relgym.logic.csp import World, satisfiable
+
+__all__ = ["Option", "Places", "RoleDescription", "RoleKind", "fillings"]
+
+Places: TypeAlias = tuple[int, ...]
+"""Object index per role, or role numbers."""
+
+Option: TypeAlias = tuple[float, int, int]
+"""(score, minus its place in the order of preference, object index) of a candidate."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class RoleKind:
+    """What makes two roles interchangeable: the same type and the same weights (§3.2.3).
+
+    Parameters
+    ----------
+    type
+        The objects' type: a unary relation of the vocabulary.
+    weights
+        (property, weight) pairs of the mode's function.
+    """
+
+    type: str
+    weights: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(slots=True)
+class RoleDescription:
+    """What is known of the objects that play one kind of role.
+
+    Parameters
+    ----------
+    kind
+        The kind.
+    places
+        Positions of the roles of this kind.
+    definition
+        ``fulfils(A, B)``: B plays the role for target A; none: any object of the type does.
+    """
+
+    kind: RoleKind
+    places: Places
+    definition: Definition | None = None
+
+    def score(self, world: World, target: int, candidate: int) -> float | None:
+        """Log-odds that a candidate plays the role; none if nothing speaks for it."""
+        if self.definition is None:
+            return 0.0
+        for clause, coverage in zip(self.definition.clauses, self.definition.coverage, strict=True):
+            if satisfiable(clause, world, (target, candidate)):
+                return _log_odds(coverage)
+        missed = self.definition.uncovered
+        # Only a description that missed some of its own objects leaves room for others.
+        return _log_odds(missed) if missed.positives > 0 else None
+
+    def __str__(self) -> str:
+        rule = f"any {self.kind.type}" if self.definition is None else str(self.definition)
+        return f"{self.kind.type}: {rule}"
+
+
+def fillings(
+    descriptions: Sequence[RoleDescription],
+    options: Sequence[Sequence[Option]],
+    taken: frozenset[int],
+) -> Iterator[tuple[float, list[tuple[int, int]]]]:
+    """(score, [(role, object), ...]) of all ways to fill all roles without using an object twice."""
+    if not descriptions:
+        yield 0.0, []
+        return
+    free = [option for option in options[0] if option[2] not in taken]
+    for chosen in combinations(free, len(descriptions[0].places)):
+        players = [each for _, _, each in sorted(chosen, key=lambda option: -option[1])]
+        mine = list(zip(descriptions[0].places, players, strict=True))
+        score = sum(score for score, _, _ in chosen)
+        for rest, others in fillings(descriptions[1:], options[1:], taken | set(players)):
+            yield score + rest, mine + others
+
+
+def _log_odds(coverage: Coverage) -> float:
+    return math.log((coverage.positives + 1.0) / (coverage.negatives + 1.0))
