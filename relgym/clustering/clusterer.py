@@ -14,7 +14,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, rounding_noise
 from relgym.clustering.roles import identify_roles
-from relgym.clustering.unification import covering, unified
+from relgym.clustering.unification import covering, reordered, unified, unified_family
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import Target
@@ -23,6 +23,9 @@ __all__ = ["ClusterReport", "ModeClusterer"]
 
 ESTIMATE_AT = (64, 512, 4096)
 """Numbers of examples after which the noise is estimated anew."""
+
+FAMILY = 4
+"""Modes that differ in their constant only are unified all at once when there are at least so many."""
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
@@ -233,7 +236,7 @@ class ModeClusterer:
         """Noise among examples of the newest example's signature."""
         ids = table.signature_ids[self.rows]
         part = np.flatnonzero(ids == ids[-1])
-        order = table.signatures[ids[-1]].preference(self.target.property)
+        order, _ = table.signatures[ids[-1]].preference(self.target)
         rows = self.rows[part]
         return estimate_noise(table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor)
 
@@ -275,13 +278,13 @@ class ModeClusterer:
         if len(pool) < least_examples(y, self.scale, self.config):
             return False
         slots = table.signatures[signature]
-        order = slots.preference(self.target.property)
+        order, stages = slots.preference(self.target)
         rows = self.rows[pool]
         found = find_mode(
             table.x[rows][:, order],
             y,
             table.strata[rows],
-            own=slots.own + (self.target.property in _pose_names(slots)),
+            stages=stages,
             fresh=fresh,
             scale=self.scale,
             config=self.config,
@@ -289,7 +292,7 @@ class ModeClusterer:
         )
         if found is None:
             return False
-        self._adopt(table, signature, _reordered(found.fit, order), pool[found.inliers])
+        self._adopt(table, signature, reordered(found.fit, order), pool[found.inliers])
         return True
 
     def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit, members: NDArray[np.intp]) -> None:
@@ -300,6 +303,12 @@ class ModeClusterer:
         while (wider := self._unify_once(table, cluster, members, absorbed)) is not None:
             cluster, members, gone = wider
             absorbed.append(gone)
+        if (family := self._unify_family(table, cluster, members, absorbed)) is not None:
+            cluster, members, gone_too = family
+            absorbed += gone_too
+            while (wider := self._unify_once(table, cluster, members, absorbed)) is not None:
+                cluster, members, gone = wider
+                absorbed.append(gone)
         for i in absorbed:
             self._remove(i)
         new = self._next_id
@@ -331,6 +340,36 @@ class ModeClusterer:
             if general is not None:
                 return self._cluster(general[1], table, general[0]), both, i
         return None
+
+    def _unify_family(
+        self, table: ExampleTable, cluster: Cluster, members: NDArray[np.intp], absorbed: list[int]
+    ) -> tuple[Cluster, NDArray[np.intp], list[int]] | None:
+        """Unify with all modes that differ in their constant only: the general function, examples, absorbed modes."""
+        siblings = [
+            i
+            for i, c in sorted(self.clusters.items())
+            if i not in absorbed and c.mode.intercept != 0.0 and c.mode.same_function(cluster.mode, constant=False)
+        ]
+        if cluster.mode.intercept == 0.0 or any(r.terms for r in cluster.mode.open_roles) or len(siblings) < FAMILY:
+            return None
+        families = [np.flatnonzero(self.labels == i) for i in siblings]
+        found = unified_family(
+            table,
+            self.rows,
+            self.y,
+            [*families, members],
+            cluster.mode.roles[0].terms,
+            target=self.target,
+            scale=self.scale,
+            config=self.config,
+            rng=self._rng,
+        )
+        if found is None or len(siblings) not in found[2]:
+            return None
+        signature, fit, which = found
+        gone = [siblings[k] for k in which if k < len(siblings)]
+        everyone = np.concatenate([members, *(families[k] for k in which if k < len(siblings))])
+        return self._cluster(fit, table, signature), everyone, gone
 
     def _cluster(self, fit: LinearFit, table: ExampleTable, signature: int) -> Cluster:
         roles = identify_roles(fit, table.signatures[signature])
@@ -411,14 +450,3 @@ class ModeClusterer:
 
 def _simpler(mode: Mode, rival: Mode) -> bool:
     return mode.parameters < rival.parameters
-
-
-def _pose_names(slots: Any) -> set[str]:
-    own = slots.types[0]
-    return {own.properties[k] for k in own.pose_columns() if k >= 0}
-
-
-def _reordered(fit: LinearFit, order: NDArray[np.intp]) -> LinearFit:
-    """The same function on columns before they were put in order of preference."""
-    pairs = sorted((int(order[c]), w) for c, w in zip(fit.columns, fit.weights, strict=True))
-    return LinearFit(tuple(c for c, _ in pairs), tuple(w for _, w in pairs), fit.intercept, fit.rss)

@@ -14,11 +14,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.scene.objects import ObjectType, SceneLayout
+from relgym.scene.objects import ObjectType, SceneLayout, Target
 
 __all__ = ["Column", "SlotSignature", "slot_order"]
 
 PRIME = "'"
+
+_STAGE = (0, 0, 2, 1, 2)
+"""When columns of each rank are tried: poses last, since few laws depend on where things are (R2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +79,6 @@ class SlotSignature:
         return {(c.slot, c.property): k for k, c in enumerate(self.columns)}
 
     @cached_property
-    def own(self) -> int:
-        """Number of leading columns that belong to the target (pose apart) or to bodiless objects."""
-        return sum(c.rank <= 1 for c in self.columns)
-
-    @cached_property
     def core(self) -> int:
         """Number of leading columns that mean the same in every signature of the same target."""
         return sum(c.rank <= 2 for c in self.columns)
@@ -103,11 +101,24 @@ class SlotSignature:
         """Index of a column."""
         return self._index[slot, prop]
 
-    def preference(self, prop: str) -> NDArray[np.intp]:
-        """Permutation of the columns that puts the target property's own column first."""
-        first = self._index[0, prop]
-        rest = [k for k in range(len(self.columns)) if k != first]
-        return np.array([first, *rest], dtype=np.intp)
+    def preference(self, target: Target) -> tuple[NDArray[np.intp], tuple[int, ...]]:
+        """Columns that a target's functions may use, in order of preference, and where its stages end.
+
+        The target property's own column comes first. The stages are the numbers of leading columns that are tried
+        together: what the target and bodiless objects have; then what other objects have; then poses as well. Next
+        values are left out unless the target is given them.
+        """
+        first = self._index[0, target.property]
+        rest = [k for k, c in enumerate(self.columns) if k != first and self._allowed(c, target)]
+        rest.sort(key=lambda k: (_STAGE[self.columns[k].rank], k))
+        stage = [_STAGE[self.columns[k].rank] for k in rest]
+        ends = tuple(dict.fromkeys(1 + sum(s <= last for s in stage) for last in (0, 1, 2)))
+        return np.array([first, *rest], dtype=np.intp), ends
+
+    def _allowed(self, column: Column, target: Target) -> bool:
+        if not column.property.endswith(PRIME):
+            return True
+        return (self.types[column.slot].name, column.property.rstrip(PRIME)) in target.given
 
     def gather(self, layout: SceneLayout, order: tuple[int, ...]) -> NDArray[np.intp]:
         """Where each column lies in the concatenation of a scene's vector and its next vector.

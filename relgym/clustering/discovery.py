@@ -12,7 +12,7 @@ from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus, consensus, refine
 from relgym.numeric.stepwise import LinearFit, least_squares
 
-__all__ = ["Scale", "find_mode", "identified", "least_examples"]
+__all__ = ["Scale", "find_mode", "identified", "least_examples", "plans"]
 
 SEARCH = 400
 """At most this many rows are searched at a time."""
@@ -52,7 +52,7 @@ def find_mode(
     y: NDArray[np.float64],
     strata: NDArray[np.integer],
     *,
-    own: int,
+    stages: tuple[int, ...],
     fresh: int,
     scale: Scale,
     config: ClusteringConfig,
@@ -64,15 +64,15 @@ def find_mode(
     ----------
     x, y, strata
         Rows ``(n, d)`` with columns in order of preference, responses and relational states, oldest first.
-    own
-        Number of leading columns that belong to the target or to bodiless objects: tried alone first, because a law
-        of the object's own state needs smaller samples and is the simpler law.
+    stages
+        Numbers of leading columns that are tried together, ascending: a law of the object's own state needs smaller
+        samples and is the simpler law.
     fresh
         Number of rows at the end that no earlier search has seen: each sample holds one of them.
     """
     needed = least_examples(y, scale, config)
     rows = _recent(len(y), fresh, rng)
-    for columns, terms, size in _plans(x.shape[1], own, config):
+    for columns, terms, size in plans(stages, config):
         if len(rows) < max(needed, size):
             continue
         found = consensus(
@@ -82,7 +82,7 @@ def find_mode(
             tolerance=scale.tolerance,
             terms=terms,
             size=size,
-            draws=max(32, config.draws // (1 if columns == own else 3)),
+            draws=max(32, config.draws // (1 if columns == stages[0] else 3)),
             rng=rng,
             strata=strata[rows],
             anchors=np.flatnonzero(rows >= len(y) - fresh),
@@ -95,16 +95,16 @@ def find_mode(
     return None
 
 
-def _plans(width: int, own: int, config: ClusteringConfig) -> list[tuple[int, int, int]]:
+def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, int, int]]:
     """(columns, terms, sample size) of the searches, cheapest first."""
-    plans = []
+    found = []
     most = config.max_terms
-    if own:
-        terms = min(own, most, 5)
-        plans.append((own, terms, terms + 3))
-    if not config.own_only and width > own:
-        plans += [(width, min(t, most), s) for t, s in ((2, 5), (5, 12), (most, 3 * most))]
-    return plans
+    for width in stages[:1] if config.own_only else stages:
+        if width <= 6:  # few enough to fit them all and drop what is needless
+            found.append((width, min(width, most), min(width, most) + 3))
+        else:
+            found += [(width, min(t, most), s) for t, s in ((2, 5), (5, 12), (most, 3 * most))]
+    return found
 
 
 def _recent(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
@@ -176,8 +176,12 @@ def _enough_combinations(
     slow = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3]
     if not slow:
         return True
-    combinations = np.unique(x[:, slow], axis=0)
-    if len(combinations) < 2 * len(slow) + 2:
+    combinations = len(np.unique(x[:, slow], axis=0))
+    weight = dict(zip(fit.columns, fit.weights, strict=True))
+    part = sum(weight[c] * x[:, c] for c in slow)
+    # If every combination contributes another value, each one beyond the parameters verifies them exactly.
+    verified = len(np.unique(np.round(part / (100.0 * tolerance)))) >= len(slow) + 3
+    if combinations < 2 * len(slow) + 2 and not verified:
         return False
     if len(slow) == len(fit.columns) and np.ptp(y) > tolerance:
         return len(np.unique(np.round(y / tolerance))) >= 2 * fit.terms

@@ -73,16 +73,14 @@ class Mode:
         """The same mode with another example count."""
         return replace(self, examples=examples)
 
-    def same_function(self, other: Mode, tolerance: float = 1e-9) -> bool:
-        """Whether both have the same roles with weights equal within a relative `tolerance`."""
+    def same_function(self, other: Mode, tolerance: float = 1e-9, *, constant: bool = True) -> bool:
+        """Whether both have the same roles with weights (and the same `constant`) within a relative `tolerance`."""
         pattern = [(r.type, [p for p, _ in r.terms]) for r in self.roles]
         if pattern != [(r.type, [p for p, _ in r.terms]) for r in other.roles]:
             return False
-        pairs = zip(self._numbers(), other._numbers(), strict=True)
+        numbers = [[w for role in m.roles for _, w in role.terms] + [m.intercept] * constant for m in (self, other)]
+        pairs = zip(*numbers, strict=True)
         return all(abs(a - b) <= tolerance * max(1.0, abs(a), abs(b)) for a, b in pairs)
-
-    def _numbers(self) -> list[float]:
-        return [w for role in self.roles for _, w in role.terms] + [self.intercept]
 
     def formula(self, digits: int = 7) -> str:
         """The function as text: ``vx' = 0.525 vx - 0.8227241 vy + 0.0004243524``.

@@ -10,10 +10,11 @@ from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode
 from relgym.config import ClusteringConfig
-from relgym.numeric.stepwise import LinearFit, forward_stepwise
+from relgym.numeric.ransac import consensus
+from relgym.numeric.stepwise import LinearFit, forward_stepwise, least_squares
 from relgym.scene.objects import Target
 
-__all__ = ["covering", "unified"]
+__all__ = ["covering", "reordered", "unified", "unified_family"]
 
 SIDE = 60
 """At most this many examples of each side are regressed; the function is then checked on all."""
@@ -70,12 +71,10 @@ def unified(
     signature = int(max(shared, key=lambda s: (signatures[new] == s).sum()))
     sides = [_spread(side[signatures[side] == signature]) for side in (new, old)]
     slots = table.signatures[signature]
-    order = slots.preference(target.property)
+    order, stages = slots.preference(target)
     pooled = np.concatenate(sides)
     allowed = simpler_than[0].parameters + simpler_than[1].parameters
-    for width in dict.fromkeys([slots.own, len(order)]):
-        if config.own_only and width > slots.own:
-            continue
+    for width in stages[:1] if config.own_only else stages:
         x = table.x[rows[pooled]][:, order[:width]]
         fit = forward_stepwise(x, y[pooled], sigma=scale.sigma, max_terms=min(config.max_terms, allowed))
         if fit.terms >= allowed or np.abs(y[pooled] - fit.predict(x)).max() > scale.tolerance:
@@ -89,12 +88,75 @@ def unified(
         shares = (found.inliers[:split].mean(), found.inliers[split:].mean())
         acts = [np.abs(y[side]) > scale.tolerance for side in sides]
         if min(shares) >= config.unify_ratio and min(a.mean() for a in acts) >= 0.5:
-            pairs = sorted((int(order[c]), w) for c, w in zip(found.fit.columns, found.fit.weights, strict=True))
-            fit = LinearFit(
-                tuple(c for c, _ in pairs), tuple(w for _, w in pairs), found.fit.intercept, found.fit.rss
-            )
-            return signature, fit
+            return signature, reordered(found.fit, order)
     return None
+
+
+def unified_family(
+    table: ExampleTable,
+    rows: NDArray[np.integer],
+    y: NDArray[np.float64],
+    families: list[NDArray[np.intp]],
+    shared: tuple[tuple[str, float], ...],
+    *,
+    target: Target,
+    scale: Scale,
+    config: ClusteringConfig,
+    rng: np.random.Generator,
+) -> tuple[int, LinearFit, list[int]] | None:
+    """A function that explains several over-specific modes at once: (signature, fit, which of them), or None.
+
+    Where something is constant while a block lasts, each block teaches a mode of its own that differs from the others
+    in its constant only. No two of them determine how the constant depends on what; many do. Each mode counts as one
+    example here, and consensus is sought among them.
+
+    Parameters
+    ----------
+    families
+        Numbers of the examples of each mode.
+    shared
+        Terms of the target's own role that they all have.
+    """
+    middle = np.array([members[len(members) // 2] for members in families])
+    signature = int(table.signature_ids[rows[middle[-1]]])
+    usable = np.flatnonzero(table.signature_ids[rows[middle]] == signature)
+    slots = table.signatures[signature]
+    order, stages = slots.preference(target)
+    own = {slots.column(0, prop): weight for prop, weight in shared}
+    part = middle[usable]
+    x = table.x[rows[part]]
+    constants = y[part] - sum(weight * x[:, column] for column, weight in own.items())
+    for width in stages[1:2]:
+        columns = np.array([c for c in order[:width] if c not in own], dtype=np.intp)
+        for terms in range(2, min(len(columns), config.max_terms) + 1):
+            found = consensus(
+                x[:, columns],
+                constants,
+                sigma=scale.sigma,
+                tolerance=scale.tolerance,
+                terms=terms,
+                size=terms + 3,
+                draws=2 * config.draws,
+                rng=rng,
+                anchors=np.array([len(usable) - 1]),
+            )
+            if found is None or found.size < found.fit.terms + 3:
+                continue
+            which = [int(k) for k in usable[found.inliers]]
+            pooled = np.concatenate([_spread(families[k]) for k in which])
+            whole = least_squares(
+                table.x[rows[pooled]], y[pooled], (*own, *(int(columns[c]) for c in found.fit.columns))
+            )
+            checked = identified(table.x[rows[pooled]], y[pooled], whole, scale=scale, support=config.support)
+            if checked is not None and checked.inliers.mean() >= config.unify_ratio:
+                return signature, checked.fit, which
+    return None
+
+
+def reordered(fit: LinearFit, order: NDArray[np.intp]) -> LinearFit:
+    """The same function on columns before they were put in order of preference."""
+    pairs = sorted((int(order[c]), w) for c, w in zip(fit.columns, fit.weights, strict=True))
+    return LinearFit(tuple(c for c, _ in pairs), tuple(w for _, w in pairs), fit.intercept, fit.rss)
 
 
 def _spread(examples: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -15,7 +15,7 @@ from relgym.clustering.mode import Mode
 from relgym.logic.csp import solutions, world_of
 from relgym.model.prediction import Prediction
 from relgym.model.text import amount
-from relgym.scene.objects import Scene, SceneLayout
+from relgym.scene.objects import Scene
 
 if TYPE_CHECKING:
     from relgym.model.property_model import PropertyModel
@@ -135,7 +135,7 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
         for index in scene.layout.of_type(target.type):
             one = next(parts)
             now = float(scene.vector[scene.layout.column(index, target.property)])
-            mode = part.mode(one.mode) if one.ok else None
+            mode = next(m for m in part.modes if m.id == one.mode) if one.ok else None
             reasons = () if mode is None else _reasons(model, part, scene, index, prediction.scene, mode.id)
             found.append(Explanation(one, now, mode, digits, reasons))
     return tuple(found)
@@ -144,14 +144,16 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
 def _reasons(
     model: WorldModel, part: PropertyModel, scene: Scene, index: int, following: Scene, chosen: int
 ) -> tuple[Reason, ...]:
-    example = model.situation(scene, index).examples[0]
-    values = part.mode_values(model.percept(scene), index, following.vector)
+    percept = model.percept(scene)
+    example = percept.situation(index).examples[0]
+    values = part.mode_values(percept, index, following.vector)
+    names = [scene.layout.names[i] for i in scene.layout.bodies if index in scene.layout.bodies]
     by_mode = dict(zip(part.classifier.modes, values, strict=True))
     reasons = []
     for verdict in part.classifier.explain(example, values):
         # Where a mode ranked higher can't fill its roles, its own pair with the chosen mode says why it led.
         rival = verdict.rival if verdict.winner == chosen else verdict.winner
-        objects = _objects(part, example, values, verdict, scene.layout)
+        objects = _objects(part, example, values, verdict, names or [scene.layout.names[index]])
         clause = "" if verdict.clause is None else str(verdict.clause)
         counts = (verdict.correct, verdict.incorrect)
         reasons.append(Reason(rival, by_mode[rival], clause, objects, verdict.tree, verdict.winner, *counts))
@@ -159,9 +161,9 @@ def _reasons(
 
 
 def _objects(
-    part: PropertyModel, example: Example, values: list[float], verdict: Verdict, layout: SceneLayout
+    part: PropertyModel, example: Example, values: list[float], verdict: Verdict, names: list[str]
 ) -> tuple[tuple[str, str], ...]:
-    """Names of the objects for which the deciding clause holds."""
+    """Objects for which the deciding clause holds; `names` are those of the example's objects."""
     if verdict.clause is None:
         return ()
     pair = {verdict.winner, verdict.rival}
@@ -169,12 +171,11 @@ def _objects(
     view = View.of_batch(ExampleBatch.of(example), part.classifier.modes, np.array([values]))
     world = world_of(view.facts(classifier.context, classifier.scope), 0)
     bound = next(solutions(verdict.clause, world, (example.target,)), ())
-    bodies = layout.bodies or (layout.index(layout.names[0]),)
-    return tuple((chr(ord("A") + k), layout.names[bodies[each]]) for k, each in enumerate(bound))
+    return tuple((chr(ord("A") + k), names[each]) for k, each in enumerate(bound))
 
 
 def _clause_text(reason: Reason) -> str:
     if not reason.clause:
-        return f"no clause holds that would speak for mode {reason.rival}"
+        return "none of the clauses that tell the two modes apart holds"
     where = ", ".join(f"{variable} = {name}" for variable, name in reason.objects)
     return f"{reason.clause}, with {where}" if where else reason.clause

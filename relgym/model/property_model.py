@@ -217,6 +217,14 @@ class PropertyModel:
         return tuple(slots)
 
     # ------------------------------------------------------------------ prediction (§3.6)
+    def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
+        """What every mode would predict, in the order of ``classifier.modes``; NaN where its roles are open.
+
+        Arguments as of `predict_one`.
+        """
+        x = percept.rows(index, following[None])[0].tolist()
+        return self._values_one(percept.situation(index).signature, x)
+
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from relgym.classification.binary import BinaryClassifier
+from relgym.classification.role_classifier import RoleKind
 from relgym.model.text import Cell, amount, indented, table, wrapped
 
 if TYPE_CHECKING:
@@ -210,16 +211,14 @@ def _pair_table(classifier: BinaryClassifier) -> PairTable:
 def _role_rows(part: PropertyModel) -> tuple[RoleRow, ...]:
     rows = []
     for mode in part.modes:
-        labels = mode.role_labels()[1:]
-        for description in part.descriptions(mode.id):
-            kind = (description.kind.type, description.kind.weights)
-            alike = [
-                label
-                for label, role in zip(labels, mode.open_roles, strict=True)
-                if (role.type, role.terms) == kind
-            ]
-            rule = "any" if description.definition is None else str(description.definition)
-            rows.append(RoleRow(mode.id, tuple(alike), rule))
+        alike: dict[RoleKind, list[str]] = {}
+        for label, role in zip(mode.role_labels()[1:], mode.open_roles, strict=True):
+            alike.setdefault(RoleKind(*role.kind), []).append(label)
+        known = part.casting.classifiers.get(mode.id)
+        rules = {d.kind: d.definition for d in known.descriptions} if known is not None else {}
+        for kind, labels in alike.items():
+            rule = f"any {kind.type}" if rules.get(kind) is None else str(rules[kind])
+            rows.append(RoleRow(mode.id, tuple(labels), rule))
     return tuple(rows)
 
 
@@ -238,7 +237,9 @@ def _clause_table(pairs: tuple[PairTable, ...]) -> str:
         rows.append(f"mode {pair.mode}, not {pair.rival}  (training accuracy {pair.performance:.4f})")
         for row in pair.rows:
             first, *rest = wrapped(row.clause, _CLAUSE_WIDTH, " ∧ ")
-            rows.append([f"  {first}", round(row.correct), round(row.incorrect), "yes" if row.tests else "no"])
+            rows.append(
+                [f"  {first}", round(row.correct), round(row.incorrect), "yes" if row.tests else "no"]
+            )
             rows += [f"    {line}" for line in rest]
             rows += [f"      {test}" for test in row.tests]
     return table(["clauses", "correct", "incorrect", "tree"], rows)
@@ -255,12 +256,16 @@ def _legend(targets: tuple[TargetReport, ...]) -> str:
     text = " ".join(row.clause + " ".join(row.tests) for pair in pairs for row in pair.rows)
     lines = []
     if pairs:
-        lines += ["'mode i, not j': the first clause that holds speaks for mode i; otherwise mode j is meant."]
+        lines += [
+            "'mode i, not j': the first clause that holds speaks for mode i; otherwise mode j is meant."
+        ]
         lines += ["A is the object whose property is predicted; other letters: there is such an object."]
     if "*" in text:
         lines.append("* is any object: ¬touching(A, *) says that A touches nothing.")
     if "F" in text:
         lines.append("F1 is what mode 1 would predict, F1 - F2 by how much two modes differ.")
     if any(row.tests for pair in pairs for row in pair.rows):
-        lines.append("tree: numeric tests behind a clause, 'tests -> whether it speaks for i (examples of i : j)'.")
+        lines.append(
+            "tree: numeric tests behind a clause, 'tests -> whether it speaks for i (examples of i : j)'."
+        )
     return "\n".join(lines)

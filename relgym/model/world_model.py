@@ -343,6 +343,10 @@ class WorldModel:
 
         return explain(self, scene)
 
+    def percept(self, scene: Scene) -> Percept:
+        """What the learners see of a scene."""
+        return self._perceive(scene)
+
     def situation(self, scene: Scene, index: int) -> Situation:
         """How the object with this index is situated in a scene."""
         return self._perceive(scene).situation(index)
