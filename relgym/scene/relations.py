@@ -31,6 +31,7 @@ from relgym.scene.context import close_set
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Geometry, pairs_of
 from relgym.scene.geometry.vectors import FloatArray, dot
 from relgym.scene.objects import Float2D, SceneLayout, SceneSchema, pose_columns
+from relgym.scene.unary import unary, unary_names
 
 __all__ = ["TOUCH_EPS", "Extractor", "Relations", "unary"]
 
@@ -183,7 +184,7 @@ class Extractor:
         ]
         self.names = tuple(sorted(["approaching", "intersect", "on-top", "smaller-than", *per_axis]))
         self.features = contacts.contact_features(schema)
-        self.unary_names = _unary_names(schema)
+        self.unary_names = unary_names(schema)
         for name in self.unary_names:
             if name in self.names:
                 raise SchemaError(f"type name {name!r} is the name of a spatial relation; rename the type")
@@ -297,18 +298,3 @@ class Extractor:
 
 _CONSTANTS = np.array([0.0, 1.0])
 """What `pose_columns` appends to a state vector: components that no property supplies."""
-
-
-def unary(schema: SceneSchema, layout: SceneLayout) -> dict[str, _Table]:
-    """Return the unary relations of a layout's bodies: every type name with a body, and all its ancestors.
-
-    Returns
-    -------
-    Shape ``(K,)`` by name, alphabetical; the same names for all layouts of a schema.
-    """
-    chains = [schema.ancestry(layout.types[i].name) for i in layout.bodies]
-    return {name: np.array([name in chain for chain in chains], dtype=bool) for name in _unary_names(schema)}
-
-
-def _unary_names(schema: SceneSchema) -> tuple[str, ...]:
-    return tuple(sorted({name for t in schema.types if t.has_body for name in schema.ancestry(t.name)}))
