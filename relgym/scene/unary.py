@@ -22,5 +22,5 @@ def unary(schema: SceneSchema, layout: SceneLayout) -> dict[str, NDArray[np.bool
 
 
 def unary_names(schema: SceneSchema) -> tuple[str, ...]:
-    """Return the names of a schema's unary relations, alphabetical: types with a body, and all their ancestors."""
+    """Return a schema's unary relations, alphabetical: types with a body, and all their ancestors."""
     return tuple(sorted({name for t in schema.types if t.has_body for name in schema.ancestry(t.name)}))

@@ -118,9 +118,10 @@ class _Memo:
 class ArrayGeometry:
     """Exact geometry of one layout in arrays.
 
-    A scene's result doesn't depend on its batch, down to the last bit, nor on the objects' order (distances
-    to the last bit, normals unless several are equally short ways out). For single scenes, pairs whose two
-    bodies stand as in the scene before are not measured again; that too leaves the bits alone.
+    A scene's result doesn't depend on its batch, down to the last bit. Nor does it depend on the objects'
+    order: distances in the plane to the last bit, in space to rounding, and normals unless several ways out
+    are equally short. For single scenes, pairs whose two bodies stand as in the scene before are not measured
+    again; that too leaves the bits alone.
 
     Parameters
     ----------
