@@ -96,6 +96,7 @@ class ModeClusterer:
         self._next_id = 1
         self._searches: dict[int, _Search] = {}
         self._largest = 0.0
+        self._known_noise = 0  # of a model that was loaded without its examples
 
     # ------------------------------------------------------------------ what is known
     @property
@@ -124,7 +125,7 @@ class ModeClusterer:
     @property
     def noise_examples(self) -> int:
         """Number of examples no mode explains."""
-        return int((self.labels == NOISE).sum())
+        return int((self.labels == NOISE).sum()) if self._size else self._known_noise
 
     def fits(self, table: ExampleTable, examples: NDArray[np.intp]) -> tuple[tuple[int, ...], NDArray[np.bool_]]:
         """Which modes explain the given examples: ids and a boolean array ``(len(examples), modes)``."""
@@ -424,6 +425,7 @@ class ModeClusterer:
             "sigma": self.scale.sigma,
             "next_id": self._next_id,
             "largest": self._largest,
+            "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
             "searches": [[i, s.waiting, s.failures] for i, s in sorted(self._searches.items())],
@@ -439,6 +441,7 @@ class ModeClusterer:
         self.scale = replace(self.scale, sigma=float(data["sigma"]))
         self._next_id = int(data["next_id"])
         self._largest = float(data["largest"])
+        self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}
         self.clusters = {int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]}
         self._searches = {int(i): _Search(int(w), int(f)) for i, w, f in data["searches"]}
