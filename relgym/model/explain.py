@@ -1,4 +1,4 @@
-"""Why a model predicts what it predicts: mode, function, roles, deciding clause and rival, as records and as text."""
+"""Why a model predicts what it predicts: mode, roles, deciding clause and rival, as records and as text."""
 
 from __future__ import annotations
 
@@ -103,11 +103,12 @@ class Explanation:
         if reason.tests:
             lines.append(f"            and {reason.tests}")
         lines.append(
-            f"            in training that was right {reason.correct:,.0f} and wrong {reason.incorrect:,.0f} times"
+            f"            in training right {reason.correct:,.0f} times, wrong {reason.incorrect:,.0f} times"
         )
-        value = "open roles" if math.isnan(reason.rival_value) else f"{reason.rival_value:.{self.digits}g}"
-        margin = self.prediction.margin
-        lines.append(f"  rival     mode {reason.rival}, which says {value}; margin {margin:.3g}")
+        says = f"which says {reason.rival_value:.{self.digits}g}"
+        if math.isnan(reason.rival_value):
+            says = "whose roles would have to be filled first"
+        lines.append(f"  rival     mode {reason.rival}, {says}; margin {self.prediction.margin:.3g}")
         return lines
 
 

@@ -102,13 +102,16 @@ class RoleRow:
     ----------
     mode
         Whose function reads the role.
+    type
+        The objects' type.
     roles
         What the function calls the objects; several where they are interchangeable.
     rule
-        What must hold of such an object B, A being the target.
+        What must hold of such an object B, A being the target; empty if any object of the type will do.
     """
 
     mode: int
+    type: str
     roles: tuple[str, ...]
     rule: str
 
@@ -126,7 +129,7 @@ class TargetReport:
     noise
         Training examples that no mode explains.
     modes, pairs, roles
-        The tables' rows; roles that any object of the type can play, for want of a choice, included.
+        The tables' rows. Roles without a body (the action) are left out: there is only one such object.
     """
 
     target: str
@@ -213,12 +216,13 @@ def _role_rows(part: PropertyModel) -> tuple[RoleRow, ...]:
     for mode in part.modes:
         alike: dict[RoleKind, list[str]] = {}
         for label, role in zip(mode.role_labels()[1:], mode.open_roles, strict=True):
-            alike.setdefault(RoleKind(*role.kind), []).append(label)
+            if role in part.casting.embodied(mode):
+                alike.setdefault(RoleKind(*role.kind), []).append(label)
         known = part.casting.classifiers.get(mode.id)
         rules = {d.kind: d.definition for d in known.descriptions} if known is not None else {}
         for kind, labels in alike.items():
-            rule = f"any {kind.type}" if rules.get(kind) is None else str(rules[kind])
-            rows.append(RoleRow(mode.id, tuple(labels), rule))
+            rule = "" if rules.get(kind) is None else str(rules[kind])
+            rows.append(RoleRow(mode.id, kind.type, tuple(labels), rule))
     return tuple(rows)
 
 
@@ -234,7 +238,7 @@ def _clause_table(pairs: tuple[PairTable, ...]) -> str:
     """All pairs' clauses under one heading, so that the columns of all pairs line up."""
     rows: list[list[Cell] | str] = []
     for pair in pairs:
-        rows.append(f"mode {pair.mode}, not {pair.rival}  (training accuracy {pair.performance:.4f})")
+        rows.append(f"mode {pair.mode} rather than {pair.rival}  (training accuracy {pair.performance:.4f})")
         for row in pair.rows:
             first, *rest = wrapped(row.clause, _CLAUSE_WIDTH, " ∧ ")
             rows.append(
@@ -246,8 +250,11 @@ def _clause_table(pairs: tuple[PairTable, ...]) -> str:
 
 
 def _role_table(roles: tuple[RoleRow, ...]) -> str:
-    rows: list[list[Cell]] = [[r.mode, ", ".join(r.roles), r.rule] for r in roles]
-    return table(["mode", "role", "played by an object B such that"], rows)
+    rows: list[list[Cell]] = []
+    for r in roles:
+        who = f"a {r.type} B with {r.rule}" if r.rule else f"any {r.type}"
+        rows.append([r.mode, ", ".join(r.roles), who])
+    return table(["mode", "role", "who plays it"], rows)
 
 
 def _legend(targets: tuple[TargetReport, ...]) -> str:
@@ -256,16 +263,16 @@ def _legend(targets: tuple[TargetReport, ...]) -> str:
     text = " ".join(row.clause + " ".join(row.tests) for pair in pairs for row in pair.rows)
     lines = []
     if pairs:
+        lines += ["mode i rather than j: the first clause that holds speaks for i; if none does, it is j."]
         lines += [
-            "'mode i, not j': the first clause that holds speaks for mode i; otherwise mode j is meant."
+            "A is the object whose property is predicted; another letter says that there is such an object."
         ]
-        lines += ["A is the object whose property is predicted; other letters: there is such an object."]
     if "*" in text:
         lines.append("* is any object: ¬touching(A, *) says that A touches nothing.")
     if "F" in text:
         lines.append("F1 is what mode 1 would predict, F1 - F2 by how much two modes differ.")
     if any(row.tests for pair in pairs for row in pair.rows):
         lines.append(
-            "tree: numeric tests behind a clause, 'tests -> whether it speaks for i (examples of i : j)'."
+            "tree: numeric tests behind a clause; yes: it speaks for mode i then (examples of i : of j)."
         )
     return "\n".join(lines)

@@ -1,0 +1,150 @@
+"""Roll-outs: whole episodes predicted from their first scenes alone, compared with what happened (§4.8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.experiments.blocks import Block
+from relgym.model.text import Cell, table
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import ACTION, Float2D, SceneLayout
+
+__all__ = ["STRAY", "RolloutErrors", "imagined", "rollouts"]
+
+STRAY = 1e-2
+"""A roll-out has failed when a position is off by more than this at some step, in units."""
+
+
+@dataclass(frozen=True, slots=True)
+class RolloutErrors:
+    """What became of roll-outs.
+
+    Attributes
+    ----------
+    trials, steps
+        How many roll-outs, and how long.
+    failed
+        How many were off by more than `STRAY` somewhere, or stopped early; all, and those during whose truth
+        no corner was hit.
+    stopped
+        How many of those stopped early, for want of a prediction.
+    corner
+        Trials during whose truth a corner was hit.
+    median
+        Median over the trials that didn't fail of their largest position error, in units; NaN if all failed.
+    """
+
+    trials: int
+    steps: int
+    failed: int
+    failed_without_corner: int
+    stopped: int
+    corner: int
+    median: float
+
+    def __str__(self) -> str:
+        rows: list[list[Cell]] = [
+            ["with a corner hit", self.corner, self.failed - self.failed_without_corner],
+            ["without", self.trials - self.corner, self.failed_without_corner],
+            ["all", self.trials, self.failed],
+        ]
+        return (
+            table([f"roll-outs of {self.steps} steps", "trials", "failed"], rows)
+            + f"\n\nfailed: a position is off by more than {STRAY:g} at some step, or the roll-out stopped "
+            + f"early ({self.stopped})\nlargest error of the others, median: {self.median:.1e}"
+        )
+
+
+def rollouts(model: WorldModel, blocks: Sequence[Block]) -> RolloutErrors:
+    """Predict every block from its first scene alone and compare with what happened (§4.8).
+
+    Actions and exogenous properties come from the block; everything else from the model's own predictions.
+
+    Parameters
+    ----------
+    model
+        The model; unchanged.
+    blocks
+        Blocks of equal length, which the model hasn't learned from.
+    """
+    errors, stopped = [], []
+    for _, group in groupby(blocks, key=lambda block: block.layout.names):
+        part = list(group)
+        off, early = _roll(model, np.stack([b.vectors for b in part]), part[0].layout)
+        errors.append(off)
+        stopped.append(early)
+    largest, early = np.concatenate(errors), np.concatenate(stopped)
+    corner = np.array([bool(b.truth.corner.any()) for b in blocks])
+    failed = early | (largest > STRAY)
+    median = float(np.median(largest[~failed])) if (~failed).any() else float("nan")
+    return RolloutErrors(
+        trials=len(blocks),
+        steps=len(blocks[0]),
+        failed=int(failed.sum()),
+        failed_without_corner=int((failed & ~corner).sum()),
+        stopped=int(early.sum()),
+        corner=int(corner.sum()),
+        median=median,
+    )
+
+
+def imagined(model: WorldModel, vectors: Float2D, layout: SceneLayout) -> tuple[Float2D, int]:
+    """A roll-out from the first of some state vectors, of the same shape, and how many steps were predicted.
+
+    What comes from outside the world (actions, exogenous properties) is taken from `vectors`; rows beyond the
+    last prediction repeat it.
+    """
+    outside = _outside(layout)
+    result = np.repeat(vectors[:1], len(vectors), axis=0)
+    for k in range(1, len(vectors)):
+        step = model.predict_batch(layout, result[k - 1 : k])
+        if not step.ok[0]:
+            return result, k - 1
+        result[k:] = step.vectors[0]
+        result[k, outside] = vectors[k, outside]
+    return result, len(vectors) - 1
+
+
+def _roll(
+    model: WorldModel, truth: NDArray[np.float64], layout: SceneLayout
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Largest position error of each trial, and whether it stopped early.
+
+    `truth` has shape ``(trials, steps + 1, width)``.
+    """
+    outside, places = _outside(layout), _positions(layout)
+    now = truth[:, 0].copy()
+    largest, stopped = np.zeros(len(truth)), np.zeros(len(truth), dtype=np.bool_)
+    for k in range(1, truth.shape[1]):
+        going = np.flatnonzero(~stopped)
+        if not len(going):
+            break
+        step = model.predict_batch(layout, now[going])
+        stopped[going[~step.ok]] = True
+        now[going] = step.vectors
+        now[:, outside] = truth[:, k][:, outside]
+        off = np.abs(now[:, places] - truth[:, k][:, places]).max(axis=1)
+        largest = np.where(stopped, largest, np.maximum(largest, off))
+    return largest, stopped
+
+
+def _outside(layout: SceneLayout) -> list[int]:
+    """Columns that no model predicts: actions and exogenous properties."""
+    return [
+        layout.column(i, prop)
+        for i, t in enumerate(layout.types)
+        for prop in t.properties
+        if t.name == ACTION or prop in t.exogenous
+    ]
+
+
+def _positions(layout: SceneLayout) -> list[int]:
+    """Columns of all bodies' positions."""
+    return [
+        layout.offsets[i] + k for i in layout.bodies for k in layout.types[i].pose_columns()[:3] if k >= 0
+    ]
