@@ -199,7 +199,10 @@ class Percept:
         padded = self._padded()
         own = padded[:, perception.own_columns(self.layout, target)]
         numbers = padded[:, perception.feature_columns(self.layout)]
-        pair = np.concatenate([relations.contacts(body), numbers], axis=2)
+        contacts = relations.contacts(body)
+        # Contact facts are facts of touching pairs (design §4): a normal towards something far away says nothing.
+        contacts[~relations.relation("intersect")[:, body]] = np.nan
+        pair = np.concatenate([contacts, numbers], axis=2)
         pair[:, body] = np.nan
         table = perception.unary_table(self.layout)
         every = np.broadcast_to(table, (n, *table.shape))
