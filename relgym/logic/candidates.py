@@ -98,9 +98,15 @@ class Score:
         if self.choice == "negatives":
             removed = self.negatives - counts.negatives
             return _rounded(np.where(counts.positives > 0, removed, -np.inf))
-        good = np.where(counts.positives > 0, counts.good, 1.0)
-        gain = counts.positives * (self.information - np.log2((good + counts.bad) / good))
-        return _rounded(np.where(counts.positives > 0, gain, -np.inf))
+        # Sums of fractional weights leave crumbs where nothing is left.
+        matched = (counts.positives > _CRUMB) & (counts.good > _CRUMB)
+        good = np.where(matched, counts.good, 1.0)
+        gain = counts.positives * (self.information - np.log2((good + np.maximum(counts.bad, 0.0)) / good))
+        return _rounded(np.where(matched, gain, -np.inf))
+
+
+_CRUMB = 1e-9
+"""Weight below which a sum of weights counts as zero."""
 
 
 def _rounded(values: Float) -> Float:
