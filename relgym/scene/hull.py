@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,9 @@ def outline_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array(lower[:-1] + upper[:-1])
 
 
-def _merge(simplices: NDArray[np.intp], neighbours: NDArray[np.intp], normals: NDArray[np.float64]) -> Facets:
+def _merge(
+    simplices: NDArray[np.integer[Any]], neighbours: NDArray[np.integer[Any]], normals: NDArray[np.float64]
+) -> Facets:
     # Qhull splits faces into triangles; those in one plane are one face, and what divides them is no edge.
     plane = np.full(len(simplices), -1)
     faces: list[int] = []

@@ -149,7 +149,7 @@ class ArrayGeometry:
         self._memo: _Memo | None = None
 
     def measure(self, pose: FloatArray) -> Measured:
-        """Measure n scenes (`Geometry.measure`). Cost: about 1 us a scene for a ball among six boxes."""
+        """Measure n scenes (`Geometry.measure`). Cost: about 3 us a scene of seven planar bodies."""
         single = pose.shape[2] == 1
         if single and self._memo is not None:
             return self._again(pose, self._memo)

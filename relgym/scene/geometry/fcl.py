@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import fcl
+import fcl as library
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +30,8 @@ from relgym.scene.geometry.vectors import FloatArray, dot, norm, rotation
 from relgym.scene.shapes import Box, Shape, Sphere, outline
 
 __all__ = ["FclGeometry"]
+
+fcl: Any = library  # a compiled module that declares no types
 
 _PROOF = 5e-11
 """Largest difference between the two bounds with which an answer stands, in units of length."""
@@ -65,6 +67,11 @@ class FclGeometry:
         self._round = np.array([isinstance(shape, Sphere) for shape in bodies.shapes], dtype=bool)
         self._first, self._second = pairs_of(len(bodies.shapes))
         self._meshes = [None if isinstance(s, Sphere) else _mesh(s, axes) for s in bodies.shapes]
+        # fcl's way to write faces: the number of corners, then their indices, face after face.
+        self._faces = [
+            None if m is None else np.concatenate([[len(ring), *ring] for ring in m.rings()])
+            for m in self._meshes
+        ]
         self._objects: list[Any] = [None] * len(bodies.shapes)
         self._extents: list[tuple[float, ...]] = [()] * len(bodies.shapes)
 
@@ -73,7 +80,7 @@ class FclGeometry:
         return {**self.__dict__, "_objects": [None] * count, "_extents": [()] * count}
 
     def measure(self, pose: FloatArray) -> Measured:
-        """Measure n scenes (`Geometry.measure`). Cost: about 10 us a pair."""
+        """Measure n scenes (`Geometry.measure`). Cost: about 0.5 ms a scene of five bodies."""
         solids = self._exact.place(pose)
         low, high = self._exact.bounds(pose, solids)
         shape = (len(self._first), pose.shape[2])
@@ -162,9 +169,7 @@ class FclGeometry:
         if isinstance(self._bodies.shapes[body], Box):
             return fcl.Box(*extent)
         corners = np.ascontiguousarray(found.corners * extent)
-        rings = found.rings()
-        faces = np.concatenate([[len(ring), *ring] for ring in rings])
-        return fcl.Convex(corners, len(rings), faces)
+        return fcl.Convex(corners, len(found.normals), self._faces[body])
 
     def _transform(self, pose: NDArray[np.float64]) -> Any:
         axes = self._axes
