@@ -20,9 +20,12 @@ from relgym.logic.facts import Bool, Float, Int
 from relgym.logic.tables import NumericStack, Tables, Template
 from relgym.logic.thresholds import simplest_between
 
-__all__ = ["Block", "Counts", "Growing", "Score", "Weights", "blocks", "extend"]
+__all__ = ["EPS", "Block", "Counts", "Growing", "Score", "Weights", "blocks", "extend"]
 
 _Tensor: TypeAlias = NDArray[np.float32]
+
+EPS: Final = 1e-7
+"""Weights below this are crumbs that sums of fractions leave where nothing is left."""
 
 _CELLS: Final = 1 << 24
 """No new variable may make a clause's bindings larger than this."""
@@ -95,18 +98,12 @@ class Score:
 
     def __call__(self, counts: Counts) -> Float:
         """Return the scores, rounded so that sums in another order rank the same."""
+        some = counts.positives > EPS
         if self.choice == "negatives":
-            removed = self.negatives - counts.negatives
-            return _rounded(np.where(counts.positives > 0, removed, -np.inf))
-        # Sums of fractional weights leave crumbs where nothing is left.
-        matched = (counts.positives > _CRUMB) & (counts.good > _CRUMB)
-        good = np.where(matched, counts.good, 1.0)
+            return _rounded(np.where(some, self.negatives - counts.negatives, -np.inf))
+        good = np.where(some, counts.good, 1.0)
         gain = counts.positives * (self.information - np.log2((good + np.maximum(counts.bad, 0.0)) / good))
-        return _rounded(np.where(matched, gain, -np.inf))
-
-
-_CRUMB = 1e-9
-"""Weight below which a sum of weights counts as zero."""
+        return _rounded(np.where(some, gain, -np.inf))
 
 
 def _rounded(values: Float) -> Float:

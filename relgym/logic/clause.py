@@ -174,11 +174,11 @@ class Clause:
         waiting, ordered = list(self.literals), list[Literal]()
         bound = set(range(self.arity))
         while waiting:
-            ready = [each for each in waiting if not each.variables or bound & set(each.variables)]
-            ready = [each for each in ready if not each.negated or bound >= set(each.variables)] or waiting
-            ordered.append(ready[0])
-            bound |= set(ready[0].variables)
-            waiting.remove(ready[0])
+            safe = [each for each in waiting if not each.negated or bound >= set(each.variables)]
+            joined = [each for each in safe if not each.variables or bound & set(each.variables)]
+            ordered.append((joined or safe)[0])
+            bound |= set(ordered[-1].variables)
+            waiting.remove(ordered[-1])
         return Clause.of(ordered, self.arity)
 
     def __iter__(self) -> Iterator[Literal]:

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from relgym.logic.candidates import Growing, Score, Weights
+from relgym.logic.candidates import EPS, Growing, Score, Weights
 from relgym.logic.clause import Clause, Coverage, Definition
 from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
@@ -22,9 +22,6 @@ __all__ = ["Cover"]
 
 _ATTEMPTS: Final = 8
 """How many clauses of one search are pruned and judged before the search counts as fruitless."""
-
-_EPS: Final = 1e-7
-"""Weights below this are rounding."""
 
 _SHORT: Final = 3
 """A definition without errors and of no more literals isn't tried to be told more briefly."""
@@ -68,16 +65,16 @@ class Cover:
         if not self._config.mdl:
             return self._definition(self._clauses(True, math.inf))
         best = self._definition(self._clauses(False, limit))
-        if best.errors > _EPS or sum(map(len, best.clauses)) > _SHORT:
+        if best.errors > EPS or sum(map(len, best.clauses)) > _SHORT:
             other = self._definition(self._clauses(True, min(limit, best.bits)))
-            best = other if other.bits < best.bits - _EPS else best
+            best = other if other.bits < best.bits - EPS else best
         return replace(best, work=self._work)
 
     def _clauses(self, pure: bool, limit: float) -> list[Clause]:
         """Add clauses, `pure` ones if any, until all is covered or they cost more bits than `limit`."""
         alive = np.ones(self._tables.size, dtype=np.bool_)
         clauses: list[Clause] = []
-        while len(clauses) < self._config.max_clauses and self._problem.count(alive).positives > _EPS:
+        while len(clauses) < self._config.max_clauses and self._problem.count(alive).positives > EPS:
             clause = next(self._acceptable(alive, pure), None)
             if clause is None or self._length.clauses([*clauses, clause]) > limit:
                 break
@@ -110,13 +107,13 @@ class Cover:
         for place, growing in enumerate(self._harvests[key].clauses):
             left = Coverage(float(growing.left.positives), float(growing.left.negatives))
             bits = self._length.literals(growing.literals, self._tables.arity)
-            clean = pure and left.negatives <= _EPS
+            clean = pure and left.negatives <= EPS
             value = left.positives * information - bits if clean else self._length.saving(bits, left, whole)
             keys[place] = (not clean, -round(value, 7), round(bits, 7), place)
         return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
 
     def _accepts(self, clause: Clause, covered: Coverage, whole: Coverage) -> bool:
-        if covered.positives <= covered.negatives + _EPS or covered.precision < self._config.min_precision:
+        if covered.positives <= covered.negatives + EPS or covered.precision < self._config.min_precision:
             return False
         return not self._config.mdl or self._length.saving(self._length.clause(clause), covered, whole) > 0
 
@@ -125,7 +122,7 @@ class Cover:
         matched = [self._problem.matches(clause) for clause in clauses]
         for place in reversed(range(len(clauses))):
             others = matched[:place] + matched[place + 1 :]
-            if others and self._errors(others) <= self._errors(matched) + _EPS:
+            if others and self._errors(others) <= self._errors(matched) + EPS:
                 matched, clauses = others, clauses[:place] + clauses[place + 1 :]
         return clauses
 

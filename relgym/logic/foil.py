@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from relgym.errors import ConfigError
+from relgym.logic.candidates import EPS
 from relgym.logic.clause import Definition
 from relgym.logic.cover import Cover
 from relgym.logic.facts import Facts, Float, Int
@@ -88,10 +89,10 @@ def learn_both(
     """
     task = _cover(facts, positives, negatives, pos_weights, neg_weights, config)
     given = task.solve()
-    if given.errors <= 0 and sum(map(len, given.clauses)) <= 1:
+    if given.errors <= EPS and sum(map(len, given.clauses)) <= 1:
         return given  # one literal without errors: the other side can't be told more simply
     # nothing beats a definition without errors but one of fewer bits
-    other = task.swapped().solve(given.bits if given.errors <= 0 else math.inf)
+    other = task.swapped().solve(given.bits if given.errors <= EPS else math.inf)
     work = given.work + other.work
     if (round(other.errors, 7), round(other.bits, 7)) < (round(given.errors, 7), round(given.bits, 7)):
         return replace(other, negated=True, work=work)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.logic.candidates import Block, Counts, Growing, Score, Weights, blocks, extend
+from relgym.logic.candidates import EPS, Block, Counts, Growing, Score, Weights, blocks, extend
 from relgym.logic.clause import Coverage
 from relgym.logic.description import DescriptionLength
 from relgym.logic.settings import FoilConfig
@@ -88,8 +88,8 @@ def _new(children: Iterator[Growing], wanted: int, pool: dict[bytes, Growing]) -
 
 def _promising(beam: Sequence[Growing], pool: Iterable[Growing]) -> list[Growing]:
     """Leave out clauses that can't cover more positives without negatives than a clause already does."""
-    reached = max((float(each.left.positives) for each in pool if each.left.negatives <= 0), default=0.0)
-    return [each for each in beam if each.left.negatives > 0 and each.left.positives > reached]
+    reached = max((float(each.left.positives) for each in pool if each.left.negatives <= EPS), default=0.0)
+    return [each for each in beam if each.left.negatives > EPS and each.left.positives > reached]
 
 
 def _may_pay(growing: Growing, arity: int, length: DescriptionLength, whole: Coverage) -> bool:
@@ -124,7 +124,7 @@ class _Candidates:
             self._positives = self._join(lambda _, block: np.round(block.counts.positives, 7))
             self._negatives = self._join(lambda _, block: np.round(block.counts.negatives, 7))
             self._introduced = self._join(lambda _, block: block.introduced())
-            self._useful = (self._positives > 0) & self._join(_changes)
+            self._useful = (self._positives > EPS) & self._join(_changes)
             names = self._join(lambda _, block: block.names)
             negated = self._join(lambda _, block: np.full(len(block.templates), block.negated))
             numeric = self._join(lambda _, block: np.full(len(block.templates), block.op is not None))
@@ -166,4 +166,4 @@ class _Candidates:
 def _changes(growing: Growing, block: Block) -> NDArray[np.bool_]:
     """Which candidates introduce a variable or leave fewer bindings than there were."""
     lost = growing.left.good + growing.left.bad - block.counts.good - block.counts.bad
-    return np.asarray((block.introduced() > 0) | (lost > 1e-7))
+    return np.asarray((block.introduced() > 0) | (lost > EPS))
