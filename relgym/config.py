@@ -58,7 +58,7 @@ class ClassificationConfig:
     mdl
         Whether a clause must pay for its bits in exceptions explained. Default true.
     min_precision
-        Least share of positives among the examples that a clause covers, weighted. Default 0.5, range [0, 1]
+        Least share of positives among the examples that a clause covers, weighted. Default 0.5, range [0.5, 1]
         (the original: 0.9 on a held-out quarter). Raising it leaves more to the tree of the fall-through.
     clause_tree_threshold
         A clause whose false-positive rate exceeds this gets a decision tree (§3.4.4). Default 0.01, range [0,
@@ -123,6 +123,7 @@ class ClassificationConfig:
         _at_least(self, 0, "max_new_variables")
         _at_least(self, 100, "max_exemplars")
         _unit(self, "min_precision", "clause_tree_threshold", "fall_through_tree_threshold", "class_balance")
+        _at_least(self, 0.5, "min_precision")
         if not self.relearn_growth > 1:
             raise ConfigError(f"relearn_growth must be greater than 1, got {self.relearn_growth}")
 
@@ -297,7 +298,7 @@ def _one_of(config: object, **allowed: tuple[str, ...]) -> None:
             raise ConfigError(f"{name} must be one of {values}, got {getattr(config, name)!r}")
 
 
-def _at_least(config: object, low: int, *names: str) -> None:
+def _at_least(config: object, low: float, *names: str) -> None:
     for name in names:
         if not getattr(config, name) >= low:
             raise ConfigError(f"{name} must be at least {low}, got {getattr(config, name)!r}")

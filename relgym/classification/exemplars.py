@@ -20,7 +20,7 @@ from relgym.classification.columns import Column, Columns
 from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabulary, check_example
 from relgym.config import ClassificationConfig
 
-__all__ = ["Exemplars"]
+__all__ = ["Exemplars", "dyadic"]
 
 _UNDEFINED: Final = float("nan")
 _MASK64: Final = (1 << 64) - 1
@@ -199,14 +199,17 @@ class Exemplars:
         self.version += 1
 
     def weights(self) -> Floats:
-        """How many seen examples each slot stands for: 1 if hard, an equal share of the rest otherwise."""
+        """How many seen examples each slot stands for: 1 if hard, an equal share of the rest otherwise.
+
+        Rounded to 64ths, so that sums of weights are exact in any order.
+        """
         cell, hard = self.columns["cell"], self.columns["hard"]
         counts = np.array([c.count for c in self._cells])
         kept = np.bincount(cell, minlength=len(counts))
         hards = np.bincount(cell[hard], minlength=len(counts))
         soft = kept - hards
         share = np.where(soft > 0, (counts - hards) / np.maximum(soft, 1), counts / np.maximum(kept, 1))
-        weights: Floats = np.where(hard & (soft[cell] > 0), 1.0, share[cell])
+        weights: Floats = np.where(hard & (soft[cell] > 0), 1.0, dyadic(share[cell]))
         return weights
 
     def to_dict(self) -> dict[str, Any]:
@@ -271,6 +274,11 @@ class Exemplars:
             self.columns.keep(np.array(kept, dtype=np.intp))
             for cell in self._cells:
                 cell.members = [new[slot] for slot in cell.members]
+
+
+def dyadic(weights: Floats) -> Floats:
+    """Weights rounded to 64ths, at least one of them: rounding residues would pass for examples."""
+    return np.maximum(np.round(weights * 64.0), 1.0) / 64.0
 
 
 def _hash(key: bytes, count: float) -> int:

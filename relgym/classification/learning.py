@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.classification.binary import BinaryClassifier, majority, tree_columns, tree_features
 from relgym.classification.examples import Bools, Floats
+from relgym.classification.exemplars import dyadic
 from relgym.classification.views import Context, Scope, View
 from relgym.config import ClassificationConfig
 from relgym.logic.clause import Clause, Definition
@@ -59,7 +60,7 @@ class Lesson:
             return self
         factors = [(count / total) ** -exponent for count in self.counts]
         weights = self.weights * np.where(self.is_i, *factors)
-        return Lesson(self.view, self.rows, self.is_i, weights * (total / weights.sum()))
+        return Lesson(self.view, self.rows, self.is_i, dyadic(weights * (total / weights.sum())))
 
 
 def foil_config(config: ClassificationConfig) -> FoilConfig:

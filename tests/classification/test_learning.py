@@ -1,0 +1,165 @@
+"""One pair of modes: contexts, polarities, numeric literals, and trees where clauses can't tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from toy_situations import BALL_VOCABULARY, BOUNCE, FLY, HALT, RAMP, Labelled, ball_stream
+
+from relgym.classification.binary import BinaryClassifier
+from relgym.classification.examples import Example, ExampleBatch, Vocabulary
+from relgym.classification.learning import Lesson, learn_pair
+from relgym.classification.views import Scope, View
+from relgym.config import ClassificationConfig
+
+_THESIS = ClassificationConfig.thesis()
+
+
+@pytest.fixture(scope="module")
+def items() -> list[Labelled]:
+    return list(ball_stream(3000, rng=np.random.default_rng(0), ramp_share=0.01, halt_share=0.02))
+
+
+def _lesson(items: list[Labelled], i: int, j: int) -> Lesson:
+    mine = [item for item in items if item.mode in (i, j)]
+    batch = ExampleBatch.stack([item.example for item in mine])
+    view = View.of_batch(batch, tuple(range(6)), np.array([item.values for item in mine]))
+    return Lesson(view, np.arange(len(mine)), np.array([m.mode == i for m in mine]), np.ones(len(mine)))
+
+
+def _learn(
+    items: list[Labelled], i: int, j: int, config: ClassificationConfig | None = None
+) -> tuple[BinaryClassifier, float]:
+    config = config or ClassificationConfig()
+    lesson = _lesson(items, i, j)
+    found = learn_pair(i, j, lesson, Scope.of(BALL_VOCABULARY, config, (i, j)), config)
+    return found, float(np.mean(found.says_i_batch(lesson.view, lesson.rows) != lesson.is_i))
+
+
+def test_conjunction_binds_the_object_that_is_approached(items: list[Labelled]) -> None:
+    found, errors = _learn(items, FLY, RAMP)
+    assert errors == 0
+    assert found.definition.negated
+    assert found.context == "touching"
+    assert {literal.relation for clause in found.definition.clauses for literal in clause} == {
+        "approach",
+        "ramp",
+    }
+
+
+def test_halting_is_a_threshold_on_a_mode_function(items: list[Labelled]) -> None:
+    found, errors = _learn(items, 3, HALT)
+    assert errors == 0
+    [clause] = found.definition.clauses
+    [literal] = clause.literals
+    assert (literal.relation, literal.op, literal.threshold) == ("F3", ">", pytest.approx(0.0, abs=2e-3))
+
+
+@pytest.mark.parametrize(
+    ("change", "forbidden"),
+    [
+        ({"numeric_literals": False}, {"approach", "F3", "vx"}),
+        ({"contact_facts": False}, {"approach", "normal-x", "normal-y", "distance"}),
+        ({"mode_function_features": False}, {"F0", "F1", "F0 - F1"}),
+    ],
+)
+def test_switched_off_names_stay_out_of_clauses(
+    items: list[Labelled], change: dict[str, bool], forbidden: set[str]
+) -> None:
+    found, _ = _learn(items, FLY, BOUNCE, ClassificationConfig(**change))
+    used = {literal.relation for clause in found.definition.clauses for literal in clause}
+    trees = [tree for tree in (*found.clause_trees, found.fall_through_tree) if tree]
+    assert not used & forbidden
+    if "numeric_literals" not in change:
+        assert not {c.split("(")[0] for tree in trees for c in tree.columns} & forbidden
+
+
+def test_tree_helps_where_relations_cannot(items: list[Labelled]) -> None:
+    # Sliding left or right is the same relational state; the thesis' trees see the velocity (§3.4.4).
+    without, errors_without = _learn(
+        items, 3, 4, ClassificationConfig.thesis(clause_tree_threshold=1.0, fall_through_tree_threshold=1.0)
+    )
+    found, errors = _learn(items, 3, 4, _THESIS)
+    assert not any(without.clause_trees)
+    assert errors_without > 0.3
+    assert errors <= 0.01
+    tree = next(tree for tree in (*found.clause_trees, found.fall_through_tree) if tree)
+    assert "vx" in str(tree)
+    assert found.describe()[-1][3] or found.describe()[0][3]
+
+
+def test_tree_of_a_clause_sees_the_bound_object() -> None:
+    rng = np.random.default_rng(1)
+    vocabulary = Vocabulary(relations=("intersect",), unary=("ball", "box"), pair=("friction",))
+    config = ClassificationConfig.thesis(both_polarities=False)
+    examples, labels = [], []
+    for _ in range(300):
+        touching, friction = rng.random() < 0.7, rng.random()
+        table = np.zeros((1, 2, 2), dtype=np.bool_)
+        table[0, 0, 1] = table[0, 1, 0] = touching
+        pair = np.array([[np.nan], [friction]])
+        examples.append(Example(table, np.eye(2, dtype=bool), np.ones(2, bool), pair, np.empty(0)))
+        labels.append(touching and friction > 0.3)
+    view = View.of_batch(ExampleBatch.stack(examples), (0, 1), np.zeros((300, 2)))
+    lesson = Lesson(view, np.arange(300), np.array(labels), np.ones(300))
+    found = learn_pair(0, 1, lesson, Scope.of(vocabulary, config, (0, 1)), config)
+    tree = next(tree for tree in found.clause_trees if tree)
+    assert tree.columns == ("friction(A, B)",)
+    assert np.mean(found.says_i_batch(view, lesson.rows) != lesson.is_i) <= 0.01
+
+
+def test_all_context_is_used_only_if_it_tells_more() -> None:
+    # "Some object, however far, is red" can't be said of close objects.
+    rng = np.random.default_rng(0)
+    vocabulary = Vocabulary(relations=("intersect",), unary=("red",))
+    examples, labels = [], []
+    for _ in range(60):
+        red = rng.random() < 0.5
+        unary = np.array([[False, False, red]])
+        close = np.array([True, True, False])
+        table = np.zeros((1, 3, 3), dtype=np.bool_)
+        examples.append(Example(table, unary, close, np.empty((3, 0)), np.empty(0)))
+        labels.append(red)
+    view = View.of_batch(ExampleBatch.stack(examples), (0, 1), np.full((60, 2), np.nan))
+    lesson = Lesson(view, np.arange(60), np.array(labels), np.ones(60))
+    scope = Scope.of(vocabulary, ClassificationConfig(), (0, 1))
+    assert learn_pair(0, 1, lesson, scope, ClassificationConfig()).context == "all"
+    touching = learn_pair(0, 1, lesson, scope, ClassificationConfig(context="touching"))
+    assert touching.context == "touching"
+    assert touching.describe()[-1][1] < 60
+
+
+@pytest.mark.parametrize("only", [FLY, BOUNCE])
+def test_one_class_always_wins(items: list[Labelled], only: int) -> None:
+    mine = [item for item in items if item.mode == only]
+    lesson = _lesson(mine, FLY, BOUNCE)
+    found = learn_pair(
+        FLY, BOUNCE, lesson, Scope.of(BALL_VOCABULARY, ClassificationConfig()), ClassificationConfig()
+    )
+    assert found.definition.clauses == ()
+    assert set(found.says_i_batch(lesson.view, lesson.rows)) == {only == FLY}
+    for_i, for_j = found.votes("soft")[0]
+    assert (for_i > for_j) == (only == FLY)
+
+
+def test_balancing_keeps_the_total_and_raises_the_rare_class(items: list[Labelled]) -> None:
+    lesson = _lesson(items, FLY, RAMP)
+    whole, rare = sum(lesson.counts), lesson.counts[1]
+    assert lesson.balanced(0.0) is lesson
+    full = lesson.balanced(1.0).counts
+    assert sum(full) == pytest.approx(whole, rel=1e-2)
+    assert full[1] == pytest.approx(whole / 2, rel=1e-2)
+    assert rare < lesson.balanced(0.5).counts[1] < full[1]
+
+
+def test_json_round_trip_keeps_decisions_and_votes(items: list[Labelled]) -> None:
+    for i, j, config in ((FLY, BOUNCE, ClassificationConfig()), (3, 4, _THESIS)):
+        found, _ = _learn(items, i, j, config)
+        again = BinaryClassifier.from_dict(found.to_dict(), found.scope)
+        lesson = _lesson(items, i, j)
+        np.testing.assert_array_equal(
+            again.decide_batch(lesson.view, lesson.rows), found.decide_batch(lesson.view, lesson.rows)
+        )
+        assert again.votes("soft") == found.votes("soft")
+        assert again.votes("hard") == found.votes("hard")
+        assert again.to_dict() == found.to_dict()

@@ -1,0 +1,95 @@
+"""Votes counted by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from toy_situations import BALL_VOCABULARY, ball_stream
+
+from relgym.classification.binary import VOTE_UNIT, BinaryClassifier
+from relgym.classification.examples import ExampleBatch
+from relgym.classification.familiarity import Familiarity
+from relgym.classification.views import Scope
+from relgym.classification.voting import Voting
+from relgym.config import ClassificationConfig
+from relgym.logic.clause import Clause, Definition, Literal
+
+_ITEM = next(ball_stream(1, rng=np.random.default_rng(0)))
+_COUNTS = {1: 10.0, 2: 30.0, 3: 20.0}
+_NOTHING_SEEN = Familiarity((), [])
+_EVERYTHING_SEEN = Familiarity((), [0])
+
+
+def _pair(i: int, j: int, counts: list[list[float]], fires: bool) -> BinaryClassifier:
+    scope = Scope.of(BALL_VOCABULARY, ClassificationConfig(), (i, j))
+    clause = Clause((Literal("vx", (), op="<=", threshold=9.0 if fires else -9.0),))
+    return BinaryClassifier(i, j, scope, "touching", Definition((clause,)), counts=counts)
+
+
+def _voting(how: str) -> Voting:
+    voting = Voting(BALL_VOCABULARY, (1, 2, 3), how)  # type: ignore[arg-type]
+    # 1 beats 2 for sure; 3 narrowly beats 1; 2 narrowly beats 3.
+    pairs = [
+        _pair(1, 2, [[98.0, 0.0], [0.0, 98.0]], fires=True),
+        _pair(1, 3, [[9.0, 1.0], [4.0, 5.0]], fires=False),
+        _pair(2, 3, [[5.0, 4.0], [0.0, 9.0]], fires=True),
+    ]
+    voting.set_pairs(pairs)
+    return voting
+
+
+def test_hard_votes_tie_and_the_more_frequent_mode_wins() -> None:
+    ranking = _voting("hard").rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
+    assert ranking.modes == (2, 3, 1)
+    assert ranking.scores == (1.0, 1.0, 1.0)
+    assert ranking.margin == 0.0
+
+
+def test_soft_votes_let_the_sure_pair_decide() -> None:
+    ranking = _voting("soft").rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
+    expected = {
+        1: math.log(99 / 100) + math.log(5 / 11),
+        2: math.log(1 / 100) + math.log(6 / 11),
+        3: math.log(6 / 11) + math.log(5 / 11),
+    }
+    assert ranking.modes == (1, 3, 2)
+    assert ranking.scores == pytest.approx([expected[mode] for mode in ranking.modes], abs=1e-9)
+    assert ranking.margin == pytest.approx(expected[1] - expected[3], abs=1e-9)
+
+
+def test_votes_are_whole_units() -> None:
+    for pair in _voting("soft")._classifiers:
+        for votes in pair.votes("soft"):
+            assert all(isinstance(vote, int) and -10 * VOTE_UNIT < vote < 0 for vote in votes)
+
+
+def test_familiar_is_what_was_seen_or_what_a_clause_speaks_for() -> None:
+    voting = _voting("soft")
+    values = [0.0] * 3
+    assert voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN).familiar  # a clause spoke for mode 1
+    assert not voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN).seen
+    sure = [[9.0, 0.0], [0.0, 9.0]]
+    voting.set_pairs([_pair(i, j, sure, fires=False) for i, j in ((1, 2), (1, 3), (2, 3))])
+    silent = voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN)
+    assert silent.modes[0] == 3
+    assert not silent.familiar
+    assert voting.rank(_ITEM.example, values, _COUNTS, _EVERYTHING_SEEN).familiar
+
+
+def test_no_modes_no_winner() -> None:
+    voting = Voting(BALL_VOCABULARY, (), "soft")
+    assert voting.rank(_ITEM.example, [], {}, _NOTHING_SEEN).modes == ()
+    batch = voting.rank_batch(ExampleBatch.of(_ITEM.example), np.empty((1, 0)), {}, _NOTHING_SEEN)
+    assert batch.modes.shape == (1, 0)
+    assert batch[0] == voting.rank(_ITEM.example, [], {}, _NOTHING_SEEN)
+
+
+def test_verdicts_give_clause_counts_and_probability() -> None:
+    voting = _voting("soft")
+    first, second = voting.verdicts(_ITEM.example, [0.0] * 3, (1, 2, 3))
+    assert (first.winner, first.rival, str(first.clause)) == (1, 2, "vx <= 9")
+    assert (first.correct, first.incorrect, first.probability) == (98.0, 0.0, 99 / 100)
+    assert (second.winner, second.rival, second.clause) == (3, 1, None)
+    assert (second.correct, second.incorrect) == (5.0, 4.0)
