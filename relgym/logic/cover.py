@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from relgym.logic.candidates import EPS, Growing, Score, Weights
 from relgym.logic.clause import Clause, Coverage, Definition
 from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
+from relgym.logic.growing import EPS, Growing, Score, Weights
 from relgym.logic.pruning import Problem, center_thresholds, prune
 from relgym.logic.search import Harvest, grow
 from relgym.logic.settings import FoilConfig
@@ -22,6 +22,9 @@ __all__ = ["Cover"]
 
 _ATTEMPTS: Final = 8
 """How many clauses of one search are pruned and judged before the search counts as fruitless."""
+
+_RELAID: Final = 0.7
+"""Share of the tuples below which a search gets tables of its own."""
 
 _SHORT: Final = 3
 """A definition without errors and of no more literals isn't tried to be told more briefly."""
@@ -96,10 +99,7 @@ class Cover:
     def _ranked(self, alive: Bool, pure: bool) -> list[Growing]:
         key = alive.tobytes()
         if key not in self._harvests:
-            weights = np.where(alive, self._problem.weights, 0.0)
-            split = self._tables.split
-            classes = Weights(weights[:split], weights[split:], self._swapped)
-            harvest = self._harvests[key] = grow(self._tables, classes, self._config, self._length)
+            harvest = self._harvests[key] = self._harvest(alive)
             self._work += harvest.work
         whole = self._problem.count(alive)
         information = Score(whole.positives, whole.negatives).information
@@ -111,6 +111,16 @@ class Cover:
             value = left.positives * information - bits if clean else self._length.saving(bits, left, whole)
             keys[place] = (not clean, -round(value, 7), round(bits, 7), place)
         return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
+
+    def _harvest(self, alive: Bool) -> Harvest:
+        """Search among the tuples left. Where many are gone it is cheaper to lay out the others anew."""
+        tables, weights = self._tables, self._problem.weights
+        if alive.mean() < _RELAID:
+            tables, weights = tables.restricted(alive), weights[alive]
+        else:
+            weights = np.where(alive, weights, 0.0)
+        classes = Weights(weights[: tables.split], weights[tables.split :], self._swapped)
+        return grow(tables, classes, self._config, self._length)
 
     def _accepts(self, clause: Clause, covered: Coverage, whole: Coverage) -> bool:
         if covered.positives <= covered.negatives + EPS or covered.precision < self._config.min_precision:

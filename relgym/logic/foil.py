@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from relgym.errors import ConfigError
-from relgym.logic.candidates import EPS
 from relgym.logic.clause import Definition
 from relgym.logic.cover import Cover
 from relgym.logic.facts import Facts, Float, Int
+from relgym.logic.growing import EPS
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.logic.candidates import EPS, Block, Counts, Growing, Score, Weights, blocks, extend
+from relgym.logic.candidates import Block, blocks
 from relgym.logic.clause import Coverage
 from relgym.logic.description import DescriptionLength
+from relgym.logic.growing import EPS, Counts, Growing, Score, Weights, extend
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 

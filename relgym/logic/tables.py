@@ -8,65 +8,18 @@ are the last axis, contiguous in memory; positives come first.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.logic.clause import ANY, Literal
 from relgym.logic.facts import Bool, Facts, Int, compare
+from relgym.logic.templates import FIRST, NEW, Template, templates
 from relgym.logic.thresholds import Bins, bin_values
 
-__all__ = ["NEW", "NumericStack", "Stack", "Tables", "Template"]
-
-NEW: Final = ANY
-"""Pattern code of a new variable; the same argument of the negated literal is universal."""
-
-_FIRST: Final = NEW - 1
-"""Pattern code of the first existential variable; the second is one less, and so on."""
-
-
-@dataclass(frozen=True, order=True)
-class Template:
-    """A relation or function and a pattern for its arguments.
-
-    `slots` holds, per argument, the number of a target variable, `NEW`, or a code below `NEW` for an
-    existential variable that is yet to be chosen.
-    """
-
-    name: str
-    slots: tuple[int, ...]
-
-    @cached_property
-    def existentials(self) -> int:
-        """How many existing existential variables the pattern takes."""
-        return sum(code < NEW for code in self.slots)
-
-    @cached_property
-    def fresh(self) -> int:
-        """How many new variables the pattern introduces."""
-        return sum(code == NEW for code in self.slots)
-
-    def literal(
-        self,
-        variables: Sequence[int],
-        fresh: int,
-        negated: bool,
-        op: str | None = None,
-        threshold: float = 0.0,
-    ) -> Literal:
-        """Return the literal for chosen existential variables and the number of the first new one."""
-        args, unused = [], itertools.count(fresh)
-        for code in self.slots:
-            if code == NEW:
-                args.append(ANY if negated else next(unused))
-            else:
-                args.append(code if code >= 0 else variables[_FIRST - code])
-        return Literal(self.name, tuple(args), negated, op, threshold)
+__all__ = ["Defined", "NumericStack", "Stack", "Tables"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +42,34 @@ class NumericStack:
 
     templates: tuple[Template, ...]
     bins: Bins
+    defined: tuple[Defined, Defined]
+
+    @staticmethod
+    def of(templates: Sequence[Template], bins: Bins, split: int) -> NumericStack:
+        """List the defined values of the first `split` tuples and of the others."""
+        index = bins.index.reshape(len(bins.index), -1, bins.index.shape[-1])
+        parts = (index[..., :split], index[..., split:])
+        first, second = (Defined.of(part, bins.count) for part in parts)
+        return NumericStack(tuple(templates), bins, (first, second))
+
+
+@dataclass(frozen=True, slots=True)
+class Defined:
+    """The defined values of F functions for one class of tuples, for histograms.
+
+    `place` is function x (B + 1) + bin, `cell` the index of the value's objects and tuple in a flat array of
+    shape (K, …, K, tuples of this class).
+    """
+
+    place: Int
+    cell: Int
+
+    @staticmethod
+    def of(index: NDArray[np.int16], count: int) -> Defined:
+        """List the values with a bin; `index` has shape (F, M, n)."""
+        function, row, column = np.nonzero(index < count)
+        place = function * (count + 1) + index[function, row, column]
+        return Defined(place, row * index.shape[-1] + column)
 
 
 class Tables:
@@ -115,43 +96,43 @@ class Tables:
         self.exists: Bool = np.ascontiguousarray(facts.exists[self.tuples[:, 0]].T)
         self.functions = sorted(facts.numeric) if numeric else []
         self._max_new = max_new
+        self._relational = _by_width(templates(facts, sorted(facts.relations), self.arity, max_new))
+        self._functional = _by_width(templates(facts, self.functions, self.arity, 0))
         self._bases: dict[str, NDArray[np.generic]] = {}
         self._stacks: dict[int, Stack] = {}
         self._numeric: dict[int, NumericStack] = {}
 
-    @cached_property
+    @property
     def widths(self) -> list[int]:
         """Numbers of existential variables that some relation's pattern takes, in increasing order."""
-        return sorted(
-            {
-                template.existentials
-                for template in self._templates(sorted(self.facts.relations), self._max_new)
-            }
-        )
+        return sorted(self._relational)
 
-    @cached_property
+    @property
     def numeric_widths(self) -> list[int]:
         """The same for numeric functions."""
-        return sorted({template.existentials for template in self._templates(self.functions, 0)})
+        return sorted(self._functional)
+
+    def restricted(self, kept: Bool) -> Tables:
+        """Return the tables of some of the tuples, `kept` of shape (n,)."""
+        first, second = self.tuples[: self.split], self.tuples[self.split :]
+        first, second = first[kept[: self.split]], second[kept[self.split :]]
+        return Tables(self.facts, first, second, self._max_new, bool(self.functions))
 
     def stack(self, width: int) -> Stack:
         """Return the relational templates with `width` existential variables; of equal ones the first."""
         found = self._stacks.get(width)
         if found is None:
-            names = sorted(self.facts.relations)
-            templates = [each for each in self._templates(names, self._max_new) if each.existentials == width]
-            found = self._stacks[width] = self._stack(templates, width)
+            found = self._stacks[width] = self._stack(self._relational[width], width)
         return found
 
     def numeric_stack(self, width: int) -> NumericStack:
         """Return the numeric templates with `width` existential variables."""
         found = self._numeric.get(width)
         if found is None:
-            templates = [each for each in self._templates(self.functions, 0) if each.existentials == width]
-            values = np.stack([self._array(each) for each in templates]).astype(np.float64)
-            exists = self._existing(width)
-            bins = bin_values(np.where(exists, values, np.nan), self.split)
-            found = self._numeric[width] = NumericStack(tuple(templates), bins)
+            chosen = self._functional[width]
+            values = np.stack([self._array(each) for each in chosen]).astype(np.float64)
+            bins = bin_values(np.where(self._existing(width), values, np.nan), self.split)
+            found = self._numeric[width] = NumericStack.of(chosen, bins, self.split)
         return found
 
     def truth(self, literal: Literal) -> Bool:
@@ -162,23 +143,13 @@ class Tables:
         slots: list[int] = []
         axes: list[bool] = []
         for arg in literal.args:
-            slots.append(arg if NEW <= arg < self.arity else _FIRST - len(axes))
+            slots.append(arg if NEW <= arg < self.arity else FIRST - len(axes))
             axes += [arg == ANY] if not 0 <= arg < self.arity else []
         values = self._array(Template(literal.relation, tuple(slots)))
         truth = values.astype(np.bool_) if literal.op is None else compare(values.astype(np.float64), literal)
         truth = truth & self._existing(len(axes))
         quantified = tuple(axis for axis, universal in enumerate(axes) if universal)
         return np.asarray(truth.any(axis=quantified) if quantified else truth) ^ literal.negated
-
-    def _templates(self, names: Sequence[str], max_new: int) -> Iterator[Template]:
-        for name in names:
-            relative = name in self.facts.relative
-            stored = self.facts.arity(name) - relative
-            targets = range(1 if relative else 0, self.arity)
-            for slots in _patterns(stored, targets, max_new):
-                bound = relative or stored <= 1 or any(code != NEW for code in slots)
-                if bound:  # a literal joins the clause by at least one argument; r(B) alone may float
-                    yield Template(name, (0, *slots) if relative else slots)
 
     def _stack(self, templates: Sequence[Template], width: int) -> Stack:
         kept: dict[bytes, tuple[Template, NDArray[np.float32]]] = {}
@@ -204,8 +175,12 @@ class Tables:
             if code < 0:
                 axis += 1
                 continue
-            objects = self.tuples[:, 1 + code].reshape(*[1] * (found.ndim - 1), -1)
-            found = np.take_along_axis(found, objects, axis=axis).squeeze(axis)
+            objects = self.tuples[:, 1 + code]
+            if (objects == objects[0]).all():  # usual: the target comes first in every world
+                found = found.take(objects[0], axis=axis)
+            else:
+                index = objects.reshape(*[1] * (found.ndim - 1), -1)
+                found = np.take_along_axis(found, index, axis=axis).squeeze(axis)
         return found
 
     def _base(self, name: str) -> NDArray[np.generic]:
@@ -225,10 +200,9 @@ class Tables:
         return found
 
 
-def _patterns(arity: int, targets: Sequence[int], max_new: int) -> Iterator[tuple[int, ...]]:
-    """Yield all ways to fill `arity` arguments without repeating a target variable."""
-    for slots in itertools.product([*targets, _FIRST, NEW], repeat=arity):
-        chosen = [code for code in slots if code >= 0]
-        if len(set(chosen)) == len(chosen) and slots.count(NEW) <= max_new:
-            numbers = itertools.count()
-            yield tuple(_FIRST - next(numbers) if code == _FIRST else code for code in slots)
+def _by_width(found: Iterable[Template]) -> dict[int, list[Template]]:
+    """Sort templates by their number of existential variables."""
+    grouped: dict[int, list[Template]] = {}
+    for template in found:
+        grouped.setdefault(template.existentials, []).append(template)
+    return grouped

@@ -34,7 +34,7 @@ class Bins:
         Shape (F, B): least and greatest value in each bin; NaN for bins that a function doesn't have.
     """
 
-    index: NDArray[np.int32]
+    index: NDArray[np.int16]
     count: int
     low: Float
     high: Float
@@ -63,7 +63,7 @@ def bin_values(values: Float, split: int) -> Bins:
     parts = [_bin_one(row.ravel(), positive) for row in values]
     count = max(max((len(low) for _, low, _ in parts), default=0), 1)
     low, high = np.full((len(parts), count), np.nan), np.full((len(parts), count), np.nan)
-    index = np.empty((len(parts), positive.size), dtype=np.int32)
+    index = np.empty((len(parts), positive.size), dtype=np.int16)
     for row, (bins, lows, highs) in enumerate(parts):
         low[row, : len(lows)], high[row, : len(highs)] = lows, highs
         index[row] = np.where(bins < 0, count, bins)

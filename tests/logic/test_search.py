@@ -10,10 +10,11 @@ from logic_worlds import random_facts
 from numpy.typing import NDArray
 
 from relgym.logic.batch import matches
-from relgym.logic.candidates import Score, Weights, blocks
+from relgym.logic.candidates import blocks
 from relgym.logic.clause import Clause, Literal
 from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Facts
+from relgym.logic.growing import Score, Weights
 from relgym.logic.search import grow
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
