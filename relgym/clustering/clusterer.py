@@ -79,8 +79,8 @@ class ModeClusterer:
     Notes
     -----
     Cost per example: one evaluation of every mode, O(modes * terms * assignments). A search runs only when an
-    unexplained example came, ever more rarely while searches fail. Every loop ends: a search that finds a mode
-    shrinks the noise, a unification lowers the number of modes, and both are counted.
+    unexplained example came, ever more rarely while searches fail. Every loop ends: a search that finds a
+    mode shrinks the noise, a unification lowers the number of modes, and both are counted.
     """
 
     def __init__(self, target: Target, config: ClusteringConfig, *, seed: int) -> None:
@@ -127,7 +127,9 @@ class ModeClusterer:
         """Number of examples no mode explains."""
         return int((self.labels == NOISE).sum()) if self._size else self._known_noise
 
-    def fits(self, table: ExampleTable, examples: NDArray[np.intp]) -> tuple[tuple[int, ...], NDArray[np.bool_]]:
+    def fits(
+        self, table: ExampleTable, examples: NDArray[np.intp]
+    ) -> tuple[tuple[int, ...], NDArray[np.bool_]]:
         """Which modes explain the given examples: ids and a boolean array ``(len(examples), modes)``."""
         ids = tuple(sorted(self.clusters))
         found = np.zeros((len(examples), len(ids)), dtype=bool)
@@ -203,8 +205,8 @@ class ModeClusterer:
     def _split_rest(self, table: ExampleTable, mode: int, members: NDArray[np.intp]) -> None:
         """Give a mode's examples on which none of its terms acts a mode of their own, if they are enough.
 
-        Where v = 0, both ``v' = 0`` and ``v' = -0.9 v`` hold. That is rest, not bouncing: the simpler law is stated
-        apart, whichever was found first.
+        Where v = 0, both ``v' = 0`` and ``v' = -0.9 v`` hold. That is rest, not bouncing: the simpler law is
+        stated apart, whichever was found first.
         """
         cluster = self.clusters[mode]
         if cluster.mode.intercept != 0.0 or not cluster.mode.parameters:
@@ -297,7 +299,7 @@ class ModeClusterer:
         return True
 
     def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit, members: NDArray[np.intp]) -> None:
-        """Make a mode of a function, unify it with the known ones (§3.2.5), reassign the examples (§3.2.4)."""
+        """Make a mode of a function: unify it with the known ones (§3.2.5), reassign examples (§3.2.4)."""
         cluster = self._cluster(fit, table, signature)
         members = self._explained(table, cluster, self._noise())
         absorbed: list[int] = []
@@ -320,7 +322,7 @@ class ModeClusterer:
     def _unify_once(
         self, table: ExampleTable, cluster: Cluster, members: NDArray[np.intp], absorbed: list[int]
     ) -> tuple[Cluster, NDArray[np.intp], int] | None:
-        """Unify with the largest mode possible: the general function, its examples, and the mode it absorbs."""
+        """Unify with the largest mode possible: the general function, its examples, the mode it absorbs."""
         rivals = [i for i in self.clusters if i not in absorbed]
         for i in sorted(rivals, key=lambda k: (-int((self.labels == k).sum()), k)):
             theirs = np.flatnonzero(self.labels == i)
@@ -345,13 +347,19 @@ class ModeClusterer:
     def _unify_family(
         self, table: ExampleTable, cluster: Cluster, members: NDArray[np.intp], absorbed: list[int]
     ) -> tuple[Cluster, NDArray[np.intp], list[int]] | None:
-        """Unify with all modes that differ in their constant only: the general function, examples, absorbed modes."""
+        """Unify with all modes that differ in their constant only; as `_unify_once`, absorbing several."""
         siblings = [
             i
             for i, c in sorted(self.clusters.items())
-            if i not in absorbed and c.mode.intercept != 0.0 and c.mode.same_function(cluster.mode, constant=False)
+            if i not in absorbed
+            and c.mode.intercept != 0.0
+            and c.mode.same_function(cluster.mode, constant=False)
         ]
-        if cluster.mode.intercept == 0.0 or any(r.terms for r in cluster.mode.open_roles) or len(siblings) < FAMILY:
+        if (
+            cluster.mode.intercept == 0.0
+            or any(r.terms for r in cluster.mode.open_roles)
+            or len(siblings) < FAMILY
+        ):
             return None
         families = [np.flatnonzero(self.labels == i) for i in siblings]
         found = unified_family(
@@ -379,7 +387,9 @@ class ModeClusterer:
     def _noise(self) -> NDArray[np.intp]:
         return np.flatnonzero(self.labels == NOISE)
 
-    def _explained(self, table: ExampleTable, cluster: Cluster, examples: NDArray[np.intp]) -> NDArray[np.intp]:
+    def _explained(
+        self, table: ExampleTable, cluster: Cluster, examples: NDArray[np.intp]
+    ) -> NDArray[np.intp]:
         error, _ = cluster.errors(table, self.rows[examples], self.y[examples], self.scale)
         return examples[error <= self.scale.tolerance]
 
@@ -389,7 +399,7 @@ class ModeClusterer:
         self._label[: self._size][self.labels == mode] = NOISE
 
     def _reassign(self, table: ExampleTable, new: int) -> None:
-        """E-step for a new mode: it takes what it explains from the noise and from modes it is preferred to."""
+        """E-step for a new mode: it takes what it explains from the noise and from less simple modes."""
         everyone = self._explained(table, self.clusters[new], np.arange(self._size))
         for example in everyone:
             held = int(self._label[example])
@@ -447,7 +457,11 @@ class ModeClusterer:
         self._searches = {int(i): _Search(int(w), int(f)) for i, w, f in data["searches"]}
         self._rng.bit_generator.state = data["random"]
         if arrays:
-            self._y, self._label, self._rows = arrays["y"].copy(), arrays["labels"].copy(), arrays["rows"].copy()
+            self._y, self._label, self._rows = (
+                arrays["y"].copy(),
+                arrays["labels"].copy(),
+                arrays["rows"].copy(),
+            )
             self._size = len(self._y)
 
 

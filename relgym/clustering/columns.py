@@ -1,9 +1,10 @@
 """How an example's state vector is lined up into regression columns (§3.2.3).
 
-The target object's properties come first. The other objects go into *slots* ``(type, k)`` in the scene's canonical
-order, never by name. Examples whose slots have the same types share a `SlotSignature` and with it the meaning of
-their columns. Columns stand in order of preference: what the target itself has, then what bodiless objects say
-(actions), then the target's pose, then other objects; of two columns that explain equally well the earlier wins.
+The target object's properties come first. The other objects go into *slots* ``(type, k)`` in the scene's
+canonical order, never by name. Examples whose slots have the same types share a `SlotSignature` and with it
+the meaning of their columns. Columns stand in order of preference: what the target itself has, then what
+bodiless objects say (actions), then the target's pose, then other objects; of two columns that explain
+equally well the earlier wins.
 """
 
 from __future__ import annotations
@@ -104,9 +105,9 @@ class SlotSignature:
     def preference(self, target: Target) -> tuple[NDArray[np.intp], tuple[int, ...]]:
         """Columns that a target's functions may use, in order of preference, and where its stages end.
 
-        The target property's own column comes first. The stages are the numbers of leading columns that are tried
-        together: what the target and bodiless objects have; then what other objects have; then poses as well. Next
-        values are left out unless the target is given them.
+        The target property's own column comes first. The stages are the numbers of leading columns that are
+        tried together: what the target and bodiless objects have; then what other objects have; then poses as
+        well. Next values are left out unless the target is given them.
         """
         first = self._index[0, target.property]
         rest = [k for k, c in enumerate(self.columns) if k != first and self._allowed(c, target)]

@@ -65,8 +65,8 @@ def find_mode(
     x, y, strata
         Rows ``(n, d)`` with columns in order of preference, responses and relational states, oldest first.
     stages
-        Numbers of leading columns that are tried together, ascending: a law of the object's own state needs smaller
-        samples and is the simpler law.
+        Numbers of leading columns that are tried together, ascending: a law of the object's own state needs
+        smaller samples and is the simpler law.
     fresh
         Number of rows at the end that no earlier search has seen: each sample holds one of them.
     """
@@ -112,7 +112,11 @@ def _recent(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
     if n <= SEARCH:
         return np.arange(n)
     newest = np.arange(n - max(fresh, SEARCH // 2), n)
-    older = rng.choice(newest[0], size=min(int(newest[0]), SEARCH // 2), replace=False) if newest[0] else newest[:0]
+    older = (
+        rng.choice(newest[0], size=min(int(newest[0]), SEARCH // 2), replace=False)
+        if newest[0]
+        else newest[:0]
+    )
     return np.concatenate([np.sort(older), newest])
 
 
@@ -121,13 +125,16 @@ def identified(
 ) -> Consensus | None:
     """The part of a function that its inliers really determine, with those inliers; None if nothing is left.
 
-    Two things are refused. A weight that fewer than `support` examples determine (a leverage point fixes it at
-    nonsense). Weights on columns that take few distinct values, when there are too few of those to tell a law from a
-    look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations.
+    Two things are refused. A weight that fewer than `support` examples determine (a leverage point fixes it
+    at nonsense). Weights on columns that take few distinct values, when there are too few of those to tell a
+    law from a look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations.
     """
     for _ in range(len(fit.columns) + 1):
         found = refine(
-            x, y, Consensus(fit, np.abs(y - fit.predict(x)) <= scale.tolerance), sigma=scale.sigma,
+            x,
+            y,
+            Consensus(fit, np.abs(y - fit.predict(x)) <= scale.tolerance),
+            sigma=scale.sigma,
             tolerance=scale.tolerance,
         )
         rows = np.flatnonzero(found.inliers)
@@ -144,7 +151,7 @@ def identified(
 def _unsupported(
     x: NDArray[np.float64], fit: LinearFit, tolerance: float, support: int
 ) -> tuple[int | None, NDArray[np.bool_]]:
-    """A column whose weight fewer than `support` rows determine, and the rows without those; (None, all) if none."""
+    """A column that fewer than `support` rows determine, and the rows without those; (None, all) if none."""
     everything = np.ones(len(x), dtype=bool)
     for column, weight in zip(fit.columns, fit.weights, strict=True):
         kept = everything.copy()
@@ -186,4 +193,3 @@ def _enough_combinations(
     if len(slow) == len(fit.columns) and np.ptp(y) > tolerance:
         return len(np.unique(np.round(y / tolerance))) >= 2 * fit.terms
     return True
-

@@ -2,9 +2,10 @@
 
 Deviation from the thesis
 -------------------------
-A Gaussian density decides between modes only where residuals differ by more than the noise. Residuals within it are
-ties: the thesis let rounding decide between ``v' = v`` and ``v' = 0`` for a resting ball and called that
-unprincipled. Here the mode with fewest parameters wins, then the one with more examples, then the older one.
+A Gaussian density decides between modes only where residuals differ by more than the noise. Residuals within
+it are ties: the thesis let rounding decide between ``v' = v`` and ``v' = 0`` for a resting ball and called
+that unprincipled. Here the mode with fewest parameters wins, then the one with more examples, then the older
+one.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Cluster:
     def errors(
         self, table: ExampleTable, rows: NDArray[np.integer], y: NDArray[np.float64], scale: Scale
     ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-        """Smallest absolute residual of each example over all role assignments, and the number of that assignment.
+        """Smallest absolute residual of each example over all role assignments, and that assignment's number.
 
         Infinite where no assignment is legal.
         """
@@ -58,10 +59,8 @@ class Cluster:
                 error[part], assignment[part] = binding.closest(table.x[rows[part]], y[part], scale.sigma)
         return error, assignment
 
-    def idle(
-        self, table: ExampleTable, rows: NDArray[np.integer], tolerance: float
-    ) -> NDArray[np.bool_]:
-        """Where every term of the target's own role vanishes and no other object has a say, shape ``(n,)``."""
+    def idle(self, table: ExampleTable, rows: NDArray[np.integer], tolerance: float) -> NDArray[np.bool_]:
+        """Where the own role's terms all vanish and no other object has a say, shape ``(n,)``."""
         still = np.full(len(rows), not any(r.terms for r in self.mode.open_roles))
         for signature in np.unique(table.signature_ids[rows]):
             part = np.flatnonzero(table.signature_ids[rows] == signature)
@@ -72,7 +71,11 @@ class Cluster:
 
 
 def preferred(
-    fitting: list[int], errors: dict[int, float], clusters: dict[int, Cluster], scale: Scale, config: ClusteringConfig
+    fitting: list[int],
+    errors: dict[int, float],
+    clusters: dict[int, Cluster],
+    scale: Scale,
+    config: ClusteringConfig,
 ) -> int:
     """The mode an example is assigned to, among those that explain it (E-step)."""
 

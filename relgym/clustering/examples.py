@@ -53,7 +53,7 @@ class ExampleTable:
 
     @property
     def bodies(self) -> NDArray[np.int16]:
-        """Number of the body in each slot of every row, shape ``(n, most slots)``; -1 for bodiless objects."""
+        """Number of the body in each slot of every row, shape ``(n, slots)``; -1 for bodiless objects."""
         return self._bodies[: self._size]
 
     def signature_id(self, signature: SlotSignature) -> int:
@@ -69,7 +69,9 @@ class ExampleTable:
                 self._bodies = np.pad(self._bodies, ((0, 0), (0, missing)), constant_values=-1)
         return known
 
-    def add(self, signature: SlotSignature, row: NDArray[np.float64], stratum: bytes, bodies: Sequence[int]) -> int:
+    def add(
+        self, signature: SlotSignature, row: NDArray[np.float64], stratum: bytes, bodies: Sequence[int]
+    ) -> int:
         """Append one row and return its number; amortised O(width).
 
         Parameters
@@ -104,7 +106,9 @@ class ExampleTable:
         """The rows, their signatures and their strata."""
         return {"x": self.x, "signature": self.signature_ids, "stratum": self.strata, "bodies": self.bodies}
 
-    def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]], types: dict[str, ObjectType]) -> None:
+    def restore(
+        self, data: dict[str, Any], arrays: dict[str, NDArray[Any]], types: dict[str, ObjectType]
+    ) -> None:
         """Take over what `to_json` and `to_arrays` wrote."""
         for names, given in data["signatures"]:
             pairs = tuple((str(t), str(p)) for t, p in given)

@@ -74,11 +74,13 @@ class Mode:
         return replace(self, examples=examples)
 
     def same_function(self, other: Mode, tolerance: float = 1e-9, *, constant: bool = True) -> bool:
-        """Whether both have the same roles with weights (and the same `constant`) within a relative `tolerance`."""
+        """Whether both have the same roles, weights and (if `constant`) intercept, within `tolerance`."""
         pattern = [(r.type, [p for p, _ in r.terms]) for r in self.roles]
         if pattern != [(r.type, [p for p, _ in r.terms]) for r in other.roles]:
             return False
-        numbers = [[w for role in m.roles for _, w in role.terms] + [m.intercept] * constant for m in (self, other)]
+        numbers = [
+            [w for role in m.roles for _, w in role.terms] + [m.intercept] * constant for m in (self, other)
+        ]
         pairs = zip(*numbers, strict=True)
         return all(abs(a - b) <= tolerance * max(1.0, abs(a), abs(b)) for a, b in pairs)
 
@@ -120,7 +122,9 @@ class Mode:
     @classmethod
     def from_json(cls, target: Target, data: dict[str, Any]) -> Mode:
         """Read what `to_json` wrote."""
-        roles = tuple(Role(r["type"], tuple((str(p), float(w)) for p, w in r["terms"])) for r in data["roles"])
+        roles = tuple(
+            Role(r["type"], tuple((str(p), float(w)) for p, w in r["terms"])) for r in data["roles"]
+        )
         return cls(
             id=int(data["id"]),
             target=target,

@@ -35,7 +35,12 @@ def rounding_noise(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
 
 
 def estimate_noise(
-    x: NDArray[np.float64], y: NDArray[np.float64], strata: NDArray[np.integer], *, floor: float, window: int = 16
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    strata: NDArray[np.integer],
+    *,
+    floor: float,
+    window: int = 16,
 ) -> float:
     """Noise of y about a locally linear function: lower quartile over windows of like examples.
 

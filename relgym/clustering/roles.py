@@ -20,7 +20,7 @@ MAX_ASSIGNMENTS = 5_000
 
 
 def identify_roles(fit: LinearFit, signature: SlotSignature) -> tuple[Role, ...]:
-    """Cut a weight vector into one segment per slot; a segment with a non-zero weight is a role (Figure 3.3)."""
+    """Cut a weight vector into one segment per slot; one with a non-zero weight is a role (Figure 3.3)."""
     terms: dict[int, list[tuple[str, float]]] = {0: []}
     for column, weight in zip(fit.columns, fit.weights, strict=True):
         where = signature.columns[column]
@@ -41,7 +41,8 @@ class Binding:
     open
         For each remaining role its (property column per slot, weight) pairs: ``({slot: column}, weight)``.
     assignments
-        Slot of each open role, one row per legal assignment, shape ``(a, len(open))``; rows in canonical order.
+        Slot of each open role, one row per legal assignment, shape ``(a, len(open))``; rows in canonical
+        order.
     forced
         Slot of every role but the target's where it is the only one possible, -1 for open roles.
     """
@@ -115,7 +116,10 @@ def bind(mode: Mode, signature: SlotSignature) -> Binding | None:
             forced.append(-1)
             open_roles.append(role)
     places = tuple(
-        tuple(({s: signature.column(s, prop) for s in by_type[role.type]}, weight) for prop, weight in role.terms)
+        tuple(
+            ({s: signature.column(s, prop) for s in by_type[role.type]}, weight)
+            for prop, weight in role.terms
+        )
         for role in open_roles
     )
     rows = list(itertools.islice(_assignments(open_roles, by_type), MAX_ASSIGNMENTS))

@@ -30,8 +30,8 @@ def covering(
 ) -> bool:
     """Whether a function explains the given examples, *and* its terms act on them.
 
-    A function all of whose terms vanish on the examples says nothing of them: bouncing (``v' = -0.9 v``) doesn't
-    swallow sliding (``v' = 0`` where v = 0).
+    A function all of whose terms vanish on the examples says nothing of them: bouncing (``v' = -0.9 v``)
+    doesn't swallow sliding (``v' = 0`` where v = 0).
     """
     if not len(rows):
         return True
@@ -106,9 +106,9 @@ def unified_family(
 ) -> tuple[int, LinearFit, list[int]] | None:
     """A function that explains several over-specific modes at once: (signature, fit, which of them), or None.
 
-    Where something is constant while a block lasts, each block teaches a mode of its own that differs from the others
-    in its constant only. No two of them determine how the constant depends on what; many do. Each mode counts as one
-    example here, and consensus is sought among them.
+    Where something is constant while a block lasts, each block teaches a mode of its own that differs from
+    the others in its constant only. No two of them determine how the constant depends on what; many do. Each
+    mode counts as one example here, and consensus is sought among them.
 
     Parameters
     ----------

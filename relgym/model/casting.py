@@ -86,7 +86,8 @@ class Casting:
     def restore(self, data: list[Any]) -> None:
         """Take over what `to_json` wrote."""
         self.classifiers = {
-            int(number): RoleClassifier.from_dict(plain, self.vocabulary, self.config) for number, plain in data
+            int(number): RoleClassifier.from_dict(plain, self.vocabulary, self.config)
+            for number, plain in data
         }
 
     def _kinds(self, mode: Mode) -> tuple[RoleKind, ...]:

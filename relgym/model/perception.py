@@ -1,8 +1,7 @@
-"""From scenes to what the learners see: relations, regression rows and situations, once for all targets (design §5)."""
+"""From scenes to what the learners see: relations, rows and situations, once for all targets (design §5)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -80,7 +79,10 @@ class Perception:
     def vocabulary(self, target: ObjectType) -> Vocabulary:
         """Names of what classifiers of a type's targets are shown."""
         bodiless = [t for t in self.schema.types if not t.has_body and t.name != target.name]
-        own = [*_free(target), *(f"{t.name}.{p}" for t in sorted(bodiless, key=_by_name) for p in t.properties)]
+        own = [
+            *_free(target),
+            *(f"{t.name}.{p}" for t in sorted(bodiless, key=_by_name) for p in t.properties),
+        ]
         binary = tuple(self.extractor.names)
         taken = {*binary, *self._unary_names, *own}
         pair = [*self._contact_names, *(f"other-{p}" if p in taken else p for p in self._pair_names)]
@@ -109,7 +111,9 @@ class Perception:
                 if t.has_body or t.name == layout.types[target].name:
                     continue
                 where = layout.of_type(t.name)
-                places += [layout.column(where[0], p) if len(where) == 1 else layout.width for p in t.properties]
+                places += [
+                    layout.column(where[0], p) if len(where) == 1 else layout.width for p in t.properties
+                ]
             known = self._own_columns[key] = np.array(places, dtype=np.intp)
         return known
 
@@ -117,11 +121,13 @@ class Perception:
         """Truth of the unary relations, shape ``(U, bodies)``."""
         if (known := self._unary.get(id(layout))) is None:
             rows = [self.extractor.unary(layout)[name] for name in self._unary_names]
-            known = self._unary[id(layout)] = np.array(rows, dtype=bool).reshape(len(rows), len(layout.bodies))
+            known = self._unary[id(layout)] = np.array(rows, dtype=bool).reshape(
+                len(rows), len(layout.bodies)
+            )
         return known
 
     def feature_columns(self, layout: SceneLayout) -> NDArray[np.intp]:
-        """Columns of the bodies' own numbers (`pair` beyond contacts), shape ``(bodies, P)``; NaN's where missing."""
+        """Columns of the bodies' own numbers, shape ``(bodies, P)``; that of a NaN where missing."""
         if (known := self._features.get(id(layout))) is None:
             table = np.full((len(layout.bodies), len(self._pair_names)), layout.width, dtype=np.intp)
             for row, i in enumerate(layout.bodies):
@@ -159,12 +165,15 @@ class Percept:
         target
             Index of the object.
         following
-            Next state vectors as far as known, shape ``(n, layout.width)``: primed columns are read from them.
+            Next state vectors as far as known, shape ``(n, layout.width)``: primed columns are read from
+            them.
         """
         place = self.situation(target)
         both = np.concatenate([self.vectors, following], axis=1)
         if len(self) == 1:
-            return both[:, self.perception.gather(self.layout, place.signature, tuple(place.order[0].tolist()))]
+            return both[
+                :, self.perception.gather(self.layout, place.signature, tuple(place.order[0].tolist()))
+            ]
         rows = np.empty((len(self), len(place.signature.columns)))
         orders, which = np.unique(place.order, axis=0, return_inverse=True)
         for k, order in enumerate(orders):
@@ -200,7 +209,7 @@ class Percept:
         own = padded[:, perception.own_columns(self.layout, target)]
         numbers = padded[:, perception.feature_columns(self.layout)]
         contacts = relations.contacts(body)
-        # Contact facts are facts of touching pairs (design §4): a normal towards something far away says nothing.
+        # Contact facts are facts of touching pairs (design §4): a normal towards something far says nothing.
         contacts[~relations.relation("intersect")[:, body]] = np.nan
         pair = np.concatenate([contacts, numbers], axis=2)
         pair[:, body] = np.nan
@@ -232,4 +241,3 @@ def _free(t: ObjectType) -> tuple[str, ...]:
     """Properties that are no pose component: those that may be compared with thresholds (R2)."""
     pose = {k for k in t.pose_columns() if k >= 0} if t.has_body else set()
     return tuple(p for k, p in enumerate(t.properties) if k not in pose)
-

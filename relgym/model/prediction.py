@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import enum
 from dataclasses import dataclass
 
@@ -16,8 +17,8 @@ __all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
 class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
-    Only `PREDICTED` is a mode's word. With every other outcome the value is *persistence*: the property keeps its
-    value, and that is a stopgap, not a claim.
+    Only `PREDICTED` is a mode's word. With every other outcome the value is *persistence*: the property keeps
+    its value, and that is a stopgap, not a claim.
     """
 
     PREDICTED = "predicted by a mode"
@@ -58,7 +59,7 @@ class Prediction:
     roles: tuple[str, ...] = ()
     margin: float = 0.0
 
-    @property
+    @builtins.property  # `property` is a field here
     def ok(self) -> bool:
         """Whether a mode predicted it."""
         return self.outcome is Outcome.PREDICTED

@@ -199,7 +199,7 @@ class PropertyModel:
     def _cast(
         self, mode: int, binding: Binding, example: Example, order: NDArray[np.intp], layout: SceneLayout
     ) -> tuple[int, ...] | None:
-        """Slots of the objects in a mode's open roles, by the role classifiers; None if they can't be filled."""
+        """Slots of a mode's open roles, by the role classifiers; None if they can't be filled."""
         bodies = bodies_of(order, layout)
         place = {body: slot for slot, body in enumerate(bodies) if body >= 0}
         played = self.casting.assign(self.mode(mode), example, tuple(place))
@@ -303,7 +303,12 @@ class PropertyModel:
         return verdict
 
     def _apply(
-        self, mode: int, percept: Percept, situation: Situation, x: NDArray[np.float64], part: NDArray[np.intp]
+        self,
+        mode: int,
+        percept: Percept,
+        situation: Situation,
+        x: NDArray[np.float64],
+        part: NDArray[np.intp],
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Those of the given examples whose roles can be filled, and the mode's values there."""
         binding = self._binding(situation.signature, mode)

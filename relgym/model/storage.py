@@ -1,4 +1,4 @@
-"""Model files: versioned canonical JSON with a checksum, written atomically; with history a zip of JSON and arrays.
+"""Model files: versioned canonical JSON with a checksum, written atomically; with history a zip.
 
 Nothing is ever unpickled or evaluated.
 """
@@ -26,10 +26,18 @@ __all__ = ["FORMAT", "VERSION", "read_model", "schema_from_json", "schema_to_jso
 FORMAT = "relgym-model"
 VERSION = 1
 
-_SHAPES: dict[str, type] = {"sphere": Sphere, "box": Box, "wedge": Wedge, "prism": Prism, "polyhedron": ConvexPolyhedron}
+_SHAPES: dict[str, type] = {
+    "sphere": Sphere,
+    "box": Box,
+    "wedge": Wedge,
+    "prism": Prism,
+    "polyhedron": ConvexPolyhedron,
+}
 
 
-def write_model(path: str | os.PathLike[str], body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None) -> None:
+def write_model(
+    path: str | os.PathLike[str], body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None
+) -> None:
     """Write a model file; a kill at any moment leaves the old or the new file whole.
 
     Parameters
@@ -46,7 +54,7 @@ def write_model(path: str | os.PathLike[str], body: dict[str, Any], arrays: dict
     if arrays is not None:
         data = _zipped(data, arrays)
     target = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=target.parent or Path(), prefix=f".{target.name}.")
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
@@ -74,8 +82,8 @@ def read_model(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, 
         whole = json.loads(data)
     except ValueError as error:
         raise ModelFileError(
-            f"{path}: expected a relgym model (JSON), but it can't be read ({error}); it is truncated or another "
-            "kind of file: save the model again"
+            f"{path}: expected a relgym model (JSON), but it can't be read ({error}); it is truncated or "
+            "another kind of file: save the model again"
         ) from None
     if not isinstance(whole, dict) or whole.get("format") != FORMAT:
         raise ModelFileError(f"{path}: expected a relgym model file, got another kind of JSON")
@@ -86,7 +94,9 @@ def read_model(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, 
         )
     body = whole.get("body")
     if not isinstance(body, dict) or _digest(body) != whole.get("sha256"):
-        raise ModelFileError(f"{path}: the checksum doesn't match: the file was edited or damaged; save it again")
+        raise ModelFileError(
+            f"{path}: the checksum doesn't match: the file was edited or damaged; save it again"
+        )
     return body, arrays
 
 

@@ -61,8 +61,8 @@ class WorldModel:
     config
         Free parameters.
     targets
-        What to learn, in causal order; default: the schema's targets, and if it names none, every property that
-        changes (kinematics and exogenous properties apart).
+        What to learn, in causal order; default: the schema's targets, and if it names none, every property
+        that changes (kinematics and exogenous properties apart).
 
     Examples
     --------
@@ -81,7 +81,11 @@ class WorldModel:
     """
 
     def __init__(
-        self, schema: SceneSchema, config: ModelConfig | None = None, *, targets: Sequence[Target] | None = None
+        self,
+        schema: SceneSchema,
+        config: ModelConfig | None = None,
+        *,
+        targets: Sequence[Target] | None = None,
     ) -> None:
         self.schema = schema
         self.config = config or ModelConfig()
@@ -108,13 +112,15 @@ class WorldModel:
         if target.property not in t.properties:
             raise SchemaError(f"target {target}: type {t.name!r} has no property {target.property!r}")
         if t.name == ACTION or target.property in t.exogenous:
-            raise ConfigError(f"target {target} can't be learned: it comes from outside the world; leave it out")
+            raise ConfigError(
+                f"target {target} can't be learned: it comes from outside the world; leave it out"
+            )
         self.targets = (*self.targets, target)
         self._models[target] = PropertyModel(target, self._perception.vocabulary(t), self.config)
         self._tables.setdefault(target.type, ExampleTable())
 
     def _discover_targets(self, before: Scene, after: Scene) -> None:
-        """Every property that changes becomes a target; each sees all transitions from its first change on."""
+        """Every property that changes becomes a target; it sees all transitions from its first change on."""
         derived = {(k.type, k.property) for k in self.schema.kinematics}
         for i, t in enumerate(before.layout.types):
             if t.name == ACTION or before.layout.names[i] not in after:
@@ -221,7 +227,7 @@ class WorldModel:
             self.schema.scene(scene.values())  # raises, naming object and property
 
     def _perceive(self, scene: Scene) -> Percept:
-        """Relations of a scene; those of the last scene are remembered, since prediction comes before learning."""
+        """Relations of a scene; the last one's are remembered, since prediction comes before learning."""
         if self._percept is None or self._percept[0] is not scene:
             self._percept = (scene, self._perception.percept(scene.layout, scene.vector[None]))
         return self._percept[1]
@@ -244,7 +250,9 @@ class WorldModel:
                 verdict = self._models[target].predict_one(percept, index, following)
                 column = layout.column(index, target.property)
                 if not np.isfinite(verdict.value):
-                    verdict = replace(verdict, value=float(scene.vector[column]), outcome=Outcome.OUTSIDE, mode=0)
+                    verdict = replace(
+                        verdict, value=float(scene.vector[column]), outcome=Outcome.OUTSIDE, mode=0
+                    )
                 following[column] = verdict.value
                 parts.append(replace(verdict, object=layout.names[index], property=target.property))
         self._derive(layout, scene.vector[None], following[None])
@@ -311,8 +319,8 @@ class WorldModel:
         steps
             Number of steps, at least 1.
         actions
-            Properties of the action object at each step (physical units), shape ``(steps, properties)``; default:
-            those of `scene` throughout.
+            Properties of the action object at each step (physical units), shape ``(steps, properties)``;
+            default: those of `scene` throughout.
 
         Returns
         -------
@@ -385,7 +393,8 @@ class WorldModel:
             "seen": self.seen,
             "given": [list(pair) for pair in self._perception.given],
             "targets": [
-                {"target": target_to_json(t), "model": self._models[t].to_json(history=history)} for t in self.targets
+                {"target": target_to_json(t), "model": self._models[t].to_json(history=history)}
+                for t in self.targets
             ],
             "tables": [self._tables[name].to_json() for name in sorted(self._tables)] if history else [],
         }
@@ -408,7 +417,9 @@ class WorldModel:
         try:
             return cls._from_json(body, arrays), dict(body["extra"])
         except (KeyError, TypeError, IndexError) as error:
-            raise ModelFileError(f"{path}: a part of the model is missing or malformed ({error!r}); save it again") from None
+            raise ModelFileError(
+                f"{path}: a part of the model is missing or malformed ({error!r}); save it again"
+            ) from None
 
     @classmethod
     def _from_json(cls, body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None) -> WorldModel:

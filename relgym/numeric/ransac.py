@@ -1,14 +1,14 @@
 """Random sampling and consensus, many samples at a time (§3.2.2).
 
-Each draw fits a sparse function to a handful of rows by forward selection; a draw whose rows are reproduced with
-degrees of freedom to spare is *verified* and its inliers among all rows are counted. All draws are made as one batch
-of array operations.
+Each draw fits a sparse function to a handful of rows by forward selection; a draw whose rows are reproduced
+with degrees of freedom to spare is *verified* and its inliers among all rows are counted. All draws are made
+as one batch of array operations.
 
 Deviation from the thesis
 -------------------------
-The thesis fits every sample and counts; with N=2000 draws of 6 rows it never finds a mode that makes up a fifth of
-the noise. Exact data verify themselves, so small samples (terms + 3 rows) and many draws find what large samples
-can't, and a draw that doesn't reproduce its own rows costs no counting.
+The thesis fits every sample and counts; with N=2000 draws of 6 rows it never finds a mode that makes up a
+fifth of the noise. Exact data verify themselves, so small samples (terms + 3 rows) and many draws find what
+large samples can't, and a draw that doesn't reproduce its own rows costs no counting.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ def draw_samples(
 ) -> NDArray[np.intp]:
     """Row numbers of `draws` samples of `size` distinct rows, shape ``(draws, size)``.
 
-    The first row of each sample comes from `anchors` (default: any row). A third of the samples takes the others from
-    anywhere, a third from the first row's stratum, a third from the rows nearest to it in time: contiguous examples
-    and examples in the same relational state tend to share a mode (§3.2.3).
+    The first row of each sample comes from `anchors` (default: any row). A third of the samples takes the
+    others from anywhere, a third from the first row's stratum, a third from the rows nearest to it in time:
+    contiguous examples and examples in the same relational state tend to share a mode (§3.2.3).
     """
     first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
     keys = rng.random((draws, n))
@@ -79,7 +79,7 @@ def consensus(
     strata: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
 ) -> Consensus | None:
-    """The function with the largest consensus among `draws` random samples; None if no sample verified itself.
+    """The function with the largest consensus among random samples; None if no sample verified itself.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def consensus(
 def refine(
     x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, *, sigma: float, tolerance: float
 ) -> Consensus:
-    """Refit on the inliers and count again until nothing changes, then drop needless terms; at most 8 rounds."""
+    """Refit on the inliers, drop needless terms and count again until nothing changes; at most 8 rounds."""
     for round_ in range(8):
         if found.size <= len(found.fit.columns) + 1:
             return Consensus(found.fit, np.zeros(len(y), dtype=bool))
@@ -135,7 +135,7 @@ def refine(
 def _forward_batch(
     a: NDArray[np.float64], y: NDArray[np.float64], *, terms: int, sigma: float
 ) -> NDArray[np.intp]:
-    """Columns chosen for each sample, shape ``(draws, terms)``, -1 where none; -2 in front if not verified."""
+    """Columns chosen for each sample, ``(draws, terms)``: -1 where none, -2 in front if not verified."""
     draws, size, _ = a.shape
     a = a - a.mean(axis=1, keepdims=True)
     sizes = np.square(a).sum(axis=1)
@@ -178,7 +178,7 @@ def _best_columns(
 def _distinct(
     samples: NDArray[np.intp], chosen: NDArray[np.intp], limit: int = 48
 ) -> list[tuple[NDArray[np.intp], list[int]]]:
-    """Verified samples with their columns: fewest terms first, at most `limit`, few of each set of columns."""
+    """Verified samples with their columns: fewest terms first, at most `limit`, few per set of columns."""
     kept: list[tuple[NDArray[np.intp], list[int]]] = []
     seen: dict[tuple[int, ...], int] = {}
     verified = np.flatnonzero(chosen[:, 0] != -2)

@@ -1,12 +1,13 @@
-"""Sparse linear regression: forward-stepwise selection with Mallows's Cp, and backward elimination (Algorithm 1).
+"""Sparse linear regression: forward-stepwise selection by Mallows's Cp, backward elimination (Algorithm 1).
 
 Deviation from the thesis
 -------------------------
-Algorithm 1 as printed never removes a chosen regressor from the candidates, divides by ``S**2`` although its ``S`` is
-already a mean square, and keeps an old ``C_best`` between rounds. Here the noise variance is *given* (as in the
-original program, which is why exact data make no 0/0), columns are orthogonalised as they are chosen instead of
-sweeping a cross-product matrix (whose condition is squared), and a backward pass drops what later columns made
-superfluous. All sums are NumPy reductions, never BLAS, so that results don't depend on thread counts.
+Algorithm 1 as printed never removes a chosen regressor from the candidates, divides by ``S**2`` although its
+``S`` is already a mean square, and keeps an old ``C_best`` between rounds. Here the noise variance is *given*
+(as in the original program, which is why exact data make no 0/0), columns are orthogonalised as they are
+chosen instead of sweeping a cross-product matrix (whose condition is squared), and a backward pass drops what
+later columns made superfluous. All sums are NumPy reductions, never BLAS, so that results don't depend on
+thread counts.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 __all__ = ["LinearFit", "eliminate_backward", "forward_stepwise", "least_squares", "varying_columns"]
 
 PIVOT = 1e-9
-"""A column whose part orthogonal to the chosen ones is relatively smaller than this is collinear with them."""
+"""A column whose part orthogonal to the chosen ones is relatively smaller is collinear with them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ class LinearFit:
         return len(self.columns) + (self.intercept != 0.0)
 
     def predict(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values on rows of `x`, shape ``(n, d)`` → ``(n,)``; summed in column order, so bitwise repeatable."""
+        """Values on rows of `x`, shape ``(n, d)`` → ``(n,)``; summed in column order, hence repeatable."""
         value = np.full(len(x), self.intercept)
         for column, weight in zip(self.columns, self.weights, strict=True):
             value += weight * x[:, column]
@@ -72,8 +73,8 @@ def least_squares(
     x, y
         Rows of shape ``(n, d)`` and responses of shape ``(n,)``.
     columns
-        Columns to use. Those collinear with earlier ones get no weight (§3.2.1: constants of the data identify
-        nothing) and don't appear in the result.
+        Columns to use. Those collinear with earlier ones get no weight (§3.2.1: constants of the data
+        identify nothing) and don't appear in the result.
     intercept
         Whether to fit a constant term.
 
@@ -93,7 +94,8 @@ def least_squares(
 
 
 def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    return (a * weights).sum(axis=1)
+    total: NDArray[np.float64] = (a * weights).sum(axis=1)
+    return total
 
 
 def _solve(a: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -133,8 +135,9 @@ def forward_stepwise(
 ) -> LinearFit:
     """Forward-stepwise regression with Mallows's Cp (Algorithm 1), then backward elimination.
 
-    Each round adds the column that lowers ``Cp = RSS / sigma^2 - n + 2 (p + 1)`` most; columns that do equally well
-    within the noise are decided by their order, the earliest first. It stops when Cp no longer falls.
+    Each round adds the column that lowers ``Cp = RSS / sigma^2 - n + 2 (p + 1)`` most; columns that do
+    equally well within the noise are decided by their order, the earliest first. It stops when Cp no longer
+    falls.
 
     Parameters
     ----------
