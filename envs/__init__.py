@@ -12,6 +12,7 @@ if __name__ != "relgym.envs":
 _HOMES = {
     "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
     "EnvState": "relgym.envs.base",
+    "LearnedModelEnv": "relgym.envs.learned_model",
     "SceneEnv": "relgym.envs.base",
     "TruckPushEnv": "relgym.envs.truck_push",
     "render_scene": "relgym.envs.rendering",
@@ -21,6 +22,7 @@ _HOMES = {
 __all__ = [
     "BallBoxRampEnv",
     "EnvState",
+    "LearnedModelEnv",
     "SceneEnv",
     "TruckPushEnv",
     "render_scene",

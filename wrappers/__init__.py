@@ -1,7 +1,31 @@
 """Gymnasium wrappers that learn a model of the env they wrap; imported as ``relgym.wrappers``."""
 
+import importlib
+from typing import Any
+
 if __name__ != "relgym.wrappers":
     raise ImportError(
         f"this package is called relgym.wrappers, not {__name__!r}: a second copy of every class would "
         "follow; use `from relgym.wrappers import …`"
     )
+
+_HOMES = {
+    "ModelLearner": "relgym.wrappers.model_learner",
+    "SceneView": "relgym.wrappers.views",
+    "StepReport": "relgym.wrappers.model_learner",
+    "View": "relgym.wrappers.views",
+    "view_of": "relgym.wrappers.views",
+}
+"""Where each public name lives; loaded on first use."""
+
+__all__ = ["ModelLearner", "SceneView", "StepReport", "View", "view_of"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {sorted(_HOMES)}")
+    return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOMES])
