@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,10 @@ from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 
 __all__ = ["Harvest", "grow"]
+
+
+_PATIENCE: Final = 2
+"""A search ends after so many literals that saved no bits; one that connects pays only with the next."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +64,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
     score = Score(whole.positives, whole.negatives, config.choice)
     beam = [Growing((), everything, Counts.of(everything, weights))]
     pool: dict[bytes, Growing] = {}
+    saved: list[float] = []
     work = 0
     for depth in range(1, config.max_literals + 1):
         found = _Candidates(tables, beam, weights, score, config)
@@ -69,7 +74,10 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
         beam = _promising(beam, pool.values())
         if config.mdl:
             beam = [each for each in beam if _may_pay(each, tables.arity, length, whole)]
-        if not beam:
+            saved.append(
+                max((_saving(each, tables.arity, length, whole) for each in pool.values()), default=0.0)
+            )
+        if not beam or (config.mdl and len(saved) > _PATIENCE and saved[-1] <= saved[-1 - _PATIENCE]):
             break
     return Harvest(tuple(pool.values()), work)
 
@@ -97,6 +105,12 @@ def _may_pay(growing: Growing, arity: int, length: DescriptionLength, whole: Cov
     """Whether the clause would save bits if it lost its negatives for nothing."""
     best = Coverage(float(growing.left.positives), 0.0)
     return length.saving(length.literals(growing.literals, arity), best, whole) > 0
+
+
+def _saving(growing: Growing, arity: int, length: DescriptionLength, whole: Coverage) -> float:
+    """Bits that the clause saves as it is."""
+    left = Coverage(float(growing.left.positives), float(growing.left.negatives))
+    return length.saving(length.literals(growing.literals, arity), left, whole)
 
 
 class _Candidates:
