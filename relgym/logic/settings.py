@@ -38,8 +38,8 @@ class FoilConfig:
         Whether thresholds on numeric functions may be literals. Default true; the thesis had none (§3.4.4).
     min_precision
         Least share of positives, by weight, among the tuples that a clause newly covers. Default 0.5, range
-        [0, 1]; below one half it has no effect, for positives must outweigh negatives anyway. The original wanted
-        0.9 on a held-out quarter. Raising it leaves more positives uncovered.
+        [0, 1]; below one half it has no effect, for positives must outweigh negatives anyway. The original
+        wanted 0.9 on a held-out quarter. Raising it leaves more positives uncovered.
     mdl
         Whether a clause must pay for its own bits in exceptions that need no mention any more (minimum
         description length), which keeps noise out of the rules. Default true. False: a clause is as good as
