@@ -242,9 +242,10 @@ class ModeClassifier:
         keep, wrong = self.config.ambiguous == "keep", 0
         explained = dict(zip(self.modes, np.asarray(fits).tolist(), strict=True))
         for at, ((i, j), pair) in enumerate(self._pairs.items()):
-            if assigned not in (i, j) or (explained[j if assigned == i else i] and not keep):
+            for_i, for_j = (assigned == m if keep else explained[m] for m in (i, j))
+            if for_i == for_j:
                 continue
-            wrong += pair.observe(outcomes[at], assigned == i, self.config.relearn_growth)
+            wrong += pair.observe(outcomes[at], for_i, self.config.relearn_growth)
             self._voting.recount(at)
         return wrong
 

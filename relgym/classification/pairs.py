@@ -121,9 +121,9 @@ class PairState:
 
 
 def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, keep: bool) -> Lesson:
-    """The exemplars that teach a pair: those of either mode that the other doesn't explain as well.
+    """The exemplars that teach a pair: those that exactly one of the two modes explains.
 
-    With `keep`, those too that both explain (the thesis' arbitrary labels).
+    With `keep`, those assigned to either (the thesis' arbitrary labels).
     """
     labels = pair_labels(exemplars.assigned, exemplars.columns["fits"], exemplars.modes, i, j, keep)
     rows = np.flatnonzero(labels)
@@ -131,6 +131,12 @@ def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, ke
 
 
 def pair_labels(assigned: Any, fits: Any, modes: tuple[int, ...], i: int, j: int, keep: bool) -> Any:
-    """1 where an example shows mode `i`, -1 where it shows `j`, 0 where it teaches the pair nothing."""
-    fits_i, fits_j = (fits[:, modes.index(mode)] & (not keep) for mode in (i, j))
-    return ((assigned == i) & ~fits_j).astype(np.int8) - ((assigned == j) & ~fits_i)
+    """1 where an example speaks for mode `i`, -1 where it speaks for `j`, 0 where it teaches the pair nothing.
+
+    An example speaks for every mode that explains it, whichever it was assigned to: a slide that bouncing explains too
+    must not let a third mode win against bouncing, or votes go round in circles.
+    """
+    for_i, for_j = assigned == i, assigned == j
+    if not keep:
+        for_i, for_j = (mine | fits[:, modes.index(m)] for m, mine in ((i, for_i), (j, for_j)))
+    return (for_i & ~for_j).astype(np.int8) - (for_j & ~for_i)
