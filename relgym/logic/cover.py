@@ -51,7 +51,8 @@ class Cover:
         self._config = config
         self._swapped = swapped
         self._problem = Problem(tables.facts, tables.tuples, weights, positive)
-        self._length = DescriptionLength(len(tables.facts.relations) + len(tables.functions), tables.size)
+        names = len(tables.facts.relations) + len(tables.functions)
+        self._length = DescriptionLength(names, tables.size, _typical(weights, tables.split))
         self._harvests: dict[bytes, Harvest] = {}
         self._work = 0
 
@@ -151,3 +152,9 @@ class Cover:
         bits = self._length.definition(clauses, covered, uncovered)
         arity = self._tables.arity
         return Definition(tuple(clauses), arity, False, tuple(coverage), uncovered, bits, self._work)
+
+
+def _typical(weights: Float, split: int) -> float:
+    """Mean weight of a tuple of the class whose tuples weigh less, at least 1; rare ones keep their say."""
+    means = [float(part.mean()) for part in (weights[:split], weights[split:]) if len(part)]
+    return max(1.0, min(means, default=1.0))

@@ -67,7 +67,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
     saved: list[float] = []
     work = 0
     for depth in range(1, config.max_literals + 1):
-        found = _Candidates(tables, beam, weights, score, config)
+        found = _Candidates(tables, beam, weights, score, config, length)
         work += tables.size * found.size
         lookahead = config.lookahead if depth < config.max_literals else 0
         beam = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
@@ -123,9 +123,10 @@ class _Candidates:
         weights: Weights,
         score: Score,
         config: FoilConfig,
+        length: DescriptionLength,
     ) -> None:
         self._tables = tables
-        self._threshold_bits = float(np.log2(tables.size + 1.0)) if config.mdl else 0.0
+        self._threshold_bits = length.threshold if config.mdl else 0.0
         self._blocks = [
             (growing, block)
             for growing in beam

@@ -202,6 +202,19 @@ def test_relations_are_preferred_to_numbers_that_say_the_same() -> None:
         assert str(learn(facts, tuples[red], tuples[~red], config=config)) == "red(A)"
 
 
+def test_numbers_of_one_tuple_are_evidence_once_however_much_it_weighs() -> None:
+    rng = np.random.default_rng(7)
+    red = np.arange(200) < 100
+    hue = np.where(red, rng.normal(1.0, 1.0, 200), rng.normal(-1.0, 1.0, 200))
+    truth = red.copy()
+    truth[np.argsort(hue)[-1:]] = True
+    truth[np.argmax(np.where(red, -np.inf, hue))] = True
+    facts = Facts({"red": red[:, None]}, np.ones((200, 1), dtype=np.bool_), {"hue": hue})
+    tuples = np.stack([np.arange(200), np.zeros(200, dtype=np.int64)], axis=1)
+    heavy = {"pos_weights": np.full(truth.sum(), 20.0), "neg_weights": np.full((~truth).sum(), 20.0)}
+    assert str(learn(facts, tuples[truth], tuples[~truth], **heavy)) == "red(A)"
+
+
 def test_without_numeric_literals_only_relations_are_used() -> None:
     facts, tuples, bounces = _bounces(np.random.default_rng(2), 200)
     definition = learn(facts, tuples[bounces], tuples[~bounces], config=FoilConfig(numeric=False))
