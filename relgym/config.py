@@ -58,8 +58,8 @@ class ClassificationConfig:
     mdl
         Whether a clause must pay for its bits in exceptions explained. Default true.
     min_precision
-        Least share of positives among the examples that a clause covers, weighted. Default 0.5, range [0.5, 1]
-        (the original: 0.9 on a held-out quarter). Raising it leaves more to the tree of the fall-through.
+        Least share of positives among the examples that a clause covers, weighted. Default 0.5, range
+        [0.5, 1] (the original: 0.9 on a held-out quarter). Raising it leaves more to the tree of the fall-through.
     clause_tree_threshold
         A clause whose false-positive rate exceeds this gets a decision tree (§3.4.4). Default 0.01, range [0,
         1] (thesis-like: 0.05). Raising it gives fewer trees, that overfit less and separate less.
@@ -76,9 +76,9 @@ class ClassificationConfig:
         Default 0: description length counts a rare class' examples dearly already; 1 gives both classes equal
         say, which makes frequent modes suffer where the data are noisy.
     exemplars_per_state
-        Examples kept per mode and relational state, those that contradicted a classifier first. Default 10, range
-        >= 1. Raising it makes early thresholds sharper and costs time and memory in proportion; on the ball data
-        6, 12 and 30 end equally well, because contradictions stay.
+        Examples kept per mode and relational state, those that contradicted a classifier first. Default 10,
+        range >= 1. Raising it makes early thresholds sharper and costs time and memory in proportion; on the
+        ball data 6, 12 and 30 end equally well, because contradictions stay.
     noise_per_state
         The same for noise, whose examples may still become a rare mode. Default 200, range >= 1.
     max_exemplars
