@@ -59,7 +59,8 @@ class ClassificationConfig:
         Whether a clause must pay for its bits in exceptions explained. Default true.
     min_precision
         Least share of positives among the examples that a clause covers, weighted. Default 0.5, range
-        [0.5, 1] (the original: 0.9 on a held-out quarter). Raising it leaves more to the tree of the fall-through.
+        [0.5, 1] (the original: 0.9 on a held-out quarter). Raising it leaves more to the tree of the
+        fall-through.
     clause_tree_threshold
         A clause whose false-positive rate exceeds this gets a decision tree (§3.4.4). Default 0.01, range [0,
         1] (thesis-like: 0.05). Raising it gives fewer trees, that overfit less and separate less.
