@@ -172,7 +172,7 @@ def _best_columns(
     gains = np.square((a * residual[:, :, None]).sum(axis=1)) / np.where(usable, pivots, np.inf)
     best = gains.max(axis=1)
     slack = np.maximum(4.0 * floor, 1e-12 * left)
-    return np.argmax(gains >= (best - slack)[:, None], axis=1), best > 0.0
+    return np.argmax(usable & (gains >= (best - slack)[:, None]), axis=1), best > 0.0
 
 
 def _distinct(

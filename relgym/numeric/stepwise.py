@@ -187,7 +187,8 @@ def _best_column(
     best = float(gains.max())
     if best / sigma**2 <= 2.0:  # Cp would not fall
         return None
-    return int(np.argmax(gains >= best - max(4.0 * len(residual) * sigma**2, 1e-12 * best)))
+    least = best - max(4.0 * len(residual) * sigma**2, 1e-12 * best)
+    return int(np.argmax(gains >= max(least, 2.0 * sigma**2)))
 
 
 def eliminate_backward(
