@@ -250,9 +250,9 @@ class WorldModel:
                 verdict = self._models[target].predict_one(percept, index, following)
                 column = layout.column(index, target.property)
                 if not np.isfinite(verdict.value):
-                    verdict = replace(
-                        verdict, value=float(scene.vector[column]), outcome=Outcome.OUTSIDE, mode=0
-                    )
+                    # A mode whose value overflows has left its experience; other verdicts say why they are empty.
+                    outcome = Outcome.OUTSIDE if verdict.ok else verdict.outcome
+                    verdict = replace(verdict, value=float(scene.vector[column]), outcome=outcome, mode=0)
                 following[column] = verdict.value
                 parts.append(replace(verdict, object=layout.names[index], property=target.property))
         self._derive(layout, scene.vector[None], following[None])
@@ -284,7 +284,8 @@ class WorldModel:
                 column = layout.column(index, target.property)
                 known = np.isfinite(verdict.values)
                 following[known, column] = verdict.values[known]
-                verdict.outcomes[~known] = OUTCOMES.index(Outcome.OUTSIDE)
+                overflowed = ~known & (verdict.outcomes == OUTCOMES.index(Outcome.PREDICTED))
+                verdict.outcomes[overflowed] = OUTCOMES.index(Outcome.OUTSIDE)
                 verdict.modes[~known] = 0
                 keys.append((layout.names[index], target.property))
                 verdicts.append(verdict)
