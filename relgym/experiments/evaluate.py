@@ -15,13 +15,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.experiments.analytic import AnalyticModes
+from relgym.experiments.analytic import AnalyticModes, Case
 from relgym.experiments.blocks import Block
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
 
-__all__ = ["TOLERANCE", "Evaluation", "ModeErrors", "TargetErrors", "evaluate", "explicable"]
+__all__ = ["TOLERANCE", "Evaluation", "ModeErrors", "TargetErrors", "evaluate", "explicable", "mode_labels"]
 
 TOLERANCE = 1e-9
 """Largest residual of a right prediction, in units of the property."""
@@ -109,14 +109,11 @@ class Evaluation:
                 rows.append(_row(target.total))
         text = table(["what really happened", "examples", "wrong", "silent", "wrong %"], rows)
         notes = [f"wrong: off by more than {TOLERANCE:g}, or silent: not predicted by any mode"]
-        left_out = [
-            f"{t.left_out} of {t.left_out + t.total.examples:,} ({t.target})"
-            for t in self.targets
-            if t.left_out
-        ]
-        if left_out:
-            notes += [f"left out: {', '.join(left_out)}: the engine's own log has a corner hit or several"]
-            notes += ["contacts at once there, and no linear law explains the step"]
+        left_out = [f"{t.left_out} of {t.left_out + t.total.examples:,} ({t.target})" for t in self.targets]
+        if any(t.left_out for t in self.targets):
+            notes += [f"left out: {', '.join(left_out)}:"]
+            notes += ["the engine's own log has a corner hit or several contacts at once, and no linear law"]
+            notes += ["explains the step"]
         return "\n".join([text, "", *notes])
 
 
@@ -139,7 +136,7 @@ def evaluate(model: WorldModel, blocks: Iterable[Block], modes: AnalyticModes | 
     names: dict[str, tuple[str, ...]] = {}
     found: _Parts = {}
     for part in _chunks(blocks):
-        names |= part[0].truth.mode_names
+        names |= part[0].truth.mode_names if modes is None else mode_labels(modes)
         for target, results in _results(model, part, modes).items():
             found.setdefault(target, []).extend(results)
     return Evaluation(tuple(_target_errors(t, names.get(t, ()), np.concatenate(r)) for t, r in found.items()))
@@ -158,6 +155,22 @@ def explicable(block: Block, modes: AnalyticModes | None) -> dict[str, NDArray[n
             v = block.columns("ball", "vx", "vy")
             result[target] |= modes.explaining(target[-1], v[:-1], v[1:], TOLERANCE).any(axis=1)
     return result
+
+
+def mode_labels(modes: AnalyticModes) -> dict[str, tuple[str, ...]]:
+    """For people: per target, in which cases each analytic mode holds (``fly, floor, ceiling``)."""
+    axes = {"ball.vx": modes.x, "ball.vy": modes.y}
+    return {
+        t: tuple(", ".join(dict.fromkeys(map(_label, m.cases))) for m in of_axis)
+        for t, of_axis in axes.items()
+    }
+
+
+def _label(case: Case) -> str:
+    if case.surface == "none":
+        return "fly"
+    where = f"slide on {case.surface}" if case.sliding else case.surface
+    return where if case.slip == "none" else f"{where} ({case.slip}, mu {case.friction:g})"
 
 
 def _row(errors: ModeErrors) -> list[Cell]:

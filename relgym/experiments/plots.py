@@ -96,6 +96,10 @@ def draw_trajectories(path: Path, trajectories: Sequence[Trajectory]) -> Path:
         stop = "" if shown.predicted == steps else f", stops after {shown.predicted}"
         _draw_path(row[1], shown, shown.imagined, f"imagined from the first scene alone{stop}")
         _draw_error(row[2], shown)
+    figure.suptitle(
+        "Paths are coloured by time. On the right: how far the imagined one is off (dashed: 0.01)",
+        fontsize=10,
+    )
     figure.savefig(path, dpi=_DOTS)
     return path
 
@@ -118,9 +122,15 @@ def draw_curves(path: Path, curves: Mapping[str, Mapping[str, Sequence[float]]])
     figure = _figure(12.0, 4.2)
     panels = figure.subplots(1, len(curves), squeeze=False)[0]
     for panel, (title, targets) in zip(panels, curves.items(), strict=True):
-        for colour, (target, shares) in zip(_COLOURS, targets.items(), strict=False):
-            blocks = np.arange(1, len(shares) + 1)
-            panel.plot(blocks, 100.0 * np.array(shares), ".-", color=colour, label=target, lw=1.2, ms=5)
+        for k, (target, shares) in enumerate(targets.items()):
+            blocks, percent = np.arange(1, len(shares) + 1), 100.0 * np.array(shares)
+            # Later curves are thinner: where two agree, both can be seen.
+            style = {
+                "color": _COLOURS[k % len(_COLOURS)],
+                "lw": max(1.0, 3.5 - 2.3 * k),
+                "ms": max(3, 9 - 5 * k),
+            }
+            panel.plot(blocks, percent, ".-", label=target, **style)
         panel.set_yscale("symlog", linthresh=1.0)
         panel.set_ylim(-0.08, 140.0)
         panel.set_yticks([0, 1, 10, 100], ["0", "1", "10", "100"])

@@ -48,11 +48,10 @@ class RolloutErrors:
     median: float
 
     def __str__(self) -> str:
-        rows: list[list[Cell]] = [
-            ["with a corner hit", self.corner, self.failed - self.failed_without_corner],
-            ["without", self.trials - self.corner, self.failed_without_corner],
-            ["all", self.trials, self.failed],
-        ]
+        rows: list[list[Cell]] = [["all", self.trials, self.failed]]
+        if self.corner:
+            rows.insert(0, ["with a corner hit", self.corner, self.failed - self.failed_without_corner])
+            rows.insert(1, ["without", self.trials - self.corner, self.failed_without_corner])
         return (
             table([f"roll-outs of {self.steps} steps", "trials", "failed"], rows)
             + f"\n\nfailed: a position is off by more than {STRAY:g} at some step, or the roll-out stopped "

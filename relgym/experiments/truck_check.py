@@ -57,10 +57,11 @@ class TruckCheck:
             [name, f"mode {mode}" if mode else "not learned"] for name, mode in self.laws
         ]
         spurious = ", ".join(map(str, self.spurious)) or "none"
+        right = f"right mode in {self.right_mode:,}, right roles in {self.right_roles:,}"
         return (
             table(["law of Table 3.1", "learned to 1e-9 as"], rows)
             + f"\n\nother modes: {spurious}; noise: {self.noise} examples"
-            + f"\nof {self.queries:,} queries: right mode in {self.right_mode:,}, right roles in {self.right_roles:,}"
+            + f"\nof {self.queries:,} queries: {right}"
         )
 
 

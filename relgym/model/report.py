@@ -27,6 +27,9 @@ __all__ = [
 _CLAUSE_WIDTH = 62
 """Widest column of clauses, in characters; longer clauses continue on the next line."""
 
+_FUNCTION_WIDTH = 76
+"""The same for functions: a report fits a terminal of 100 columns."""
+
 _OTHERWISE = "otherwise"
 
 
@@ -228,9 +231,14 @@ def _role_rows(part: PropertyModel) -> tuple[RoleRow, ...]:
 
 # ------------------------------------------------------------------ text
 def _mode_table(target: TargetReport) -> str:
-    share = 100.0 * target.noise / target.examples if target.examples else 0.0
-    rows: list[list[Cell]] = [[0, target.noise, f"noise: no mode explains these {share:.2g} %"]]
-    rows += [[m.mode, m.examples, m.function] for m in target.modes]
+    noise = "noise"
+    if target.noise:
+        noise += f": no mode explains these {100.0 * target.noise / target.examples:.2g} %"
+    rows: list[list[Cell]] = [[0, target.noise, noise]]
+    for m in target.modes:
+        first, *rest = wrapped(m.function, _FUNCTION_WIDTH, "+-")
+        rows.append([m.mode, m.examples, first])
+        rows += [["", "", f"      {line}"] for line in rest]
     return table(["mode", "examples", "function"], rows)
 
 
@@ -240,7 +248,7 @@ def _clause_table(pairs: tuple[PairTable, ...]) -> str:
     for pair in pairs:
         rows.append(f"mode {pair.mode} rather than {pair.rival}  (training accuracy {pair.performance:.4f})")
         for row in pair.rows:
-            first, *rest = wrapped(row.clause, _CLAUSE_WIDTH, " ∧ ")
+            first, *rest = wrapped(row.clause, _CLAUSE_WIDTH, "∧")
             rows.append(
                 [f"  {first}", round(row.correct), round(row.incorrect), "yes" if row.tests else "no"]
             )

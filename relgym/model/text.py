@@ -1,11 +1,14 @@
-"""Plain-text tables: aligned columns, numbers to the right, long cells continued on the next line."""
+"""Records as text and as plain data: aligned tables, long lines broken, dictionaries for JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeAlias
+import dataclasses
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
 
-__all__ = ["Cell", "amount", "indented", "table", "wrapped"]
+__all__ = ["Cell", "amount", "indented", "plain", "table", "wrapped"]
 
 Cell: TypeAlias = str | int | float
 """Integers get thousands separators, floats six significant digits."""
@@ -22,7 +25,7 @@ def table(heading: Sequence[str], rows: Sequence[Sequence[Cell] | str]) -> str:
         Names of the columns.
     rows
         As many cells as the heading has, or one string that runs across all columns. Columns that hold
-        numbers only are aligned to the right.
+        only numbers and empty strings are aligned to the right.
 
     Examples
     --------
@@ -33,7 +36,7 @@ def table(heading: Sequence[str], rows: Sequence[Sequence[Cell] | str]) -> str:
        2       295
     """
     cells = [row for row in rows if not isinstance(row, str)]
-    right = [all(not isinstance(row[k], str) for row in cells) for k in range(len(heading))]
+    right = [all(not isinstance(row[k], str) or not row[k] for row in cells) for k in range(len(heading))]
     widths = [max(len(name), *(len(_text(row[k])) for row in cells), 0) for k, name in enumerate(heading)]
 
     def line(row: Sequence[Cell]) -> str:
@@ -48,27 +51,44 @@ def indented(text: str, by: int = 2) -> str:
     return "\n".join(" " * by + line if line else line for line in text.split("\n"))
 
 
-def wrapped(text: str, width: int, separator: str) -> list[str]:
-    """Lines of at most `width` characters, broken before a separator, as far as the parts allow it.
+def wrapped(text: str, width: int, signs: str) -> list[str]:
+    """Lines of at most `width` characters, broken before one of the given signs, if the parts allow it.
 
     Examples
     --------
-    >>> wrapped("wall(B) ∧ intersect(A, B) ∧ floor(C)", 26, " ∧ ")
-    ['wall(B) ∧ intersect(A, B)', '∧ floor(C)']
+    >>> wrapped("v' = 0.5 v - 2 force + 1", 16, "+-")
+    ["v' = 0.5 v", '- 2 force + 1']
     """
-    first, *rest = text.split(separator)
+    first, *rest = re.split(f" (?=[{re.escape(signs)}] )", text)
     lines = [first]
     for part in rest:
-        if len(lines[-1]) + len(separator) + len(part) <= width:
-            lines[-1] += separator + part
+        if len(lines[-1]) + 1 + len(part) <= width:
+            lines[-1] += f" {part}"
         else:
-            lines.append(separator.lstrip() + part)
+            lines.append(part)
     return lines
 
 
 def amount(count: int, noun: str) -> str:
     """Such as ``1 mode`` and ``16,000 examples``."""
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def plain(value: Any) -> Any:
+    """Records as dictionaries, ready for JSON; what JSON has no number for becomes None.
+
+    Examples
+    --------
+    >>> plain({"modes": (1, 2), "median": float("nan")})
+    {'modes': [1, 2], 'median': None}
+    """
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _text(cell: Cell) -> str:

@@ -1,0 +1,211 @@
+"""What people read of a model: the thesis' tables as text, and why a prediction came about."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from relgym.experiments.data import truck_blocks
+from relgym.model.explain import explanations
+from relgym.model.report import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport, report
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
+
+BALL = ObjectType("ball", ("v",))
+SCHEMA = SceneSchema((BALL,), (("b", "ball"),), targets=(Target("ball", "v"),))
+
+
+def halving(steps: int = 12) -> WorldModel:
+    """A model of one ball without a body whose velocity halves."""
+    model, v = WorldModel(SCHEMA), 8.0
+    for _ in range(steps):
+        model.learn_one(Transition(SCHEMA.scene({"b": [v]}), SCHEMA.scene({"b": [0.5 * v]})))
+        v *= 0.5
+    return model
+
+
+@pytest.fixture(scope="module")
+def truck() -> tuple[WorldModel, Scene]:
+    """The truck's model after all 48 blocks, and a scene with a stack of two and a single box."""
+    model, scene = None, None
+    for block in truck_blocks(seed=0):
+        model = model or WorldModel(block.schema)
+        for transition in block.transitions():
+            model.learn_one(transition)
+        if block.configuration["layout"] == 2:
+            scene = block.scene(7)
+    assert model is not None and scene is not None
+    model.finish()
+    return model, scene
+
+
+def test_a_model_without_targets_says_so() -> None:
+    open_schema = SceneSchema((BALL,), (("b", "ball"),))
+    model = WorldModel(open_schema)
+    assert model.describe() == "No targets yet: nothing changed in 0 transitions."
+    assert "no targets yet" in model.explain(open_schema.scene({"b": [1.0]}))
+
+
+def test_a_target_without_modes_says_so() -> None:
+    assert "ball.v: no mode learned yet, 0 examples" in WorldModel(SCHEMA).describe()
+
+
+def test_an_empty_model_explains_that_it_kept_the_value() -> None:
+    text = WorldModel(SCHEMA).explain(SCHEMA.scene({"b": [1.25]}))
+    assert text == (
+        "b.v: 1.25 kept for want of a prediction\n"
+        "  outcome   no mode learned yet: learn from more transitions"
+    )
+
+
+def test_one_mode_word_for_word() -> None:
+    assert halving().describe() == (
+        "Learned from 12 transitions.\n\n" + "─" * 80 + "\n"
+        "ball.v: 1 mode, 12 examples\n\n"
+        "  mode  examples  function\n"
+        "     0         0  noise\n"
+        "     1        12  v' = 0.5 v"
+    )
+
+
+def test_the_only_mode_has_no_rival() -> None:
+    assert halving().explain(SCHEMA.scene({"b": [3.0]})) == (
+        "b.v: 3 -> 1.5\n"
+        "  mode      1: v' = 0.5 v  (12 training examples)\n"
+        "  roles     b\n"
+        "  because   no other mode is known"
+    )
+
+
+def test_records_as_text_word_for_word() -> None:
+    pair = PairTable(
+        2,
+        1,
+        (
+            ClauseRow("ramp(B) ∧ approaching(A, B)", 295.0, 1.0, ("F1 - F2 <= 0.5 -> yes (295 : 1)",)),
+            ClauseRow("otherwise", 15574.0, 26.0),
+        ),
+    )
+    target = TargetReport(
+        "ball.vx",
+        "ball",
+        105,
+        (ModeRow(1, 15600, "vx' = vx"), ModeRow(2, 295, "vx' = -0.9 vx")),
+        (pair,),
+        (RoleRow(2, "box", ("box_a",), "on-top(C, B)"), RoleRow(2, "box", ("box_b", "box_c"), "")),
+    )
+    assert pair.performance == pytest.approx(15869 / 15896)
+    text = str(ModelReport(16000, (target,)))
+    body = text.split("─" * 80)[1]
+    assert body == (
+        "\nball.vx: 2 modes, 16,000 examples\n\n"
+        "  mode  examples  function\n"
+        "     0       105  noise: no mode explains these 0.66 %\n"
+        "     1    15,600  vx' = vx\n"
+        "     2       295  vx' = -0.9 vx\n\n"
+        "  clauses                        correct  incorrect  tree\n"
+        "  mode 2 rather than 1  (training accuracy 0.9983)\n"
+        "    ramp(B) ∧ approaching(A, B)      295          1  yes\n"
+        "        F1 - F2 <= 0.5 -> yes (295 : 1)\n"
+        "    otherwise                     15,574         26  no\n\n"
+        "  mode  role          who plays it\n"
+        "     2  box_a         a box B with on-top(C, B)\n"
+        "     2  box_b, box_c  any box\n\n"
+    )
+    assert "F1 is what mode 1 would predict" in text
+    assert "* is any object" not in text
+
+
+def test_long_lines_are_broken() -> None:
+    clause = " ∧ ".join(f"x-greater-than(A, {letter})" for letter in "BCDEFG")
+    function = "vx' = vx" + " - 2.5 box_a.friction" * 6
+    pair = PairTable(1, 2, (ClauseRow(clause, 1.0, 0.0), ClauseRow("otherwise", 1.0, 0.0)))
+    text = str(TargetReport("t.vx", "t", 0, (ModeRow(1, 1, function), ModeRow(2, 1, "vx' = 0")), (pair,), ()))
+    assert max(map(len, text.split("\n"))) <= 100
+    assert text.count("x-greater-than") == 6 and text.count("box_a.friction") == 6
+
+
+def test_a_pair_without_examples_is_not_wrong() -> None:
+    assert PairTable(1, 2, (ClauseRow("otherwise", 0.0, 0.0),)).performance == 1.0
+
+
+def test_truck_report_is_table_3_1(truck: tuple[WorldModel, Scene]) -> None:
+    velocity = report(truck[0]).targets[0]
+    found = {mode.function: mode.examples for mode in velocity.modes}
+    force = "vx' = vx + 0.025 action.force"
+    assert found == {
+        f"{force} - 7.5 box.friction": 480,
+        f"{force} - 5 box_a.friction - 2.5 box_b.friction": 960,
+        f"{force} - 2.5 box_a.friction - 2.5 box_b.friction - 2.5 box_c.friction": 480,
+    }
+    assert velocity.noise == 0 and velocity.examples == 1920
+
+
+def test_truck_clauses_are_perfect_as_in_table_3_2(truck: tuple[WorldModel, Scene]) -> None:
+    velocity = report(truck[0]).targets[0]
+    assert [pair.performance for pair in velocity.pairs] == [1.0, 1.0, 1.0]
+    counts = {mode.mode: mode.examples for mode in velocity.modes}
+    for pair in velocity.pairs:
+        *clauses, otherwise = pair.rows
+        # Not exact: a classifier remembers a sample of its examples, each with a weight.
+        assert sum(row.correct for row in clauses) == pytest.approx(counts[pair.mode], rel=0.01)
+        assert otherwise.correct == pytest.approx(counts[pair.rival], rel=0.01)
+
+
+def test_truck_roles_as_in_figure_3_8(truck: tuple[WorldModel, Scene]) -> None:
+    velocity = report(truck[0]).targets[0]
+    by_size = {row.roles: row for row in velocity.roles if row.roles != ("box",)}
+    assert set(by_size) == {("box_a",), ("box_b",), ("box_a", "box_b", "box_c")}
+    assert by_size["box_a", "box_b", "box_c"].rule == "", "any box can fulfil any role"
+    assert by_size["box_a",].rule and by_size["box_b",].rule
+    assert all(row.type == "box" for row in velocity.roles), "the action is the only one of its type"
+
+
+def test_explanation_names_the_objects_that_play_the_roles(truck: tuple[WorldModel, Scene]) -> None:
+    model, scene = truck
+    first = explanations(model, scene)[0]
+    assert first.mode is not None and first.mode.examples == 960
+    stacked = next(o.name for o in scene if o.type.name == "box" and o["py"] > scene["truck"]["py"] + 2.0)
+    assert stacked not in first.prediction.roles
+    text = str(first)
+    assert f"{first.now:.7g} -> {first.prediction.value:.7g}" in text
+    assert f"box_a = {first.prediction.roles[2]}" in text
+    assert [reason.winner for reason in first.reasons] == [first.mode.id] * 2
+
+
+def test_clauses_of_an_explanation_hold_for_the_objects_it_names(truck: tuple[WorldModel, Scene]) -> None:
+    model, scene = truck
+    reasons = [r for e in explanations(model, scene) for r in e.reasons if r.clause]
+    assert reasons, "at least one pair must have been decided by a clause"
+    for reason in reasons:
+        letters = {
+            letter for letter in "BCDE" if f"{letter})" in reason.clause or f"{letter}," in reason.clause
+        }
+        assert reason.objects[0] == ("A", "truck")
+        assert letters <= {variable for variable, _ in reason.objects}
+        assert all(name in scene for _, name in reason.objects)
+
+
+def test_open_roles_have_no_value_until_they_are_filled(truck: tuple[WorldModel, Scene]) -> None:
+    model, scene = truck
+    rivals = [r for r in explanations(model, scene)[0].reasons if math.isnan(r.rival_value)]
+    assert rivals
+    assert "roles would have to be filled" in model.explain(scene)
+
+
+def test_saving_changes_no_word(truck: tuple[WorldModel, Scene], tmp_path: Path) -> None:
+    model, scene = truck
+    model.save(tmp_path / "truck.json")
+    loaded = WorldModel.load(tmp_path / "truck.json")
+    assert loaded.describe(digits=12) == model.describe(digits=12)
+    assert loaded.explain(scene) == model.explain(scene)
+
+
+def test_describing_and_explaining_change_nothing(truck: tuple[WorldModel, Scene]) -> None:
+    model, scene = truck
+    before = model.to_json()
+    model.describe()
+    model.explain(scene)
+    assert model.to_json() == before

@@ -1,0 +1,141 @@
+"""The console commands: what they print, write and return."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from relgym.cli import app
+from relgym.experiments import demo
+from relgym.model.world_model import WorldModel
+
+RUNNER = CliRunner()
+
+
+def run(*arguments: Any, code: int = 0) -> str:
+    result = RUNNER.invoke(app, [str(a) for a in arguments])
+    assert result.exit_code == code, result.output
+    return result.stdout if code == 0 else result.output
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that holds what `relgym demo --quick --json` wrote, and its output."""
+    out = tmp_path_factory.mktemp("demo")
+    (out / "output.json").write_text(run("demo", "--quick", "--json", "--out", out), encoding="utf-8")
+    return out
+
+
+def test_demo_tells_what_it_learned_measured_and_wrote(folder: Path) -> None:
+    told = json.loads((folder / "output.json").read_text(encoding="utf-8"))
+    assert set(told["worlds"]) == {"truck", "ball"}
+    truck, ball = told["worlds"]["truck"], told["worlds"]["ball"]
+    assert (truck["transitions"], ball["transitions"]) == (320, 1600)
+    functions = {m["function"] for m in ball["report"]["targets"][0]["modes"]}
+    assert {"vx' = vx", "vx' = -0.9 vx"} <= functions
+    assert len(ball["curve"]) == 8 and ball["figures"]["evaluation"]["targets"]
+    for file in (*told["pictures"].values(), truck["file"], ball["file"]):
+        assert Path(file).stat().st_size > 1000
+
+
+def test_demo_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    truck, folder = demo.demonstrations(quick=True)[0], tmp_path
+    monkeypatch.setattr(demo, "demonstrations", lambda *, quick: (truck,))
+    text = run("demo", "--quick", "--out", folder)
+    assert "vx' = vx + 0.025 action.force - 7.5 box.friction" in text
+    assert "On fresh scenes" in text
+    for file in ("truck.json", "trajectories.png", "learning.png"):
+        assert str(folder / file) in text
+    assert max(map(len, text.split("\n"))) <= max(100, len(str(folder)) + 40)
+
+
+def test_rules_print_a_model(folder: Path) -> None:
+    model = WorldModel.load(folder / "ball.json")
+    assert run("rules", folder / "ball.json").rstrip("\n") == model.describe()
+    told = json.loads(run("rules", folder / "ball.json", "--json"))
+    assert [t["target"] for t in told["targets"]] == ["ball.vx", "ball.vy"]
+
+
+def test_explain_a_scene_of_an_env(folder: Path) -> None:
+    text = run("explain", folder / "ball.json", "relgym/BallBoxRamp-v0", "--step", 3, "--seed", 1)
+    assert "ball.vx: " in text and "ball.vy: " in text
+
+
+def test_explain_an_action(folder: Path) -> None:
+    text = run("explain", folder / "truck.json", "relgym/TruckPush-v0", "--arg", "redraw=step")
+    assert "truck.vx: 0" in text
+
+
+def test_eval_and_rollout(folder: Path) -> None:
+    told = json.loads(run("eval", folder / "truck.json", "--world", "truck", "--json"))
+    assert {t["target"]: sum(m["examples"] for m in t["modes"]) for t in told["targets"]} == {
+        "truck.vx": 1920,
+        "box.px": 5760,
+    }
+    assert "what really happened" in run("eval", folder / "truck.json", "--world", "truck")
+    told = json.loads(run("rollout", folder / "truck.json", "--world", "truck", "--trials", 5, "--json"))
+    assert told["trials"] == 5
+
+
+def test_learn_writes_a_model(tmp_path: Path) -> None:
+    file = tmp_path / "truck.json"
+    run("learn", "relgym/TruckPush-v0", "-a", "redraw=step", "-a", "n_boxes=2", "--steps", 60, "--out", file)
+    model = WorldModel.load(file)
+    assert model.seen == 60
+    assert [name for name, kind in model.schema.objects if kind == "box"] == ["box1", "box2"]
+
+
+def test_the_same_seed_writes_the_same_file(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        run("learn", "relgym/BallBoxRamp-v0", "--steps", 250, "--seed", 4, "--out", tmp_path / name)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_envs_are_listed() -> None:
+    told = json.loads(run("envs", "--json"))
+    assert {"relgym/BallBoxRamp-v0", "relgym/TruckPush-v0"} <= set(told)
+    assert all(told.values()), "every env says in a line what it is"
+    assert run("envs").count("relgym/") >= len(told)
+
+
+def test_inspect_shows_types_and_relations() -> None:
+    text = run("inspect", "relgym/TruckPush-v0", "-a", "n_boxes=1")
+    for part in ("truck.px' = px + vx'", "box1    box", "intersect: (box1, truck), (truck, box1)"):
+        assert part in text
+
+
+def test_doctor_finds_everything_that_the_tests_run_with() -> None:
+    told = {f["name"]: f for f in json.loads(run("doctor", "--json"))}
+    assert all(f["ok"] for f in told.values() if f["required"])
+    assert told["relgym/BallBoxRamp-v0"]["text"] == "made, reset and stepped"
+    assert not told["torch"]["required"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("rules", "missing.json"), "No such file"),
+        (("inspect", "relgym/Nowhere-v0"), "relgym envs"),
+        (("inspect", "CartPole-v1"), "schema"),
+        (("inspect", "relgym/TruckPush-v0", "-a", "n_boxes"), "NAME=VALUE"),
+        (("inspect", "relgym/TruckPush-v0", "-a", "n_boxes=99"), "n_boxes"),
+        (("learn", "CartPole-v1", "--steps", "5", "--out", "x.json"), "schema"),
+    ],
+)
+def test_foreseeable_errors_are_sentences(arguments: tuple[str, ...], message: str) -> None:
+    text = run(*arguments, code=2)
+    assert text.startswith("relgym: ") and message in text
+    assert "Traceback" not in text
+
+
+def test_another_kind_of_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("hello", encoding="utf-8")
+    assert "expected a relgym model" in run("rules", tmp_path / "notes.txt", code=2)
+
+
+def test_an_unknown_world_is_refused(folder: Path) -> None:
+    assert "['ball', 'truck']" in run("eval", folder / "ball.json", "--world", "moon", code=2)
