@@ -37,8 +37,8 @@ class ClassificationConfig:
         Whether the two modes' predictions and their difference are offered as numbers. Default true.
         Boundaries of friction and halting become one threshold.
     ambiguous
-        What to do with an example that several modes explain. ``"drop"`` (default): it speaks for each of them
-        against all modes that don't explain it, and teaches nothing to a pair of them. ``"keep"``: it
+        What to do with an example that several modes explain. ``"drop"`` (default): it speaks for each of
+        them against all modes that don't explain it, and teaches nothing to a pair of them. ``"keep"``: it
         counts for the mode it was assigned to, as in the thesis.
     both_polarities
         Whether either mode of a pair may be the positive class (§3.4.5). Default true.

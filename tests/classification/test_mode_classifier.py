@@ -301,3 +301,17 @@ def _taught_truck(classifier: ModeClassifier, blocks: int, bystanders: int = 0) 
     for item in truck_stream(blocks, rng=np.random.default_rng(0), bystanders=bystanders):
         classifier.observe(item.example, item.mode, item.fits, item.values)
         classifier.refresh()
+
+
+def test_an_ambiguous_example_speaks_for_both_modes_against_a_third() -> None:
+    # Else votes go round in circles: 0 beats 2, 1 is a tie with 0, and 2, never taught otherwise, beats 1.
+    classifier = _empty((0, 1, 2))
+    items = list(ball_stream(200, rng=np.random.default_rng(0)))
+    for item in items:
+        flying = item.mode == FLY
+        fits = np.array([flying, flying, not flying])
+        classifier.observe(item.example, 0 if flying else 2, fits, np.full(3, np.nan))
+        classifier.refresh()
+    told = {(c.i, c.j): sum(map(sum, c.counts)) for c in classifier.classifiers}
+    assert told[0, 1] == 0
+    assert told[0, 2] == told[1, 2] == pytest.approx(200, rel=2e-3)
