@@ -131,7 +131,7 @@ def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, ke
 
 
 def pair_labels(assigned: Any, fits: Any, modes: tuple[int, ...], i: int, j: int, keep: bool) -> Any:
-    """1 where an example speaks for mode `i`, -1 where it speaks for `j`, 0 where it teaches the pair nothing.
+    """1 where an example speaks for mode `i`, -1 where it speaks for `j`, 0 where it teaches nothing.
 
     An example speaks for every mode that explains it, whichever it was assigned to: a slide that bouncing
     explains too must not let a third mode win against bouncing, or votes go round in circles.
