@@ -15,7 +15,7 @@ from relgym.classification.examples import NOISE, Bools, Example, ExampleBatch, 
 from relgym.classification.exemplars import Exemplars
 from relgym.classification.familiarity import Familiarity, situations, used_by
 from relgym.classification.learning import Lesson
-from relgym.classification.pairs import PairState, lesson_of, pair_labels
+from relgym.classification.pairs import PairState, covered_by, lesson_of, pair_labels
 from relgym.classification.ranking import Ranking, RankingBatch, Verdict
 from relgym.classification.views import Scope, View
 from relgym.classification.voting import Voting
@@ -242,8 +242,9 @@ class ModeClassifier:
         keep, wrong = self.config.ambiguous == "keep", 0
         explained = dict(zip(self.modes, np.asarray(fits).tolist(), strict=True))
         for at, ((i, j), pair) in enumerate(self._pairs.items()):
-            for_i, for_j = (assigned == m if keep else explained[m] for m in (i, j))
-            if for_i == for_j:
+            for_i, for_j = (assigned == m or (not keep and (assigned, m) in self._covered) for m in (i, j))
+            other = j if for_i else i
+            if for_i == for_j or (explained[other] and not keep):
                 continue
             wrong += pair.observe(outcomes[at], for_i, self.config.relearn_growth)
             self._voting.recount(at)
@@ -291,6 +292,12 @@ class ModeClassifier:
     def _pairs_changed(self) -> None:
         self._voting.set_pairs(self.classifiers)
         self._seen = None
+        assigned, fits = self.exemplars.assigned, self.exemplars.columns["fits"]
+        self._covered = {
+            (k, m)
+            for at, m in enumerate(self.modes if len(assigned) else ())
+            for k in covered_by(assigned, fits[:, at] | (assigned == m))
+        }
 
 
 def _same(a: Floats, b: Floats) -> bool:

@@ -8,13 +8,17 @@ from typing import Any
 import numpy as np
 
 from relgym.classification.binary import BinaryClassifier, majority
+from relgym.classification.examples import NOISE
 from relgym.classification.exemplars import Exemplars
 from relgym.classification.learning import Lesson, learn_pair
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
 
-__all__ = ["PairState", "lesson_of"]
+__all__ = ["PairState", "covered_by", "lesson_of"]
+
+COVERED = 0.95
+"""Share of a mode's examples that another mode must explain to cover it."""
 
 
 @dataclass(slots=True)
@@ -121,7 +125,7 @@ class PairState:
 
 
 def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, keep: bool) -> Lesson:
-    """The exemplars that teach a pair: those that exactly one of the two modes explains.
+    """The exemplars that teach a pair: those that speak for one of its modes and that the other doesn't explain.
 
     With `keep`, those assigned to either (the thesis' arbitrary labels).
     """
@@ -133,10 +137,30 @@ def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, ke
 def pair_labels(assigned: Any, fits: Any, modes: tuple[int, ...], i: int, j: int, keep: bool) -> Any:
     """1 where an example speaks for mode `i`, -1 where it speaks for `j`, 0 where it teaches nothing.
 
-    An example speaks for every mode that explains it, whichever it was assigned to: a slide that bouncing
-    explains too must not let a third mode win against bouncing, or votes go round in circles.
+    An example speaks for the mode it was assigned to, and for every mode that *covers* that one. Bouncing covers
+    sliding: a slide must not let a third mode win against bouncing, or votes go round in circles. A mode that explains
+    some of another's examples by chance covers nothing.
     """
     for_i, for_j = assigned == i, assigned == j
-    if not keep:
-        for_i, for_j = (mine | fits[:, modes.index(m)] for m, mine in ((i, for_i), (j, for_j)))
-    return (for_i & ~for_j).astype(np.int8) - (for_j & ~for_i)
+    if keep:
+        return for_i.astype(np.int8) - for_j
+    fits_i, fits_j = (fits[:, modes.index(m)] | mine for m, mine in ((i, for_i), (j, for_j)))
+    for_i |= fits_i & np.isin(assigned, covered_by(assigned, fits_i))
+    for_j |= fits_j & np.isin(assigned, covered_by(assigned, fits_j))
+    return (for_i & ~fits_j).astype(np.int8) - (for_j & ~fits_i)
+
+
+def covered_by(assigned: Any, explained: Any) -> list[int]:
+    """Modes nearly all of whose examples another mode explains.
+
+    Parameters
+    ----------
+    assigned
+        Mode of each example, shape ``(n,)``.
+    explained
+        Whether the other mode explains it, shape ``(n,)``.
+    """
+    shifted = assigned - NOISE
+    total = np.bincount(shifted)
+    share = np.bincount(shifted, weights=explained, minlength=len(total)) >= COVERED * np.maximum(total, 1)
+    return [int(m) + NOISE for m in np.flatnonzero(share & (total > 0)) if m + NOISE != NOISE]
