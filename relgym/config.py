@@ -203,11 +203,11 @@ class ClusteringConfig:
         _one_of(self, stickiness=("simple", "nearest"))
         _at_least(self, 1, "draws", "support")
         _at_least(self, 0, "max_terms")
-        if self.noise_std != "auto" and not (isinstance(self.noise_std, float) and self.noise_std > 0):
+        noise: object = self.noise_std
+        least: object = self.min_examples
+        if noise != "auto" and not (isinstance(noise, int | float) and noise > 0):
             raise ConfigError(f"noise_std must be 'auto' or a positive float, got {self.noise_std!r}")
-        if self.min_examples != "auto" and not (
-            isinstance(self.min_examples, int) and self.min_examples >= 4
-        ):
+        if least != "auto" and not (isinstance(least, int) and least >= 4):
             raise ConfigError(f"min_examples must be 'auto' or an int >= 4, got {self.min_examples!r}")
         if not 0.5 <= self.unify_ratio <= 1.0:
             raise ConfigError(f"unify_ratio must lie in [0.5, 1], got {self.unify_ratio}")
