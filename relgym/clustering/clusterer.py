@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import Scale, find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode, Role
-from relgym.clustering.noise import estimate_noise, rounding_noise
+from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import covering, reordered, unified, unified_family
 from relgym.config import ClusteringConfig
@@ -89,10 +90,7 @@ class ModeClusterer:
         self.clusters: dict[int, Cluster] = {}
         self.scale = Scale(1e-12, config.inlier_stds, config.tail_stds)
         self._rng = np.random.default_rng(seed)
-        self._y = np.zeros(256)
-        self._label = np.zeros(256, dtype=np.int32)
-        self._rows = np.zeros(256, dtype=np.int64)
-        self._size = 0
+        self._log = AssignmentLog()
         self._next_id = 1
         self._searches: dict[int, _Search] = {}
         self._largest = 0.0
@@ -102,22 +100,22 @@ class ModeClusterer:
     @property
     def y(self) -> NDArray[np.float64]:
         """Target values of all examples, shape ``(n,)``."""
-        return self._y[: self._size]
+        return self._log.y
 
     @property
     def labels(self) -> NDArray[np.int32]:
         """Mode id of every example, shape ``(n,)``."""
-        return self._label[: self._size]
+        return self._log.labels
 
     @property
     def rows(self) -> NDArray[np.int64]:
         """Row of every example in the example table, shape ``(n,)``."""
-        return self._rows[: self._size]
+        return self._log.rows
 
     @property
     def modes(self) -> tuple[Mode, ...]:
         """All modes but noise, by id."""
-        if not self._size:
+        if not len(self._log):
             return tuple(c.mode for _, c in sorted(self.clusters.items()))
         counts = np.bincount(self.labels, minlength=self._next_id)
         return tuple(c.mode.with_examples(int(counts[i])) for i, c in sorted(self.clusters.items()))
@@ -125,7 +123,7 @@ class ModeClusterer:
     @property
     def noise_examples(self) -> int:
         """Number of examples no mode explains."""
-        return int((self.labels == NOISE).sum()) if self._size else self._known_noise
+        return int((self.labels == NOISE).sum()) if len(self._log) else self._known_noise
 
     def fits(
         self, table: ExampleTable, examples: NDArray[np.intp]
@@ -151,43 +149,31 @@ class ModeClusterer:
         y
             The property's next value.
         """
+        before = set(self.clusters)
         example = self._append(table, row, y)
         errors = self._errors_of(table, example)
         fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
         if fitting:
             mode = preferred(fitting, errors, self.clusters, self.scale, self.config)
-            self._label[example] = mode
-            newest = self._next_id
+            self.labels[example] = mode
             self._grow(table, mode)
-            created = tuple(range(newest, self._next_id))
-            return ClusterReport(int(self._label[example]), tuple(sorted((*fitting, *created))), created)
-        if errors and min(errors.values()) <= self.scale.tail:
-            return ClusterReport(NOISE, ())  # a known mode's tail seeds nothing
-        before = set(self.clusters)
-        self._discover(table, example)
+        elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
+            self._discover(table, example)
         after = set(self.clusters)
-        if before == after:
-            return ClusterReport(NOISE, ())
-        ids, fits = self.fits(table, np.array([example]))
-        explained = tuple(i for i, ok in zip(ids, fits[0], strict=True) if ok)
+        if after != set(errors):
+            ids, fits = self.fits(table, np.array([example]))
+            fitting = [i for i, ok in zip(ids, fits[0], strict=True) if ok]
         created, removed = tuple(sorted(after - before)), tuple(sorted(before - after))
-        return ClusterReport(int(self._label[example]), explained, created, removed)
+        return ClusterReport(int(self.labels[example]), tuple(sorted(fitting)), created, removed)
 
     def _append(self, table: ExampleTable, row: int, y: float) -> int:
-        if self._size == len(self._y):
-            room = (0, max(256, self._size))
-            self._y = np.pad(self._y, room)
-            self._label = np.pad(self._label, room)
-            self._rows = np.pad(self._rows, room)
-        self._y[self._size], self._rows[self._size] = y, row
-        self._label[self._size] = NOISE
-        self._size += 1
+        example = self._log.append(row, y)
         core = table.signatures[table.signature_ids[row]].core
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
-        if largest > self._largest or self._size in ESTIMATE_AT:
+        if largest > self._largest or len(self._log) in ESTIMATE_AT:
             self._largest = max(largest, self._largest)
             self._rescale(table)
-        return self._size - 1
+        return example
 
     def _errors_of(self, table: ExampleTable, example: int) -> dict[int, float]:
         rows, y = self.rows[example : example + 1], self.y[example : example + 1]
@@ -220,7 +206,7 @@ class ModeClusterer:
             return
         self.clusters[bare.id] = Cluster(bare, fitted=len(idle))
         self._next_id += 1
-        self._label[idle] = bare.id
+        self.labels[idle] = bare.id
 
     # ------------------------------------------------------------------ noise scale
     def _rescale(self, table: ExampleTable) -> None:
@@ -228,9 +214,10 @@ class ModeClusterer:
             self.scale = replace(self.scale, sigma=float(self.config.noise_std))
             return
         floor = rounding_noise(np.array([[self._largest]]), self.y[:256])
-        if self._size in ESTIMATE_AT and 2 * self.noise_examples > self._size:
+        if len(self._log) in ESTIMATE_AT and 2 * self.noise_examples > len(self._log):
             estimate = self._estimate(table, floor)
-            if estimate > 2.0 * self.scale.sigma:
+            explained = 1.0 - self.noise_examples / len(self._log)
+            if refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
                 self.scale = replace(self.scale, sigma=estimate)
                 self._start_over()
         self.scale = replace(self.scale, sigma=max(floor, self.scale.sigma))
@@ -247,7 +234,7 @@ class ModeClusterer:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""
         self.clusters.clear()
         self._searches.clear()
-        self._label[: self._size] = NOISE
+        self.labels[:] = NOISE
 
     # ------------------------------------------------------------------ discovery (§3.2.2)
     def _discover(self, table: ExampleTable, example: int) -> None:
@@ -257,17 +244,19 @@ class ModeClusterer:
         if search.waiting <= search.failures // 6:
             return
         for _ in range(MOST_DISCOVERIES):
-            if not self._search_once(table, signature, fresh=search.waiting):
+            pool = self._pool(table, signature)
+            if len(pool) < least_examples(self.y[pool], self.scale, self.config):
+                break  # not a failure: nothing was searched
+            if not self._search_once(table, signature, pool, fresh=search.waiting):
                 search.failures += 1
                 break
             search.failures = 0
         search.waiting = 0
 
-    def _pool(self, table: ExampleTable, signature: int | None) -> NDArray[np.intp]:
-        """Noise examples (of one signature) that aren't some mode's tail, oldest first."""
-        pool = np.flatnonzero(self.labels == NOISE)
-        if signature is not None:
-            pool = pool[table.signature_ids[self.rows[pool]] == signature]
+    def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
+        """Noise examples of one signature that aren't some mode's tail, oldest first."""
+        pool: NDArray[np.intp] = np.flatnonzero(self.labels == NOISE)
+        pool = pool[table.signature_ids[self.rows[pool]] == signature]
         if len(pool) and self.clusters:
             near = np.full(len(pool), np.inf)
             for cluster in self.clusters.values():
@@ -275,11 +264,10 @@ class ModeClusterer:
             pool = pool[near > self.scale.tail]
         return pool
 
-    def _search_once(self, table: ExampleTable, signature: int, fresh: int) -> bool:
-        pool = self._pool(table, signature)
+    def _search_once(
+        self, table: ExampleTable, signature: int, pool: NDArray[np.intp], *, fresh: int
+    ) -> bool:
         y = self.y[pool]
-        if len(pool) < least_examples(y, self.scale, self.config):
-            return False
         slots = table.signatures[signature]
         order, stages = slots.preference(self.target)
         rows = self.rows[pool]
@@ -396,15 +384,15 @@ class ModeClusterer:
     def _remove(self, mode: int) -> None:
         """A deleted mode gives its examples back to the noise, from where others take them."""
         del self.clusters[mode]
-        self._label[: self._size][self.labels == mode] = NOISE
+        self.labels[self.labels == mode] = NOISE
 
     def _reassign(self, table: ExampleTable, new: int) -> None:
         """E-step for a new mode: it takes what it explains from the noise and from less simple modes."""
-        everyone = self._explained(table, self.clusters[new], np.arange(self._size))
+        everyone = self._explained(table, self.clusters[new], np.arange(len(self._log)))
         for example in everyone:
-            held = int(self._label[example])
+            held = int(self.labels[example])
             if held == NOISE or _simpler(self.clusters[new].mode, self.clusters[held].mode):
-                self._label[example] = new
+                self.labels[example] = new
         self._prune(table)
         for i in [new] if new in self.clusters else []:
             members = np.flatnonzero(self.labels == i)
@@ -426,7 +414,7 @@ class ModeClusterer:
             fitting = [i for i, ok in zip(ids, row, strict=True) if ok]
             if fitting:
                 errors = self._errors_of(table, int(example))
-                self._label[example] = preferred(fitting, errors, self.clusters, self.scale, self.config)
+                self.labels[example] = preferred(fitting, errors, self.clusters, self.scale, self.config)
 
     # ------------------------------------------------------------------ saving
     def to_json(self) -> dict[str, Any]:
@@ -444,7 +432,7 @@ class ModeClusterer:
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """The examples: target values, modes and rows."""
-        return {"y": self.y, "labels": self.labels, "rows": self.rows}
+        return self._log.to_arrays()
 
     def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         """Take over what `to_json` and `to_arrays` wrote; without arrays there are no examples."""
@@ -457,12 +445,7 @@ class ModeClusterer:
         self._searches = {int(i): _Search(int(w), int(f)) for i, w, f in data["searches"]}
         self._rng.bit_generator.state = data["random"]
         if arrays:
-            self._y, self._label, self._rows = (
-                arrays["y"].copy(),
-                arrays["labels"].copy(),
-                arrays["rows"].copy(),
-            )
-            self._size = len(self._y)
+            self._log = AssignmentLog.from_arrays(arrays)
 
 
 def _simpler(mode: Mode, rival: Mode) -> bool:

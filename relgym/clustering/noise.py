@@ -7,10 +7,19 @@ from numpy.typing import NDArray
 
 from relgym.numeric.stepwise import forward_stepwise
 
-__all__ = ["estimate_noise", "rounding_noise"]
+__all__ = ["estimate_noise", "refuted", "rounding_noise"]
 
 MOST_WINDOWS = 24
 """At most about this many windows are looked at."""
+
+SAME_ORDER = 100.0
+"""Noise larger than assumed by at most this factor may have hidden examples of the modes known so far."""
+
+EXPLAINED = 0.1
+"""Share of explained examples that makes noise of another order implausible."""
+
+FEW = 128
+"""Fewer examples than this can't tell noise as large as the signal from laws not seen yet."""
 
 ROUNDINGS = 32.0
 """A function of a few terms on differences of stored numbers carries at most about this many roundings."""
@@ -69,3 +78,25 @@ def estimate_noise(
         return floor
     estimate = float(np.quantile(spreads, 0.25))
     return estimate if estimate > 4.0 * floor else floor
+
+
+def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.float64]) -> bool:
+    """Whether an estimate of the noise refutes the one that was assumed.
+
+    Where a good part of the examples is explained, only a noise of the same order does: the others just obey
+    no law that is known yet. As long as there are few examples, a noise as large as the signal says nothing.
+
+    Parameters
+    ----------
+    sigma, estimate
+        The noise as assumed and as estimated, in units of y.
+    explained
+        Share of the examples that modes explain under the assumption.
+    y
+        All responses, shape ``(n,)``.
+    """
+    if explained > EXPLAINED and estimate > SAME_ORDER * sigma:
+        return False
+    if len(y) < FEW and estimate > 0.5 * float(y.std()):
+        return False
+    return estimate > 2.0 * sigma

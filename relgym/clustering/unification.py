@@ -74,22 +74,45 @@ def unified(
     order, stages = slots.preference(target)
     pooled = np.concatenate(sides)
     allowed = simpler_than[0].parameters + simpler_than[1].parameters
+    everyone = [side[signatures[side] == signature] for side in (new, old)]
+    if _persist(table.x[:, order[0]], rows, y, everyone, scale, config):
+        return signature, LinearFit((int(order[0]),), (1.0,), 0.0, 0.0)
     for width in stages[:1] if config.own_only else stages:
         x = table.x[rows[pooled]][:, order[:width]]
         fit = forward_stepwise(x, y[pooled], sigma=scale.sigma, max_terms=min(config.max_terms, allowed))
         if fit.terms >= allowed or np.abs(y[pooled] - fit.predict(x)).max() > scale.tolerance:
             continue
-        everyone = np.concatenate([side[signatures[side] == signature] for side in (new, old)])
-        x = table.x[rows[everyone]][:, order[:width]]
-        found = identified(x, y[everyone], fit, scale=scale, support=config.support)
+        both = np.concatenate(everyone)
+        x = table.x[rows[both]][:, order[:width]]
+        found = identified(x, y[both], fit, scale=scale, support=config.support)
         if found is None or found.fit.terms >= allowed:
             continue
-        split = int((signatures[new] == signature).sum())
-        shares = (found.inliers[:split].mean(), found.inliers[split:].mean())
+        shares = [part.mean() for part in np.split(found.inliers, [len(everyone[0])])]
         acts = [np.abs(y[side]) > scale.tolerance for side in sides]
         if min(shares) >= config.unify_ratio and min(a.mean() for a in acts) >= 0.5:
             return signature, reordered(found.fit, order)
     return None
+
+
+def _persist(
+    present: NDArray[np.float64],
+    rows: NDArray[np.integer],
+    y: NDArray[np.float64],
+    sides: list[NDArray[np.intp]],
+    scale: Scale,
+    config: ClusteringConfig,
+) -> bool:
+    """Whether on each side the property keeps its value, and isn't at rest.
+
+    Of two constants ``v' = c`` this is the general law (§3.2.5). It has no parameter to be fitted, so that a
+    few examples which a side owes to coincidence (v arrives at c) can't spoil it.
+    """
+    for side in sides:
+        kept = np.abs(y[side] - present[rows[side]]) <= scale.tolerance
+        moving = np.abs(y[side]) > scale.tolerance
+        if kept.mean() < config.unify_ratio or moving.mean() < 0.5:
+            return False
+    return True
 
 
 def unified_family(
@@ -126,9 +149,9 @@ def unified_family(
     part = middle[usable]
     x = table.x[rows[part]]
     constants = y[part] - sum(weight * x[:, column] for column, weight in own.items())
-    for width in stages[1:2]:
+    for width in stages[:2][-1:]:
         columns = np.array([c for c in order[:width] if c not in own], dtype=np.intp)
-        for terms in range(2, min(len(columns), config.max_terms) + 1):
+        for terms in range(1, min(len(columns), config.max_terms) + 1):
             found = consensus(
                 x[:, columns],
                 constants,

@@ -1,0 +1,93 @@
+"""Which functions data identify, and which they only seem to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relgym.clustering.discovery import Scale, find_mode, identified, least_examples, plans
+from relgym.config import ClusteringConfig
+from relgym.numeric.ransac import Consensus
+from relgym.numeric.stepwise import LinearFit, least_squares
+
+SCALE = Scale(1e-13, 4.0, 8.0)
+CONFIG = ClusteringConfig()
+
+
+def judged(x: np.ndarray, y: np.ndarray, fit: LinearFit, support: int = 3) -> Consensus | None:
+    return identified(x, y, fit, scale=SCALE, support=support)
+
+
+def test_a_weight_that_one_example_determines_is_dropped(rng: np.random.Generator) -> None:
+    # A ball that meets the slope along the floor has w = 0 but for once: that once would fix w's weight.
+    x = np.column_stack([rng.normal(size=30), np.zeros(30)])
+    y = -0.17 * x[:, 0]
+    x[7, 1], y[7] = 0.4, 0.9
+    found = judged(x, y, least_squares(x, y, (0, 1)))
+    assert found is not None
+    assert found.fit.columns == (0,)
+    assert found.fit.weights == pytest.approx((-0.17,), abs=1e-12)
+    assert found.inliers.tolist() == [k != 7 for k in range(30)]
+
+
+@pytest.mark.parametrize(("backing", "columns"), [(2, (0,)), (3, (0, 1)), (10, (0, 1))])
+def test_three_examples_must_back_each_weight(
+    backing: int, columns: tuple[int, ...], rng: np.random.Generator
+) -> None:
+    x = np.column_stack([rng.normal(size=40), np.zeros(40)])
+    x[:backing, 1] = rng.normal(size=backing)
+    y = 0.5 * x[:, 0] - 0.7 * x[:, 1]
+    found = judged(x, y, least_squares(x, y, (0, 1)))
+    assert found is not None
+    assert found.fit.columns == columns
+
+
+def test_constants_of_a_few_scenes_are_no_law(rng: np.random.Generator) -> None:
+    # Three scenes, two positions that are constant in each: any three constants are linear in them.
+    scene = np.arange(60) % 3
+    places = rng.normal(size=(3, 2))[scene]
+    x = np.column_stack([rng.normal(size=60), places])
+    y = x[:, 0] + np.array([1e-3, -2e-3, 5e-4])[scene]
+    fit = least_squares(x, y, (0, 1, 2))
+    assert np.abs(y - fit.predict(x)).max() < 1e-12
+    assert judged(x, y, fit) is None
+
+
+def test_constants_of_many_scenes_that_obey_are_a_law(rng: np.random.Generator) -> None:
+    scene = np.arange(60) % 10
+    x = np.column_stack([rng.normal(size=60), rng.normal(size=(10, 2))[scene]])
+    y = x[:, 0] + 0.3 * x[:, 1] - 0.2 * x[:, 2]
+    found = judged(x, y, least_squares(x, y, (0, 1, 2)))
+    assert found is not None
+    assert found.fit.columns == (0, 1, 2)
+
+
+def test_persistence_needs_no_other_proof() -> None:
+    x = np.repeat([3.0, 5.0], 6)[:, None]
+    assert judged(x, x[:, 0], LinearFit((0,), (1.0,), 0.0, 0.0)) is not None
+    assert judged(x, -0.9 * x[:, 0], LinearFit((0,), (-0.9,), 0.0, 0.0)) is None
+
+
+def test_exact_data_need_ten_examples_and_noisy_ones_forty(rng: np.random.Generator) -> None:
+    y = rng.normal(size=100)
+    assert least_examples(y, SCALE, CONFIG) == 10
+    assert least_examples(y, Scale(1e-2, 4.0, 8.0), CONFIG) > 30
+    assert least_examples(y, Scale(1.0, 4.0, 8.0), CONFIG) == 40
+    assert least_examples(y, SCALE, ClusteringConfig(min_examples=25)) == 25
+
+
+def test_searches_go_from_few_columns_to_many() -> None:
+    assert plans((3, 29), CONFIG) == [(3, 3, 6), (29, 2, 5), (29, 5, 12), (29, 8, 24)]
+    assert plans((3, 29), ClusteringConfig(own_only=True)) == [(3, 3, 6)]
+
+
+def test_a_mode_among_the_noise_is_found_by_its_newest_example(rng: np.random.Generator) -> None:
+    x, y = rng.normal(size=(60, 3)), rng.normal(size=60)
+    x[45:], y[45:] = x[45:], -0.8227241 * x[45:, 0] - 0.425 * x[45:, 1] - 0.000245
+    found = find_mode(
+        x, y, np.zeros(60, dtype=int), stages=(3,), fresh=1, scale=SCALE, config=CONFIG, rng=rng
+    )
+    assert found is not None
+    assert found.size == 15
+    assert found.fit.weights == pytest.approx((-0.8227241, -0.425), abs=1e-12)
+    assert found.fit.intercept == pytest.approx(-0.000245, abs=1e-12)
