@@ -52,7 +52,7 @@ World = Annotated[str, typer.Option("--world", help="Whose test scenes: truck or
 
 @app.command()
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for models and pictures.")] = Path("demo"),
+    out: Annotated[Path, typer.Option(help="Folder for models and pictures.")] = Path("out/demo"),
     seed: Seed = 0,
     quick: Annotated[bool, typer.Option(help="Learn from a few blocks only.")] = False,
     as_json: Json = False,
@@ -128,14 +128,15 @@ def explain(
 ) -> None:
     """Say why a model predicts what it predicts in a scene of an env."""
     from relgym.model.world_model import WorldModel
-    from relgym.wrappers import view_of
+    from relgym.wrappers.views import view_of
 
     env: Any = _make(env_id, arg)
     env.action_space.seed(seed)
     observation, _ = env.reset(seed=seed)
     for _ in range(step):
         observation, *_ = env.step(env.action_space.sample())
-    scene = view_of(env).scene(observation, env.action_space.sample())
+    view = view_of(env)
+    scene = view.with_action(view.scene(observation), env.action_space.sample())
     typer.echo(WorldModel.load(model).explain(scene))
 
 

@@ -243,7 +243,8 @@ def trajectories(model: WorldModel, shown: Demonstration, *, seed: int) -> list[
     found = []
     for block in islice(shown.testing(seed), shown.drawn):
         dream, steps = imagined(model, block.vectors, block.layout)
-        found.append(Trajectory(shown.name, block.scene(0), shown.mover, block.vectors, dream, steps))
+        title = f"{shown.name}, which hits a corner" if block.truth.corner.any() else shown.name
+        found.append(Trajectory(title, block.scene(0), shown.mover, block.vectors, dream, steps))
     return found
 
 

@@ -61,7 +61,8 @@ class ClauseRow:
     clause
         The clause; ``otherwise`` for the examples that no clause covers (the thesis' row "Negative").
     correct, incorrect
-        Training examples that were decided here, rightly and wrongly.
+        Training examples that were decided here, rightly and wrongly: those that just one of the two modes
+        explains, whichever mode they belong to. Estimates, where only a sample of them is remembered.
     tests
         Leaves of the decision tree behind the clause (§3.4.4), one line each; empty if there is none.
     """
@@ -271,9 +272,10 @@ def _legend(targets: tuple[TargetReport, ...]) -> str:
     text = " ".join(row.clause + " ".join(row.tests) for pair in pairs for row in pair.rows)
     lines = []
     if pairs:
-        lines += ["mode i rather than j: the first clause that holds speaks for i; if none does, it is j."]
-        lines += [
-            "A is the object whose property is predicted; another letter says that there is such an object."
+        lines = [
+            "mode i rather than j: the first clause that holds speaks for i; if none does, it is j.",
+            "correct, incorrect: training examples that only one of the two modes explains.",
+            "A is the object whose property is predicted; another letter says that there is such an object.",
         ]
     if "*" in text:
         lines.append("* is any object: ¬touching(A, *) says that A touches nothing.")
