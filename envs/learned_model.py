@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
@@ -10,70 +11,82 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
 
-from relgym.envs.arguments import check_options, checked_action, physical_action
-from relgym.envs.base import Observation
-from relgym.envs.spaces_json import space_from_json
-from relgym.errors import ConfigError
-from relgym.model.world_model import WorldModel, with_action
-from relgym.scene.objects import ACTION, Scene
+from relgym.envs.actions import acting, check_action_space, without_action
+from relgym.envs.arguments import check_options, checked_action, checked_count
+from relgym.envs.model_files import EnvRecord
+from relgym.errors import ConfigError, ObservationError
+from relgym.model.prediction import ScenePrediction
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import ACTION, Scene, SceneSchema
 
-__all__ = ["LearnedModelEnv"]
+__all__ = ["Judge", "LearnedModelEnv"]
 
 Judge: TypeAlias = Callable[[Scene, Any, Scene], float]
-"""A function of the scene before, the action and the scene after."""
-
-LEFT = "left the observation space"
-"""`info["reason"]` when a predicted scene has no place among the observations."""
+"""A function of the scene before, the action taken and the scene after; the scenes hold no action object."""
 
 
-class LearnedModelEnv(gym.Env[Observation, Any]):
+class LearnedModelEnv(gym.Env[Any, Any]):
     """Dreams: the transitions are a learned model's predictions.
 
     Description
     -----------
-    Has the spaces of the env that the model was learned in. Every step asks the model for the next scene. Where no
-    mode can answer, the episode is truncated and ``info["reason"]`` says why: a dream never goes on by guessing.
+    Has the spaces and the schema of the env that the model was learned in. Every step asks the model for the
+    next scene. Where it has no answer the episode is truncated and ``info["reason"]`` says why: a dream never
+    goes on by guessing. Exogenous properties keep their values.
+
+    The model is used as it is, live: what it learns later changes the dream. For a snapshot pass
+    ``copy.deepcopy(model)``.
 
     Action Space
     ------------
-    The real env's.
+    The real env's; the action object gets the same physical units.
 
     Observation Space
     -----------------
-    The real env's.
+    The real env's: ``Dict``, object name -> ``Box``.
 
     Rewards
     -------
-    `reward` of (scene, action, next scene); 0 without one.
+    `reward` of (scene, action, next scene); 0 without one, and 0 for a step that the model couldn't predict.
 
     Starting State
     --------------
-    Reset option ``scene``: a `Scene`. Otherwise what `start` draws; otherwise a reset of `like`; otherwise one of the
-    start scenes that the model's file holds.
+    Reset option ``scene``: a `Scene`. Otherwise what `start` draws; otherwise a reset of `like`, which takes
+    the seed and all other options, so that the dream begins as the real env would; otherwise one of the first
+    scenes that the learner saw. A dream resets a copy of `like`: the real episode goes on undisturbed.
 
     Episode End
     -----------
-    Terminated when `terminated` of (scene, action, next scene) is true. Truncated when the model leaves what it knows
-    or the observation space, with ``info["reason"]``.
+    Terminated when `terminated` of (scene, action, next scene) is true. Truncated when no mode can predict
+    some property, or when the next scene lies outside the observation space: then the dream stays in the last
+    scene that is known. Truncated too after `horizon` steps.
+
+    Info
+    ----
+    ``info["prediction"]``: the model's `ScenePrediction`. ``info["reason"]``: a sentence, if truncated. At
+    reset ``info["scene"]``.
 
     Arguments
     ---------
     model
-        A `WorldModel` (used as it is, live: what it learns later changes the dream), or the path of a file written by
-        `ModelLearner.save`.
+        A `WorldModel`, or the path of the file of one that a `ModelLearner` taught.
     like
-        A real env: gives the spaces, and start scenes. Not needed with a file.
+        A real env with the model's schema: gives the spaces, and start scenes. Wrappers around it are looked
+        through. Not needed where a `ModelLearner` taught the model.
     reward, terminated
-        Functions of (scene, action, next scene).
+        Functions of (scene, action, next scene); none: 0 and false.
     start
         Function of a random generator that returns a start scene.
+    horizon
+        Longest episode in steps, >= 1; none: no limit.
     render_mode
         ``None``, ``"rgb_array"`` or ``"human"``.
 
     Version History
     ---------------
-    v0: first version.
+    * v0: initial version.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
@@ -86,71 +99,72 @@ class LearnedModelEnv(gym.Env[Observation, Any]):
         reward: Judge | None = None,
         terminated: Judge | None = None,
         start: Callable[[np.random.Generator], Scene] | None = None,
+        horizon: int | None = None,
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ConfigError(
                 f"render_mode={render_mode!r}: expected None or one of {self.metadata['render_modes']}"
             )
-        extra: Mapping[str, Any] = {}
         if not isinstance(model, WorldModel):
-            model, extra = WorldModel.load_with_extra(model)
+            model = WorldModel.load(model)
         self.model = model
         self.schema = model.schema
         self.render_mode = render_mode
-        self._like = like
+        self._world = None if like is None else _world_of(like, model)
+        record = _record(self._world, model)
+        self.observation_space, self.action_space = record.observation_space, record.action_space
+        self.metadata = {**self.metadata, "render_fps": record.metadata.get("render_fps", 50)}
+        self._low, self._high = _bounds(record.observation_space)
+        self._starts = record.starts
         self._reward, self._terminated, self._start = reward, terminated, start
-        self._starts = [self.schema.scene(values) for values in extra.get("starts", ())]
-        self.observation_space, self.action_space = _spaces(like, extra)
-        if like is None and start is None and not self._starts:
-            raise ConfigError("where does a dream begin? pass like=env or start=function: the model holds no scenes")
+        self._horizon = None if horizon is None else checked_count("horizon", horizon, 1, 10**9)
         self._scene: Scene | None = None
+        self._steps = 0
         self._viewer: Any = None
 
-    @property
-    def scene(self) -> Scene:
-        """The current scene."""
-        if self._scene is None:
-            raise ResetNeeded("the dream has not begun: call reset() first")
-        return self._scene
-
+    # ------------------------------------------------------------------ the Gymnasium contract
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Begin a dream; option ``scene``: where."""
-        super().reset(seed=seed)
-        check_options(options or {}, ("scene",))
-        given = (options or {}).get("scene")
-        self._scene = self._completed(given if given is not None else self._first(seed))
-        if self.render_mode == "human":
-            self.render()
-        return self._observe(self._scene), {"scene": self._scene}
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin a dream; see *Starting State* for `options`.
 
-    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Predict one step; `ActionError` when `action` lies outside the action space."""
-        taken = checked_action(self.action_space, action)
-        before = self.scene
-        if ACTION in before:
-            before = with_action(before, physical_action(self.schema, taken))
-        prediction = self.model.predict_one(before)
-        after = prediction.scene
-        info: dict[str, Any] = {}
-        failed = next((part for part in prediction.parts if not part.ok), None)
-        if failed is not None:
-            info["reason"] = f"{failed.object}.{failed.property}: {failed.outcome.value}"
-        elif not self.observation_space.contains(self._observe(after)):
-            info["reason"] = LEFT
-        if info:
-            after = before  # the last scene that is known
-        self._scene = after
-        reward = 0.0 if self._reward is None else float(self._reward(before, action, after))
-        ended = self._terminated is not None and bool(self._terminated(before, action, after))
+        Raises
+        ------
+        ConfigError
+            An unknown option, or nothing to begin with.
+        ObservationError
+            The start scene isn't one of this world, or lies outside the observation space.
+        """
+        super().reset(seed=seed)
+        self._scene = self._fitted(self._first(seed, options or {}))
+        self._steps = 0
         if self.render_mode == "human":
             self.render()
-        return self._observe(after), reward, ended, bool(info), info
+        return self._observation(), {"scene": self._scene}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Predict one step; `ActionError` when `action` lies outside the action space."""
+        before = self.scene
+        taken = checked_action(self.action_space, action)
+        prediction = self.model.predict_one(acting(before, taken))
+        after = without_action(prediction.scene)
+        self._steps += 1
+        info: dict[str, Any] = {"prediction": prediction}
+        if (reason := self._failure(prediction, after)) is not None:
+            return self._observation(), 0.0, False, True, {**info, "reason": reason}
+        self._scene = after
+        reward = 0.0 if self._reward is None else float(self._reward(before, taken, after))
+        ended = self._terminated is not None and bool(self._terminated(before, taken, after))
+        late = self._horizon is not None and self._steps >= self._horizon
+        if late:
+            info["reason"] = f"the horizon of {self._horizon} steps is reached"
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), reward, ended, late, info
 
     def render(self) -> Any:
-        """Draw the scene as the real env would."""
+        """Draw the scene: as an array of shape (height, width, 3), or in a window for ``"human"``."""
         from relgym.envs.rendering import SceneViewer
 
         if self.render_mode is None:
@@ -165,31 +179,139 @@ class LearnedModelEnv(gym.Env[Observation, Any]):
             self._viewer.close()
             self._viewer = None
 
-    def _first(self, seed: int | None) -> Scene:
+    @property
+    def scene(self) -> Scene:
+        """The current scene, without an action."""
+        if self._scene is None:
+            raise ResetNeeded("the dream has not begun: call reset() first")
+        return self._scene
+
+    # ------------------------------------------------------------------ where dreams begin
+    def _first(self, seed: int | None, options: Mapping[str, Any]) -> Scene:
+        if "scene" in options or self._start is not None or self._world is None:
+            check_options(options, ("scene",))
+        if "scene" in options:
+            given: Scene = options["scene"]
+            return given
         if self._start is not None:
             return self._start(self.np_random)
-        if self._like is not None:
-            self._like.reset(seed=int(self.np_random.integers(2**31)) if seed is None else seed)
-            scene: Scene = self._like.get_wrapper_attr("scene")
-            return scene
+        if self._world is not None:
+            return self._real_start(seed, options)
+        if not self._starts:
+            raise ConfigError(
+                "nothing says where a dream begins: pass options={'scene': scene} to reset, or start=function or "
+                "like=env to the env"
+            )
         return self._starts[int(self.np_random.integers(len(self._starts)))]
 
-    def _completed(self, scene: Scene) -> Scene:
-        """The scene with an action object, if the schema has one and it is missing."""
-        if ACTION not in self.schema.order or ACTION in scene:
-            return scene
-        width = len(self.schema.type_of(ACTION).properties)
-        return self.schema.scene({**scene.values(), ACTION: np.zeros(width)})
+    def _real_start(self, seed: int | None, options: Mapping[str, Any]) -> Scene:
+        assert self._world is not None, "asked only where there is a real env"
+        # A seed passes through, so that equal seeds begin equally; without one the dream's own draws decide.
+        chosen = int(self.np_random.integers(2**31)) if seed is None else seed
+        observation, _ = self._world.reset(seed=chosen, options=dict(options))
+        return self.schema.scene(observation)
 
-    def _observe(self, scene: Scene) -> Observation:
-        return {o.name: o.values.copy() for o in scene if o.type.has_body}
+    def _fitted(self, scene: Scene) -> Scene:
+        """A copy of the scene without an action, checked against schema and observation space."""
+        if not isinstance(scene, Scene):
+            raise ObservationError(
+                f"expected a start scene, got {type(scene).__name__}; take env.scene, or schema.scene(observation)"
+            )
+        # Through the model's own schema: scenes of an equal one, or of another with the same objects, do too.
+        fitted = self.schema.scene({name: v for name, v in scene.values().items() if name != ACTION})
+        names = set(self._boxes().spaces)
+        if set(fitted.layout.names) != names or (outside := self._outside(fitted)):
+            why = outside if set(fitted.layout.names) == names else f"it has {list(fitted.layout.names)}"
+            raise ObservationError(
+                f"a dream can't begin here: expected {sorted(names)} within their bounds; {why}"
+            )
+        return fitted
+
+    # ------------------------------------------------------------------ helpers
+    def _failure(self, prediction: ScenePrediction, after: Scene) -> str | None:
+        """Why a prediction can't be followed; None if it can."""
+        if not prediction.ok:
+            parts = (part for part in prediction.parts if not part.ok)
+            return "; ".join(f"{part.object}.{part.property}: {part.outcome.value}" for part in parts)
+        return self._outside(after) or None
+
+    def _outside(self, scene: Scene) -> str:
+        """Which properties left the observation space, as a sentence; empty if none did."""
+        layout = scene.layout
+        low, high = (
+            np.concatenate([ends[name] for name in layout.names]) for ends in (self._low, self._high)
+        )
+        inside = (low <= scene.vector) & (scene.vector <= high)
+        if inside.all():
+            return ""
+        names = [f"{o.name}.{prop}" for o in scene for prop in o.type.properties]
+        left = (
+            f"{names[k]} = {scene.vector[k]:g} left the observation space [{low[k]:g}, {high[k]:g}]"
+            for k in np.flatnonzero(~inside)
+        )
+        return "; ".join(left)
+
+    def _boxes(self) -> spaces.Dict:
+        assert isinstance(self.observation_space, spaces.Dict), "checked when made"
+        return self.observation_space
+
+    def _observation(self) -> dict[str, NDArray[Any]]:
+        scene, boxes = self.scene, self._boxes().spaces
+        return {name: scene[name].values.astype(box.dtype) for name, box in boxes.items()}
 
 
-def _spaces(
-    like: gym.Env[Any, Any] | None, extra: Mapping[str, Any]
-) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
-    if like is not None:
-        return like.observation_space, like.action_space
-    if "observation_space" not in extra:
-        raise ConfigError("the model holds no spaces: pass like=env, or save it with ModelLearner.save")
-    return space_from_json(extra["observation_space"]), space_from_json(extra["action_space"])
+def _world_of(like: gym.Env[Any, Any], model: WorldModel) -> gym.Env[Any, Any]:
+    """A copy of the env inside all wrappers."""
+    inner = like.unwrapped
+    if not _alike(getattr(inner, "schema", None), model.schema):
+        raise ConfigError(
+            f"like={like}: expected an env whose scenes have the objects, properties and action ranges of the "
+            f"model's (objects {list(model.schema.order)}); make it with the arguments that the model's env had"
+        )
+    try:
+        world = copy.deepcopy(inner)
+    except (TypeError, NotImplementedError, copy.Error) as error:
+        raise ConfigError(
+            f"like={like} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
+            "that a ModelLearner taught holds spaces and first scenes of its own: leave out like"
+        ) from error
+    world.render_mode = None  # its resets are no one's to see
+    return world
+
+
+def _alike(schema: SceneSchema | None, other: SceneSchema) -> bool:
+    """Whether scenes of one schema are scenes of the other; what is to be learned of them may differ."""
+    if schema is None or (schema.objects, schema.up, schema.planar) != (
+        other.objects,
+        other.up,
+        other.planar,
+    ):
+        return False
+    kinds = [{t.name: (t.properties, t.shape, dict(t.pose)) for t in s.types} for s in (schema, other)]
+    return kinds[0] == kinds[1] and schema.action_scale == other.action_scale
+
+
+def _record(world: gym.Env[Any, Any] | None, model: WorldModel) -> EnvRecord:
+    """What is known of the real env, checked against the model's schema."""
+    if world is not None:
+        metadata = {"render_fps": world.metadata.get("render_fps", 50)}
+        record = EnvRecord(world.observation_space, world.action_space, metadata=metadata)
+    elif model.extra:
+        record = EnvRecord.from_json(model.extra, model.schema)
+    else:
+        raise ConfigError(
+            "the model holds no spaces: pass like=env, or learn it with a ModelLearner around an env"
+        )
+    check_action_space(model.schema, record.action_space)
+    return record
+
+
+def _bounds(space: spaces.Space[Any]) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
+    """Smallest and largest values by object; `ConfigError` unless the space is a Dict of flat Boxes."""
+    parts = space.spaces if isinstance(space, spaces.Dict) else {}
+    boxes = {name: part for name, part in parts.items() if isinstance(part, spaces.Box)}
+    if not boxes or len(boxes) != len(parts):
+        raise ConfigError(
+            f"expected a Dict observation space, object name -> Box, got {space}; wrap the dream as the env was"
+        )
+    return {name: box.low for name, box in boxes.items()}, {name: box.high for name, box in boxes.items()}

@@ -11,14 +11,22 @@ if __name__ != "relgym.wrappers":
 
 _HOMES = {
     "ModelLearner": "relgym.wrappers.model_learner",
+    "Prequential": "relgym.wrappers.prequential",
     "SceneView": "relgym.wrappers.views",
-    "StepReport": "relgym.wrappers.model_learner",
+    "StepReport": "relgym.wrappers.prequential",
     "View": "relgym.wrappers.views",
     "view_of": "relgym.wrappers.views",
 }
 """Where each public name lives; loaded on first use."""
 
-__all__ = ["ModelLearner", "SceneView", "StepReport", "View", "view_of"]
+__all__ = [
+    "ModelLearner",
+    "Prequential",
+    "SceneView",
+    "StepReport",
+    "View",
+    "view_of",
+]
 
 
 def __getattr__(name: str) -> Any:

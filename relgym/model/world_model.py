@@ -91,6 +91,7 @@ class WorldModel:
         self.config = config or ModelConfig()
         self.seen = 0
         self.frozen = False
+        self.extra: dict[str, Any] = {}
         named = schema.targets if targets is None else tuple(targets)
         self._open = named is None
         self.targets: tuple[Target, ...] = ()
@@ -373,7 +374,7 @@ class WorldModel:
         history
             Whether to keep what further learning needs; without it the loaded model can only predict.
         extra
-            Plain data of the caller's, kept under ``extra`` (spaces, metadata).
+            Plain data of the caller's; default: the attribute `extra`, where a learner around an env keeps its spaces.
         """
         self.finish()
         arrays: dict[str, NDArray[Any]] | None = None
@@ -383,7 +384,7 @@ class WorldModel:
                 arrays |= {f"table{k}.{name}": a for name, a in self._tables[type_name].to_arrays().items()}
             for k, target in enumerate(self.targets):
                 arrays |= {f"target{k}.{name}": a for name, a in self._models[target].to_arrays().items()}
-        write_model(path, self.to_json(history=history) | {"extra": extra or {}}, arrays)
+        write_model(path, self.to_json(history=history) | {"extra": self.extra if extra is None else extra}, arrays)
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
@@ -416,7 +417,9 @@ class WorldModel:
         """Read a model file and the caller's data in it."""
         body, arrays = read_model(path)
         try:
-            return cls._from_json(body, arrays), dict(body["extra"])
+            model = cls._from_json(body, arrays)
+            model.extra = dict(body["extra"])
+            return model, model.extra
         except (KeyError, TypeError, IndexError) as error:
             raise ModelFileError(
                 f"{path}: a part of the model is missing or malformed ({error!r}); save it again"

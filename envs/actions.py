@@ -1,0 +1,88 @@
+"""Actions in scenes: what an agent does becomes the properties of the object `action`, in physical units."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from relgym.envs.arguments import physical_action
+from relgym.errors import ConfigError
+from relgym.scene.objects import ACTION, Float1D, Scene, SceneSchema
+
+__all__ = ["acting", "action_values", "check_action_space", "without_action"]
+
+
+def acting(scene: Scene, action: Any) -> Scene:
+    """The scene with an action of the env in it; the scene itself where the schema has no action object.
+
+    Parameters
+    ----------
+    scene
+        With or without an action.
+    action
+        A legal action of the env, in the units of its action space.
+    """
+    schema = scene.schema
+    if ACTION not in schema.order:
+        return scene
+    bare = without_action(scene)
+    layout = schema.layout((*bare.layout.names, ACTION))
+    # Objects stand in schema order, so the action may lie anywhere.
+    at = layout.offsets[layout.index(ACTION)]
+    parts = (bare.vector[:at], action_values(schema, action), bare.vector[at:])
+    return Scene(schema, layout, np.concatenate(parts))
+
+
+def without_action(scene: Scene) -> Scene:
+    """The scene as an env shows it: without the action object."""
+    layout = scene.layout
+    if ACTION not in scene:
+        return scene
+    rest = scene.schema.layout(name for name in layout.names if name != ACTION)
+    return Scene(scene.schema, rest, np.delete(scene.vector, layout.slice(layout.index(ACTION))))
+
+
+def action_values(schema: SceneSchema, action: Any) -> Float1D:
+    """Property vector of the action object: through the schema's affine maps, or as it is if there are none."""
+    if not schema.action_scale:
+        return np.asarray(action, dtype=np.float64).ravel()
+    scaled = dict(zip(_scaled(schema), physical_action(schema, action).tolist(), strict=True))
+    return np.array([scaled[prop] for prop in schema.type_of(ACTION).properties])
+
+
+def check_action_space(schema: SceneSchema, space: spaces.Space[Any]) -> None:
+    """Raise `ConfigError` unless actions of this space are what the schema's action object stands for."""
+    if ACTION not in schema.order:
+        return
+    properties = schema.type_of(ACTION).properties
+    if not schema.action_scale:
+        if _size(space) != len(properties):
+            raise ConfigError(
+                f"the schema's action has the properties {properties}, but the action space is {space}; "
+                "declare one property for each number of an action"
+            )
+        return
+    if sorted(_scaled(schema)) != sorted(properties):
+        raise ConfigError(
+            f"action_scale names {_scaled(schema)}, but the action has the properties {properties}; "
+            "give one range for each"
+        )
+    unit = isinstance(space, spaces.Box) and bool((space.low == -1.0).all() and (space.high == 1.0).all())
+    if not unit or _size(space) != len(properties):
+        raise ConfigError(
+            f"the schema's action_scale is for actions in [-1, 1], {len(properties)} numbers each, but the "
+            f"action space is {space}; put wrappers that change actions outside the learner"
+        )
+
+
+def _scaled(schema: SceneSchema) -> tuple[str, ...]:
+    return tuple(prop for prop, _, _ in schema.action_scale)
+
+
+def _size(space: spaces.Space[Any]) -> int:
+    """How many numbers an action has; -1 where it isn't made of numbers."""
+    if isinstance(space, (spaces.Box, spaces.MultiDiscrete, spaces.MultiBinary)):
+        return int(np.prod(space.shape))
+    return 1 if isinstance(space, spaces.Discrete) else -1

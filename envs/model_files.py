@@ -1,0 +1,80 @@
+"""What a model keeps of the env that it was learned in: the spaces, and scenes to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from relgym.envs.spaces_json import space_from_json, space_to_json
+from relgym.errors import ModelFileError, ObservationError
+from relgym.scene.objects import Scene, SceneSchema
+
+__all__ = ["EnvRecord"]
+
+
+@dataclass(frozen=True, slots=True)
+class EnvRecord:
+    """All that a dream needs to know of the real env.
+
+    Attributes
+    ----------
+    observation_space, action_space
+        The env's spaces.
+    starts
+        First scenes of some episodes.
+    metadata
+        Plain data for people and renderers: the env's id, `render_fps`.
+    """
+
+    observation_space: spaces.Space[Any]
+    action_space: spaces.Space[Any]
+    starts: tuple[Scene, ...] = ()
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back; `ConfigError` for a space that it doesn't know."""
+        return {
+            "spaces": {
+                "observation": space_to_json(self.observation_space),
+                "action": space_to_json(self.action_space),
+            },
+            "starts": [
+                {"objects": list(scene.layout.names), "vector": scene.vector.tolist()}
+                for scene in self.starts
+            ],
+            "metadata": dict(self.metadata),
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any], schema: SceneSchema) -> EnvRecord:
+        """Read what `to_json` wrote.
+
+        Raises
+        ------
+        ModelFileError
+            Something is missing or malformed.
+        """
+        try:
+            return cls(
+                space_from_json(data["spaces"]["observation"]),
+                space_from_json(data["spaces"]["action"]),
+                tuple(_scene(schema, start) for start in data["starts"]),
+                dict(data["metadata"]),
+            )
+        except (KeyError, TypeError, ValueError, AssertionError) as error:
+            raise ModelFileError(
+                f"what the model's file says of its env is missing or malformed ({error!r}); "
+                "save it again, or pass like=env"
+            ) from None
+
+
+def _scene(schema: SceneSchema, data: Mapping[str, Any]) -> Scene:
+    layout = schema.layout(data["objects"])
+    vector = np.array(data["vector"], dtype=np.float64)
+    if vector.shape != (layout.width,) or not np.isfinite(vector).all():
+        raise ObservationError(f"expected {layout.width} finite numbers for {list(layout.names)}")
+    return Scene(schema, layout, vector)

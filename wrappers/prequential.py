@@ -1,0 +1,124 @@
+"""Test, then train: errors of predictions made before their outcome was learned from (Dawid 1984)."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from relgym.envs.arguments import checked_count
+from relgym.model.prediction import ScenePrediction
+from relgym.model.text import Cell, table
+from relgym.model.world_model import LearnReport
+from relgym.scene.objects import Scene
+
+__all__ = ["WRONG", "Key", "Prequential", "StepReport", "compared"]
+
+WRONG = 1e-9
+"""A prediction off by more than this, in units of the property, counts as wrong."""
+
+Key: TypeAlias = tuple[str, str]
+"""An object and one of its properties."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepReport:
+    """What one step told the learner; ``info["relgym"]``.
+
+    Attributes
+    ----------
+    prediction
+        What the model had expected, before it saw the outcome; ``None`` when it wasn't asked.
+    residuals
+        Observed minus predicted value of every target, by (object, property), in units of the property;
+        objects that vanished have none.
+    wrong
+        Those that were off by more than 1e-9, or that no mode predicted.
+    learned
+        What the transition taught; ``None`` when it wasn't learned from.
+    """
+
+    prediction: ScenePrediction | None
+    residuals: Mapping[Key, float]
+    wrong: tuple[Key, ...]
+    learned: LearnReport | None
+
+
+class Prequential:
+    """How often the model was wrong on steps that it hadn't seen, in total and lately.
+
+    Parameters
+    ----------
+    window
+        How many steps count as the latest, >= 1.
+
+    Attributes
+    ----------
+    steps : int
+        Steps with predictions.
+    predictions, wrong : dict
+        How many predictions were made, and how many were wrong, by (object, property).
+
+    Examples
+    --------
+    >>> count = Prequential(window=2)
+    >>> for wrong in ([("ball", "vx")], [("ball", "vx")], []):
+    ...     count.count([("ball", "vx")], wrong)
+    >>> count.wrong, count.recent_wrong, count.recent
+    ({('ball', 'vx'): 2}, {('ball', 'vx'): 1}, 0.5)
+    """
+
+    def __init__(self, window: int = 1000) -> None:
+        self.steps = 0
+        self.predictions: dict[Key, int] = {}
+        self.wrong: dict[Key, int] = {}
+        self._window: deque[tuple[Key, ...]] = deque(maxlen=checked_count("window", window, 1, 10**9))
+
+    def count(self, predicted: Iterable[Key], wrong: Iterable[Key]) -> None:
+        """Take in one step: what was predicted, and which of that was wrong."""
+        self.steps += 1
+        for key in predicted:
+            self.predictions[key] = self.predictions.get(key, 0) + 1
+            self.wrong.setdefault(key, 0)
+        self._window.append(tuple(wrong))
+        for key in self._window[-1]:
+            self.wrong[key] += 1
+
+    @property
+    def recent(self) -> float:
+        """Share of the latest steps with a wrong prediction; NaN before the first."""
+        return sum(map(bool, self._window)) / len(self._window) if self._window else float("nan")
+
+    @property
+    def recent_wrong(self) -> dict[Key, int]:
+        """How many predictions of the latest steps were wrong, by (object, property)."""
+        counts = dict.fromkeys(self.wrong, 0)
+        for keys in self._window:
+            for key in keys:
+                counts[key] += 1
+        return counts
+
+    def __str__(self) -> str:
+        lately = self.recent_wrong
+        rows: list[list[Cell]] = [
+            [f"{key[0]}.{key[1]}", self.predictions[key], self.wrong[key], lately[key]] for key in self.wrong
+        ]
+        latest = f"in the last {len(self._window):,}"
+        return table(["target", "predictions", "wrong", latest], rows)
+
+
+def compared(prediction: ScenePrediction | None, after: Scene) -> tuple[dict[Key, float], tuple[Key, ...]]:
+    """Residuals of a prediction, and which parts of it were wrong: see `StepReport`."""
+    residuals: dict[Key, float] = {}
+    wrong: list[Key] = []
+    layout = after.layout
+    for part in () if prediction is None else prediction.parts:
+        if part.object not in after:
+            continue
+        key = (part.object, part.property)
+        column = layout.column(layout.index(part.object), part.property)
+        residuals[key] = float(after.vector[column]) - part.value
+        if not part.ok or not abs(residuals[key]) <= WRONG:
+            wrong.append(key)
+    return residuals, tuple(wrong)
