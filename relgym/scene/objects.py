@@ -132,11 +132,11 @@ class SceneSchema:
         """Layout of a scene with these objects (default: all), in schema order; cached."""
         present = frozenset(self.order if names is None else names)
         key = tuple(name for name in self.order if name in present)
+        if len(key) != len(present):
+            raise ObservationError(
+                f"unknown objects {sorted(present - set(key))}; the schema has {list(self.order)}"
+            )
         if (layout := self._layouts.get(key)) is None:
-            if len(key) != len(present):
-                raise ObservationError(
-                    f"unknown objects {sorted(present - set(key))}; the schema has {list(self.order)}"
-                )
             layout = self._layouts[key] = SceneLayout(key, tuple(self.type_of(name) for name in key))
         return layout
 
