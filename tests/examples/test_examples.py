@@ -1,0 +1,32 @@
+"""Every example runs, with a tiny budget, and says what it promises."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+RUNS = {
+    "read_the_laws.py": (["--steps", "400"], "vy' = vy - 0.00098"),
+    "live_in_a_dream.py": (["--blocks", "8", "--trials", "1"], "trial 0: the trucks were never more than"),
+    "grandparents.py": ([], "grandparent(A, B) ← parent(A, C) ∧ parent(C, B)"),
+}
+
+
+def test_every_example_is_run() -> None:
+    assert {path.name for path in EXAMPLES.glob("*.py")} == set(RUNS)
+
+
+@pytest.mark.parametrize("name", sorted(RUNS))
+def test_example(name: str) -> None:
+    options, expected = RUNS[name]
+    script = EXAMPLES / name
+    assert len(script.read_text(encoding="utf-8").splitlines()) < 120
+    command = [sys.executable, "-X", "utf8", "-W", "error", str(script), *options]
+    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False)
+    assert done.returncode == 0, done.stderr
+    assert expected in done.stdout
