@@ -101,7 +101,10 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
         if not space.contains(action):
             raise ActionError(f"action {action!r} lies outside {space}")
         return action
-    array = np.asarray(action, dtype=np.float64)
+    try:
+        array = np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ActionError(f"expected numbers of shape {space.shape}, got {action!r}") from None
     slack = 1e-6 * np.maximum(1.0, np.abs(space.high))
     if array.shape != space.shape or not np.all((array >= space.low - slack) & (array <= space.high + slack)):
         raise ActionError(

@@ -219,12 +219,13 @@ class LearnedModelEnv(gym.Env[Any, Any]):
             )
         # Through the model's own schema: scenes of an equal one, or of another with the same objects, do too.
         fitted = self.schema.scene({name: v for name, v in scene.values().items() if name != ACTION})
-        names = set(self._boxes().spaces)
-        if set(fitted.layout.names) != names or (outside := self._outside(fitted)):
-            why = outside if set(fitted.layout.names) == names else f"it has {list(fitted.layout.names)}"
+        names = sorted(self._boxes().spaces)
+        if sorted(fitted.layout.names) != names:
             raise ObservationError(
-                f"a dream can't begin here: expected {sorted(names)} within their bounds; {why}"
+                f"a dream can't begin here: expected the objects {names}, got {list(fitted.layout.names)}"
             )
+        if outside := self._outside(fitted):
+            raise ObservationError(f"a dream can't begin here: {outside}")
         return fitted
 
     # ------------------------------------------------------------------ helpers
@@ -256,8 +257,9 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         return self.observation_space
 
     def _observation(self) -> dict[str, NDArray[Any]]:
-        scene, boxes = self.scene, self._boxes().spaces
-        return {name: scene[name].values.astype(box.dtype) for name, box in boxes.items()}
+        # In schema order, as the real env's; the Dict space sorts its keys.
+        boxes = self._boxes().spaces
+        return {o.name: o.values.astype(boxes[o.name].dtype) for o in self.scene}
 
 
 def _world_of(like: gym.Env[Any, Any], model: WorldModel) -> gym.Env[Any, Any]:
@@ -281,14 +283,12 @@ def _world_of(like: gym.Env[Any, Any], model: WorldModel) -> gym.Env[Any, Any]:
 
 def _alike(schema: SceneSchema | None, other: SceneSchema) -> bool:
     """Whether scenes of one schema are scenes of the other; what is to be learned of them may differ."""
-    if schema is None or (schema.objects, schema.up, schema.planar) != (
-        other.objects,
-        other.up,
-        other.planar,
-    ):
-        return False
-    kinds = [{t.name: (t.properties, t.shape, dict(t.pose)) for t in s.types} for s in (schema, other)]
-    return kinds[0] == kinds[1] and schema.action_scale == other.action_scale
+    return schema is not None and _signature(schema) == _signature(other)
+
+
+def _signature(schema: SceneSchema) -> tuple[Any, ...]:
+    types = {t.name: (t.properties, t.shape, dict(t.pose)) for t in schema.types}
+    return schema.objects, types, schema.up, schema.planar, schema.action_scale
 
 
 def _record(world: gym.Env[Any, Any] | None, model: WorldModel) -> EnvRecord:

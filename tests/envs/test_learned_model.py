@@ -1,0 +1,382 @@
+"""Dreams have the real env's spaces, follow the model, and stop where it knows nothing."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from carts import CartEnv, run
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from gymnasium.utils.env_checker import check_env
+
+from relgym.envs import LearnedModelEnv
+from relgym.envs.model_files import EnvRecord
+from relgym.envs.spaces_json import space_from_json, space_to_json
+from relgym.errors import ActionError, ConfigError, ModelFileError, ObservationError
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Scene
+from relgym.wrappers import ModelLearner
+
+ID = "relgym/LearnedModel-v0"
+PUSH = np.array([1.0], np.float32)
+
+
+@pytest.fixture(scope="module")
+def truck() -> ModelLearner:
+    """A truck with one box, watched for 12 episodes of ever new pushes."""
+    env = ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step"))
+    env.action_space.seed(0)
+    for episode in range(12):
+        env.reset(seed=episode)
+        for _ in range(40):
+            env.step(np.clip(env.action_space.sample(), 0.5, 1.0))
+    return env
+
+
+@pytest.fixture(scope="module")
+def cart() -> ModelLearner:
+    """A cart that was pushed 100 times."""
+    env = ModelLearner(CartEnv())
+    run(env, 100)
+    return env
+
+
+@pytest.fixture
+def model_file(truck: ModelLearner, tmp_path: Path) -> Path:
+    truck.save(tmp_path / "truck.json")
+    return tmp_path / "truck.json"
+
+
+# ---------------------------------------------------------------------- what Gymnasium asks
+@pytest.mark.parametrize("horizon", [None, 40])
+def test_the_checker_has_nothing_to_say(model_file: Path, horizon: int | None) -> None:
+    env = gym.make(ID, model=str(model_file), horizon=horizon)
+    check_env(env.unwrapped)  # warnings are errors
+    env.close()
+
+
+def test_the_checker_has_nothing_to_say_of_a_model_in_memory(cart: ModelLearner) -> None:
+    check_env(gym.make(ID, model=cart.model, like=CartEnv()).unwrapped, skip_render_check=True)
+
+
+def test_same_seed_same_dream(model_file: Path) -> None:
+    def dream() -> list[Any]:
+        env = gym.make(ID, model=str(model_file), max_episode_steps=40)
+        observations = [env.reset(seed=5)[0]]
+        observations += [env.step(PUSH)[0] for _ in range(10)]
+        return observations
+
+    assert str(dream()) == str(dream())
+
+
+def test_observations_belong_to_the_caller(cart: ModelLearner) -> None:
+    dream = LearnedModelEnv(cart.model)
+    observation, _ = dream.reset(seed=0)
+    was = dream.scene["cart"]["v"]
+    observation["cart"] += 1.0
+    assert dream.scene["cart"]["v"] == was
+
+
+@pytest.mark.parametrize("through", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_copies_go_on_alike_and_apart(cart: ModelLearner, through: Any) -> None:
+    dream = LearnedModelEnv(cart.model, like=CartEnv())
+    dream.reset(seed=0)
+    dream.step(PUSH)
+    twin = through(dream)
+    assert str(twin.step(PUSH)[0]) == str(dream.step(PUSH)[0])
+    dream.step(PUSH)
+    assert twin.scene["cart"]["v"] != dream.scene["cart"]["v"]
+    twin.step(PUSH)
+    assert str(twin.reset()[0]) == str(dream.reset()[0])
+
+
+def test_a_dream_is_drawn_and_recorded(model_file: Path, tmp_path: Path) -> None:
+    pytest.importorskip("moviepy", reason="RecordVideo writes through moviepy")
+    env = gym.make(ID, model=str(model_file), render_mode="rgb_array", max_episode_steps=5)
+    env = gym.wrappers.RecordVideo(env, str(tmp_path / "videos"))
+    env.reset(seed=0)
+    picture: Any = env.render()
+    assert picture.dtype == np.uint8 and picture.shape[2] == 3 and len(np.unique(picture)) > 3
+    for _ in range(5):
+        env.step(PUSH)
+    env.close()
+    (video,) = (tmp_path / "videos").glob("*.mp4")
+    assert video.stat().st_size > 1000
+
+
+def test_a_dream_opens_a_window(model_file: Path) -> None:
+    env = LearnedModelEnv(model_file, render_mode="human")
+    env.reset(seed=0)
+    env.step(PUSH)
+    assert env.render() is None
+    env.close()
+    env.close()
+
+
+# ---------------------------------------------------------------------- as the real env
+def test_spaces_are_the_real_ones(truck: ModelLearner, model_file: Path) -> None:
+    dream = LearnedModelEnv(model_file)
+    assert dream.observation_space == truck.observation_space
+    assert dream.action_space == truck.action_space
+    assert dream.metadata["render_fps"] == truck.metadata["render_fps"]
+
+
+@pytest.mark.parametrize("action", [-1.0, -0.3, 0.25, 1.0])
+def test_actions_mean_the_same_as_in_the_real_env(cart: ModelLearner, action: float) -> None:
+    real, dream = CartEnv(), LearnedModelEnv(cart.model)
+    real.reset(options={"v": 10.0})
+    dream.reset(options={"scene": cart.model.schema.scene({"cart": [10.0]})})
+    for _ in range(20):
+        seen, *_ = real.step(np.array([action]))
+        imagined, *_ = dream.step(np.array([action]))
+        assert imagined["cart"][0] == pytest.approx(seen["cart"][0], abs=1e-11)
+
+
+def test_a_dream_follows_the_trucks_world(truck: ModelLearner) -> None:
+    real = gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="block")  # else frictions come from outside
+    dream = LearnedModelEnv(truck.model, like=real)
+    real.reset(seed=77)
+    dream.reset(options={"scene": real.get_wrapper_attr("scene")})
+    for k in range(30):
+        action = np.array([0.5 + 0.01 * k], np.float32)
+        seen, *_ = real.step(action)
+        imagined, _, _, truncated, info = dream.step(action)
+        assert not truncated, info
+        for name, values in seen.items():
+            np.testing.assert_allclose(imagined[name], values, rtol=0, atol=1e-9)
+
+
+def test_a_ball_dreamed_from_a_file_bounces_as_the_real_one(tmp_path: Path) -> None:
+    env = ModelLearner(gym.make("relgym/BallBoxRamp-v0", objects=()))
+    for episode in range(12):
+        env.reset(seed=episode)
+        truncated = False
+        while not truncated:
+            *_, truncated, _ = env.step(0)
+    env.model.save(tmp_path / "ball.json")
+    dream = gym.make(ID, model=str(tmp_path / "ball.json"))
+    real = gym.make("relgym/BallBoxRamp-v0", objects=())
+    _, info = real.reset(seed=900)
+    dream.reset(options={"scene": info["scene"]})
+    bounces = 0
+    for _ in range(199):
+        seen, *_, told = real.step(0)
+        imagined, _, _, stopped, info = dream.step(0)
+        assert not stopped, info
+        bounces += bool(told["contacts"])
+        for name, values in seen.items():
+            np.testing.assert_allclose(imagined[name], values, rtol=0, atol=1e-11)
+    assert bounces > 3
+
+
+def test_a_dream_can_be_learned_from(cart: ModelLearner) -> None:
+    again = ModelLearner(LearnedModelEnv(cart.model, horizon=50))
+    run(again, 100)
+    (mode,) = again.model.modes("cart", "v")
+    assert mode.formula(6) == "v' = 0.9 v + 0.1 action.push"
+
+
+# ---------------------------------------------------------------------- where dreams begin
+def test_a_dream_begins_as_the_real_env_would(truck: ModelLearner) -> None:
+    real = gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step")
+    dream = LearnedModelEnv(truck.model, like=real)
+    for options in (None, {"box1_friction": 0.25, "speed": 3.0}):
+        expected, _ = real.reset(seed=8, options=options)
+        assert str(dream.reset(seed=8, options=options)[0]) == str(expected)
+    assert dream.scene["box1"]["friction"] == 0.25
+    assert str(dream.reset()[0]) != str(dream.reset()[0])
+
+
+def test_the_real_episode_goes_on_undisturbed(cart: ModelLearner) -> None:
+    learner = ModelLearner(CartEnv(), targets=["cart.v"])
+    learner.reset(seed=0, options={"v": 10.0})
+    learner.step(PUSH)
+    dream = LearnedModelEnv(learner.model, like=learner)
+    dream.reset(seed=1)
+    dream.step(PUSH)
+    assert learner.scene["cart"]["v"] == 10.0
+    assert (learner.model.seen, learner.get_wrapper_attr("resets")) == (1, 1)
+
+
+def test_files_hold_first_scenes(cart: ModelLearner, tmp_path: Path) -> None:
+    cart.model.save(tmp_path / "cart.json")
+    dream = LearnedModelEnv(tmp_path / "cart.json")
+    begun = {dream.reset(seed=seed)[0]["cart"][0] for seed in range(40)}
+    real = {CartEnv().reset(seed=seed)[0]["cart"][0] for seed in (0, 25, 50, 75)}
+    assert begun == real
+    with pytest.raises(ConfigError, match="unknown reset options"):
+        dream.reset(options={"v": 1.0})
+
+
+def test_a_sampler_draws_first_scenes(cart: ModelLearner) -> None:
+    def fast(rng: np.random.Generator) -> Scene:
+        return cart.model.schema.scene({"cart": [rng.uniform(90.0, 91.0)]})
+
+    dream = LearnedModelEnv(cart.model, like=CartEnv(), start=fast)
+    first = dream.reset(seed=3)[0]["cart"][0]
+    assert 90.0 <= first <= 91.0
+    assert dream.reset(seed=3)[0]["cart"][0] == first
+    assert dream.reset()[0]["cart"][0] != first
+
+
+def test_a_given_scene_must_be_of_this_world(cart: ModelLearner, truck: ModelLearner) -> None:
+    schema, dream = cart.model.schema, LearnedModelEnv(cart.model)
+    dream.reset(options={"scene": schema.scene({"cart": [5.0], "action": [1.0]})})
+    assert dream.scene == schema.scene({"cart": [5.0]})
+    for scene, message in [
+        (truck.scene, "unknown objects"),
+        (schema.scene({"action": [1.0]}), r"expected the objects \['cart'\], got \[\]"),
+        (schema.scene({"cart": [2000.0]}), r"cart\.v = 2000 left the observation space \[-1000, 1000\]"),
+        ({"cart": [1.0]}, "expected a start scene, got dict"),
+    ]:
+        with pytest.raises(ObservationError, match=message):
+            dream.reset(options={"scene": scene})
+
+
+# ---------------------------------------------------------------------- reward and end
+def test_reward_and_termination_are_functions_of_both_scenes(truck: ModelLearner) -> None:
+    seen: list[Any] = []
+
+    def gained(before: Scene, action: Any, after: Scene) -> float:
+        seen.append(action)
+        assert "action" not in before and "action" not in after
+        return after["truck"]["px"] - before["truck"]["px"]
+
+    dream = LearnedModelEnv(
+        truck.model,
+        like=gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step"),
+        reward=gained,
+        terminated=lambda _before, _action, after: after["truck"]["vx"] > 100.0,
+    )
+    dream.reset(seed=0)
+    for _ in range(40):
+        _, reward, terminated, _, _ = dream.step(PUSH)
+        assert reward == pytest.approx(dream.scene["truck"]["vx"], abs=1e-9)
+        if terminated:
+            break
+    assert terminated and dream.scene["truck"]["vx"] > 100.0
+    assert all(action == [1.0] for action in seen)
+
+
+def test_a_dream_ends_where_the_model_knows_nothing(truck: ModelLearner) -> None:
+    ignorant = WorldModel(truck.model.schema)
+    like = gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step")
+    dream = LearnedModelEnv(ignorant, like=like, reward=lambda *_: 1.0, terminated=lambda *_: True)
+    before, _ = dream.reset(seed=0)
+    after, reward, terminated, truncated, info = dream.step(PUSH)
+    assert truncated and not terminated and reward == 0.0
+    assert "truck.vx: no mode learned yet" in info["reason"] and "box1.px" in info["reason"]
+    assert str(before) == str(after)
+
+
+def test_a_dream_ends_where_it_leaves_the_observation_space(cart: ModelLearner) -> None:
+    dream = LearnedModelEnv(cart.model, like=CartEnv(limit=9.5))
+    dream.reset(options={"scene": cart.model.schema.scene({"cart": [9.3]})})  # 9.37, 9.433, 9.4897, 9.54073
+    for _ in range(3):
+        *_, truncated, info = dream.step(PUSH)
+        assert not truncated and "reason" not in info
+    observation, _, terminated, truncated, info = dream.step(PUSH)
+    assert truncated and not terminated
+    assert info["reason"] == "cart.v = 9.54073 left the observation space [-9.5, 9.5]"
+    assert info["prediction"].scene["cart"]["v"] > 9.5
+    assert observation in dream.observation_space
+
+
+def test_a_horizon_truncates(cart: ModelLearner) -> None:
+    dream = LearnedModelEnv(cart.model, horizon=3)
+    for _ in range(2):
+        dream.reset(seed=0)
+        assert [dream.step(PUSH)[3] for _ in range(3)] == [False, False, True]
+    with pytest.raises(ConfigError, match="horizon=0"):
+        LearnedModelEnv(cart.model, horizon=0)
+
+
+def test_the_model_is_live() -> None:
+    env = ModelLearner(CartEnv())
+    env.reset(seed=0)
+    env.step(PUSH)
+    dream, snapshot = LearnedModelEnv(env.model), LearnedModelEnv(copy.deepcopy(env.model))
+    run(env, 100)
+    for known, imagined in ((True, dream), (False, snapshot)):
+        imagined.reset(seed=0)
+        assert imagined.step(PUSH)[3] is not known
+
+
+# ---------------------------------------------------------------------- bad input and files
+def test_bad_input_names_the_remedy(cart: ModelLearner, truck: ModelLearner) -> None:
+    with pytest.raises(ConfigError, match="like=env"):
+        LearnedModelEnv(WorldModel(truck.model.schema))
+    with pytest.raises(ConfigError, match="render_mode"):
+        LearnedModelEnv(cart.model, render_mode="ascii")
+    with pytest.raises(ConfigError, match="make it with the arguments"):
+        LearnedModelEnv(truck.model, like=gym.make("relgym/TruckPush-v0", n_boxes=2))
+    with pytest.raises(ConfigError, match="make it with the arguments"):
+        LearnedModelEnv(truck.model, like=gym.make("relgym/TruckPush-v0", n_boxes=1, force_range=(0, 1)))
+    with pytest.raises(ConfigError, match="make it with the arguments"):
+        LearnedModelEnv(cart.model, like=gym.make("CartPole-v1"))
+    dream = LearnedModelEnv(cart.model)
+    with pytest.raises(ResetNeeded):
+        dream.step(PUSH)
+    with pytest.raises(ConfigError, match="render_mode="):
+        dream.render()
+    dream.reset(seed=0)
+    with pytest.raises(ActionError):
+        dream.step(np.array([7.0]))
+
+
+def test_an_env_that_cannot_be_copied_is_named(cart: ModelLearner) -> None:
+    like: Any = CartEnv()
+    like.lock = (k for k in range(3))  # generators can't be copied
+    with pytest.raises(ConfigError, match="can't be copied"):
+        LearnedModelEnv(cart.model, like=like)
+
+
+def test_damaged_files_are_refused(model_file: Path, tmp_path: Path) -> None:
+    (tmp_path / "short.json").write_bytes(model_file.read_bytes()[:-40])
+    with pytest.raises(ModelFileError, match="truncated"):
+        LearnedModelEnv(tmp_path / "short.json")
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"spaces": {}},
+        {"starts": [{"objects": ["cow"], "vector": [1.0]}]},
+        {"starts": [{"objects": ["cart"], "vector": [1.0, 2.0]}]},
+        {"starts": [{"objects": ["cart"], "vector": [float("nan")]}]},
+        {"metadata": 3},
+    ],
+)
+def test_a_malformed_record_is_refused(cart: ModelLearner, damage: dict[str, Any]) -> None:
+    model = copy.deepcopy(cart.model)
+    model.extra = {**cart.record.to_json(), **damage}
+    with pytest.raises(ModelFileError, match="missing or malformed"):
+        LearnedModelEnv(model)
+
+
+def test_what_a_file_says_of_the_env_survives(truck: ModelLearner) -> None:
+    record = truck.record
+    data = json.loads(json.dumps(record.to_json()))
+    assert EnvRecord.from_json(data, truck.model.schema) == record
+    assert len(record.starts) == 12
+    assert record.metadata == {"env": "relgym/TruckPush-v0", "render_fps": truck.metadata["render_fps"]}
+
+
+def test_spaces_survive_json() -> None:
+    space = spaces.Dict(
+        {
+            "a": spaces.Box(-1.0, np.array([1.0, 2.0], np.float32), dtype=np.float32),
+            "b": spaces.Discrete(3, start=1),
+            "c": spaces.Box(-np.inf, np.inf, (2, 2), dtype=np.float64),
+        }
+    )
+    assert space_from_json(json.loads(json.dumps(space_to_json(space)))) == space
+    with pytest.raises(ConfigError, match="Box, Discrete and Dict"):
+        space_to_json(spaces.MultiBinary(2))
