@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
@@ -15,11 +14,11 @@ from numpy.typing import NDArray
 
 from relgym.envs.actions import acting, check_action_space, without_action
 from relgym.envs.arguments import check_options, checked_action, checked_count
-from relgym.envs.model_files import EnvRecord
+from relgym.envs.model_files import EnvRecord, world_like
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ACTION, Scene, SceneSchema
+from relgym.scene.objects import ACTION, Scene
 
 __all__ = ["Judge", "LearnedModelEnv"]
 
@@ -111,7 +110,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         self.model = model
         self.schema = model.schema
         self.render_mode = render_mode
-        self._world = None if like is None else _world_of(like, model)
+        self._world = None if like is None else world_like(like, model.schema)
         record = _record(self._world, model)
         self.observation_space, self.action_space = record.observation_space, record.action_space
         self.metadata = {**self.metadata, "render_fps": record.metadata.get("render_fps", 50)}
@@ -260,35 +259,6 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         # In schema order, as the real env's; the Dict space sorts its keys.
         boxes = self._boxes().spaces
         return {o.name: o.values.astype(boxes[o.name].dtype) for o in self.scene}
-
-
-def _world_of(like: gym.Env[Any, Any], model: WorldModel) -> gym.Env[Any, Any]:
-    """A copy of the env inside all wrappers."""
-    inner = like.unwrapped
-    if not _alike(getattr(inner, "schema", None), model.schema):
-        raise ConfigError(
-            f"like={like}: expected an env whose scenes have the objects, properties and action ranges of the "
-            f"model's (objects {list(model.schema.order)}); make it with the arguments that the model's env had"
-        )
-    try:
-        world = copy.deepcopy(inner)
-    except (TypeError, NotImplementedError, copy.Error) as error:
-        raise ConfigError(
-            f"like={like} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
-            "that a ModelLearner taught holds spaces and first scenes of its own: leave out like"
-        ) from error
-    world.render_mode = None  # its resets are no one's to see
-    return world
-
-
-def _alike(schema: SceneSchema | None, other: SceneSchema) -> bool:
-    """Whether scenes of one schema are scenes of the other; what is to be learned of them may differ."""
-    return schema is not None and _signature(schema) == _signature(other)
-
-
-def _signature(schema: SceneSchema) -> tuple[Any, ...]:
-    types = {t.name: (t.properties, t.shape, dict(t.pose)) for t in schema.types}
-    return schema.objects, types, schema.up, schema.planar, schema.action_scale
 
 
 def _record(world: gym.Env[Any, Any] | None, model: WorldModel) -> EnvRecord:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
 from relgym.envs.spaces_json import space_from_json, space_to_json
-from relgym.errors import ModelFileError, ObservationError
+from relgym.errors import ConfigError, ModelFileError, ObservationError
 from relgym.scene.objects import Scene, SceneSchema
 
-__all__ = ["EnvRecord"]
+__all__ = ["EnvRecord", "world_like"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +72,41 @@ class EnvRecord:
                 f"what the model's file says of its env is missing or malformed ({error!r}); "
                 "save it again, or pass like=env"
             ) from None
+
+
+def world_like(like: gym.Env[Any, Any], schema: SceneSchema) -> gym.Env[Any, Any]:
+    """A copy of the env inside all wrappers, whose episode goes on undisturbed.
+
+    Raises
+    ------
+    ConfigError
+        Its scenes aren't of this schema, or it can't be copied.
+    """
+    inner = like.unwrapped
+    if not _alike(getattr(inner, "schema", None), schema):
+        raise ConfigError(
+            f"like={like}: expected an env whose scenes have the objects, properties and action ranges of the "
+            f"model's (objects {list(schema.order)}); make it with the arguments that the model's env had"
+        )
+    try:
+        world = copy.deepcopy(inner)
+    except (TypeError, NotImplementedError, copy.Error) as error:
+        raise ConfigError(
+            f"like={like} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
+            "that a ModelLearner taught holds spaces and first scenes of its own: leave out like"
+        ) from error
+    world.render_mode = None  # its resets are no one's to see
+    return world
+
+
+def _alike(schema: SceneSchema | None, other: SceneSchema) -> bool:
+    """Whether scenes of one schema are scenes of the other; what is to be learned of them may differ."""
+    return schema is not None and _signature(schema) == _signature(other)
+
+
+def _signature(schema: SceneSchema) -> tuple[Any, ...]:
+    types = {t.name: (t.properties, t.shape, dict(t.pose)) for t in schema.types}
+    return schema.objects, types, schema.up, schema.planar, schema.action_scale
 
 
 def _scene(schema: SceneSchema, data: Mapping[str, Any]) -> Scene:
