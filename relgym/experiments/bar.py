@@ -1,0 +1,96 @@
+"""Bars to be met, and what was measured, as records, as a table and as plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from statistics import median
+from typing import Any, Literal
+
+from relgym.model.text import Cell, table
+
+__all__ = ["Bar", "Measure", "measured", "report"]
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A limit that a figure must keep.
+
+    Attributes
+    ----------
+    what
+        Of what, with its unit.
+    limit
+        The limit.
+    side
+        Whether the figure may be at most or must be at least that.
+    """
+
+    what: str
+    limit: float
+    side: Literal["<=", ">="] = "<="
+
+    def met(self, value: float) -> bool:
+        """Whether a figure keeps the limit; NaN never does."""
+        return value <= self.limit if self.side == "<=" else value >= self.limit
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """A figure, measured several times, against its bar.
+
+    Attributes
+    ----------
+    bar
+        The bar.
+    values
+        One figure per repetition (training seed, or pair of training and test seed).
+    """
+
+    bar: Bar
+    values: tuple[float, ...]
+
+    @property
+    def worst(self) -> float:
+        """The figure farthest on the wrong side; NaN if there is none."""
+        if not self.values or any(math.isnan(v) for v in self.values):
+            return math.nan
+        return max(self.values) if self.bar.side == "<=" else min(self.values)
+
+    @property
+    def middle(self) -> float:
+        """Median of the figures."""
+        return median(self.values) if self.values else math.nan
+
+    @property
+    def ok(self) -> bool:
+        """Whether the worst figure keeps the bar."""
+        return self.bar.met(self.worst)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        derived = {"worst": self.worst, "median": self.middle, "ok": self.ok}
+        return asdict(self.bar) | {"values": list(self.values)} | derived
+
+
+def measured(what: str, limit: float, values: Iterable[float], side: Literal["<=", ">="] = "<=") -> Measure:
+    """A bar and its figures in one call."""
+    return Measure(Bar(what, limit, side), tuple(map(float, values)))
+
+
+def report(title: str, measures: Sequence[Measure], notes: Iterable[str] = ()) -> str:
+    """A table of bars, for people."""
+    rows: list[list[Cell]] = [
+        [
+            m.bar.what,
+            f"{m.bar.side} {m.bar.limit:g}",
+            f"{m.worst:.4g}",
+            f"{m.middle:.4g}",
+            len(m.values),
+            "met" if m.ok else "MISSED",
+        ]
+        for m in measures
+    ]
+    header = ["figure", "bar", "worst", "median", "of", ""]
+    return "\n".join([title, table(header, rows), *notes])

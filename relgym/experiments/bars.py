@@ -1,0 +1,88 @@
+"""Issue "Chapter III whole": what must be shown, row by row, measured against its bar.
+
+``python -m relgym.experiments.bars 1 2 --json bars.json`` measures rows 1 and 2 and writes the figures down as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from relgym.experiments.accuracy import AXES, Outcome, accuracy, ball_bars
+from relgym.experiments.bar import Measure, report
+from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
+
+__all__ = ["main"]
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """Which seeds to measure on."""
+
+    training: tuple[int, ...]
+    tests: tuple[int, ...]
+
+
+def _ball(experiment: int) -> Callable[[Request], tuple[str, list[Measure], list[str]]]:
+    def measure(request: Request) -> tuple[str, list[Measure], list[str]]:
+        outcomes = []
+        for outcome in accuracy(experiment, training=request.training, tests=request.tests):
+            outcomes.append(outcome)
+            print("\n".join(_lines(outcome)), flush=True)
+        return f"experiment {experiment}", ball_bars(experiment, outcomes), []
+
+    return measure
+
+
+def _lines(outcome: Outcome) -> list[str]:
+    lines = [f"training seed {outcome.seed}:"]
+    for axis, target in outcome.targets.items():
+        lines.append(f"  {axis}: {len(target.stated)} analytic modes, noise {target.noise:.3%}")
+        lines += [f"     missing:  {name}" for name in target.missing]
+        lines += [f"     spurious: {formula}" for formula in target.spurious]
+    for test, evaluation in outcome.evaluations.items():
+        for axis, target in AXES.items():
+            errors = evaluation[target]
+            bad = ", ".join(f"{m.name} {m.wrong}/{m.examples}" for m in errors.modes if m.wrong)
+            lines.append(
+                f"  test {test} {axis}: wrong {errors.total.rate:.4%} ({bad}); left out {errors.left_out}"
+            )
+        if test in outcome.rolled:
+            rolled = outcome.rolled[test]
+            lines.append(
+                f"  test {test} roll-outs: {rolled.failed} of {rolled.trials} failed, {rolled.failed_without_corner} "
+                f"without a corner, {rolled.stopped} stopped early; median error {rolled.median:.1e}"
+            )
+    return lines
+
+
+ROWS: Final = {1: _ball(1), 2: _ball(2), 3: _ball(3)}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure the rows named on the command line and print them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("rows", type=int, nargs="+", choices=sorted(ROWS))
+    parser.add_argument("--json", type=Path, help="where to write the figures")
+    parser.add_argument(
+        "--tuning", action="store_true", help="the seeds for tuning instead of those for reporting"
+    )
+    parser.add_argument("--seeds", type=int, help="only so many training seeds")
+    chosen = parser.parse_args(arguments)
+    training = (TUNING_SEEDS if chosen.tuning else TRAINING_SEEDS)[: chosen.seeds]
+    request = Request(training, (TUNING_TEST_SEED,) if chosen.tuning else TEST_SEEDS)
+    found: dict[int, Any] = {}
+    for row in chosen.rows:
+        title, measures, notes = ROWS[row](request)
+        found[row] = {"title": title, "measures": [m.to_json() for m in measures], "notes": notes}
+        print(report(f"row {row}: {title}", measures, notes), flush=True)
+    if chosen.json:
+        chosen.json.write_text(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()

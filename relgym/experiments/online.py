@@ -1,0 +1,108 @@
+"""Learning from blocks one transition at a time, each predicted before it is learned from (§4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.config import ModelConfig
+from relgym.experiments.analytic import AnalyticModes
+from relgym.experiments.blocks import Block
+from relgym.experiments.evaluate import TOLERANCE, explicable
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Float1D
+
+__all__ = ["Course", "follow", "learned"]
+
+_Bools: TypeAlias = NDArray[np.bool_]
+
+
+@dataclass(slots=True)
+class Course:
+    """How learning from a stream of blocks went.
+
+    Attributes
+    ----------
+    model
+        The model; the blocks seen so far taught it.
+    wrong
+        Per target and block: which predictions were off by more than `TOLERANCE` or made by no mode.
+    counted
+        Likewise: which transitions count (see `explicable`).
+    seconds
+        Per block: time of predicting and learning from each transition, in seconds.
+    """
+
+    model: WorldModel
+    wrong: dict[str, list[_Bools]] = field(default_factory=dict)
+    counted: dict[str, list[_Bools]] = field(default_factory=dict)
+    seconds: list[Float1D] = field(default_factory=list)
+
+    def rate(self, target: str, first: int, last: int | None = None) -> float:
+        """Share of wrong predictions of a target from block `first` on (the first is 1) up to `last`."""
+        part = slice(first - 1, last)
+        counted = np.concatenate(self.counted[target][part])
+        return float(np.concatenate(self.wrong[target][part])[counted].mean())
+
+
+def follow(
+    blocks: Iterable[Block], *, config: ModelConfig | None = None, laws: AnalyticModes | None = None
+) -> Iterator[Course]:
+    """Predict and learn block after block.
+
+    Parameters
+    ----------
+    blocks
+        Blocks of one schema.
+    config
+        Free parameters of the model.
+    laws
+        The ball world's linear laws, for `Course.counted`.
+
+    Yields
+    ------
+    The course after each block; always the same object.
+    """
+    course: Course | None = None
+    for block in blocks:
+        course = course or Course(WorldModel(block.schema, config))
+        seconds, wrong = _learn(course.model, block)
+        course.seconds.append(seconds)
+        for target, counted in explicable(block, laws).items():
+            course.counted.setdefault(target, []).append(counted)
+            course.wrong.setdefault(target, []).append(wrong[target])
+        yield course
+
+
+def learned(blocks: Iterable[Block], *, config: ModelConfig | None = None) -> WorldModel:
+    """The model that some blocks teach, its classifiers up to date; nothing is predicted on the way."""
+    model: WorldModel | None = None
+    for block in blocks:
+        model = model or WorldModel(block.schema, config)
+        for transition in block.transitions():
+            model.learn_one(transition)
+    assert model is not None, "no blocks, no schema"
+    model.finish()
+    return model
+
+
+def _learn(model: WorldModel, block: Block) -> tuple[Float1D, dict[str, _Bools]]:
+    n, layout = len(block), block.layout
+    seconds, wrong = np.zeros(n), {target: np.ones(n, dtype=np.bool_) for target in block.truth.mode}
+    for k, transition in enumerate(block.transitions()):
+        start = perf_counter()
+        prediction = model.predict_one(transition.before)
+        model.learn_one(transition)
+        seconds[k] = perf_counter() - start
+        for part in prediction.parts:
+            index = layout.index(part.object)
+            target = f"{layout.types[index].name}.{part.property}"
+            actual = transition.after.vector[layout.column(index, part.property)]
+            if target in wrong:
+                wrong[target][k] = not part.ok or abs(part.value - actual) > TOLERANCE
+    return seconds, wrong
