@@ -207,6 +207,7 @@ class ModeClassifier:
             "counts": [[mode, count] for mode, count in sorted(self.counts.items())],
             "pairs": [pair.to_dict() for pair in self._pairs.values()],
             "seen": sorted(self._familiarity().seen),
+            "covered": [list(pair) for pair in sorted(self._covered)],
             "exemplars": self.exemplars.to_dict() if exemplars else None,
         }
 
@@ -223,17 +224,19 @@ class ModeClassifier:
             i, j = int(plain["classifier"]["i"]), int(plain["classifier"]["j"])
             self._pairs[i, j] = PairState.from_dict(plain, self._scope(i, j))
         self._reset_caches()
-        self._seen = Familiarity(used_by(self.classifiers, self.vocabulary), data["seen"])
+        self._remember(data["seen"], {(int(k), int(m)) for k, m in data["covered"]})
         return self
 
     def __getstate__(self) -> dict[str, Any]:
         # Caches are rebuilt on demand; leaving them out keeps pickles and copies small.
-        kept = {"vocabulary", "config", "exemplars", "counts", "_pairs"}
-        return {name: value for name, value in self.__dict__.items() if name in kept} | {"_view": None}
+        kept = {"vocabulary", "config", "exemplars", "counts", "_pairs", "_covered"}
+        state = {name: value for name, value in self.__dict__.items() if name in kept}
+        return state | {"_view": None, "_seen": sorted(self._familiarity().seen)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._reset_caches()
+        self._remember(state["_seen"], state["_covered"])
 
     # ----- inside -----
 
@@ -288,6 +291,11 @@ class ModeClassifier:
     def _reset_caches(self) -> None:
         self._voting = Voting(self.vocabulary, self.modes, self.config.votes)
         self._pairs_changed()
+
+    def _remember(self, seen: Iterable[int], covered: set[tuple[int, int]]) -> None:
+        """Take over what can't be told from the exemplars, which are but a choice of the examples."""
+        self._seen = Familiarity(used_by(self.classifiers, self.vocabulary), seen)
+        self._covered = covered
 
     def _pairs_changed(self) -> None:
         self._voting.set_pairs(self.classifiers)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,12 +64,24 @@ class Perception:
         self._contact_names = self.extractor.features
         self._pair_names = tuple(sorted({p for t in schema.types if t.has_body for p in _free(t)}))
         self._unary_names = self.extractor.unary_names
+        self._forget()
+
+    def _forget(self) -> None:
         self._signatures: dict[tuple[ObjectType, ...], SlotSignature] = {}
         self._gathers: dict[tuple[int, tuple[int, ...]], NDArray[np.intp]] = {}
         self._layouts: dict[int, SceneLayout] = {}
         self._own_columns: dict[tuple[int, int], NDArray[np.intp]] = {}
         self._unary: dict[int, NDArray[np.bool_]] = {}
         self._features: dict[int, NDArray[np.intp]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Caches are keyed by identity, which a copy doesn't share.
+        caches = ("_signatures", "_gathers", "_layouts", "_own_columns", "_unary", "_features")
+        return {name: value for name, value in self.__dict__.items() if name not in caches}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._forget()
 
     def percept(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> Percept:
         """Relations of a batch of scenes, shape ``(n, layout.width)``."""

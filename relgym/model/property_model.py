@@ -63,7 +63,10 @@ class PropertyModel:
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
         self.classifier = ModeClassifier(vocabulary, config.classification)
         self.casting = Casting(vocabulary, config.classification)
-        self._bindings: dict[tuple[int, int], Binding | None] = {}
+        self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_bindings": {}}  # keyed by identity, which a copy doesn't share
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -150,10 +153,11 @@ class PropertyModel:
 
     # ------------------------------------------------------------------ functions and roles
     def _binding(self, signature: SlotSignature, mode: int) -> Binding | None:
-        key = (id(signature), mode)
-        if key not in self._bindings:
-            self._bindings[key] = bind(self.mode(mode), signature)
-        return self._bindings[key]
+        key, present = (id(signature), mode), self.mode(mode)
+        known = self._bindings.get(key)
+        if known is None or known[0] is not present:  # a refit changes the function, not the mode's id
+            known = self._bindings[key] = (present, bind(present, signature))
+        return known[1]
 
     def _values(
         self, signature: SlotSignature, x: NDArray[np.float64], ids: tuple[int, ...]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -92,6 +93,7 @@ class WorldModel:
         self.seen = 0
         self.frozen = False
         self.extra: dict[str, Any] = {}
+        self._kin: dict[int, SceneSchema] = {}
         named = schema.targets if targets is None else tuple(targets)
         self._open = named is None
         self.targets: tuple[Target, ...] = ()
@@ -102,6 +104,9 @@ class WorldModel:
         self._percept: tuple[Scene, Percept] | None = None
         for target in named or ():
             self._add_target(target)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_percept": None, "_kin": {}}
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{t}: {len(self._models[t].modes)} modes" for t in self.targets)
@@ -215,17 +220,24 @@ class WorldModel:
         return spent
 
     def finish(self) -> int:
-        """Re-learn every stale classifier now, without a budget; returns the work spent."""
-        return sum(self._models[t].refresh(None) for t in self.targets)
+        """Re-learn every stale classifier now, without a budget; returns the work spent.
+
+        A model without its history has nothing to learn from and stays as it is.
+        """
+        return 0 if self.frozen else sum(self._models[t].refresh(None) for t in self.targets)
 
     def _check(self, scene: Scene) -> None:
-        if scene.schema is not self.schema and scene.schema != self.schema:
-            raise ObservationError(
-                f"the scene follows another schema (objects {list(scene.schema.order)}) than the model "
-                f"(objects {list(self.schema.order)}); build it with model.schema"
-            )
+        schema = scene.schema
+        if schema is not self.schema and id(schema) not in self._kin:
+            mismatch = _mismatch(schema, self.schema)
+            if mismatch:
+                raise ObservationError(
+                    f"the scene follows another schema than the model: {mismatch}; numbers and names of objects may "
+                    "differ, their types may not"
+                )
+            self._kin[id(schema)] = schema  # kept alive, so that its id stays its own
         if not np.isfinite(scene.vector).all():
-            self.schema.scene(scene.values())  # raises, naming object and property
+            schema.scene(scene.values())  # raises, naming object and property
 
     def _perceive(self, scene: Scene) -> Percept:
         """Relations of a scene; the last one's are remembered, since prediction comes before learning."""
@@ -257,7 +269,7 @@ class WorldModel:
                 following[column] = verdict.value
                 parts.append(replace(verdict, object=layout.names[index], property=target.property))
         self._derive(layout, scene.vector[None], following[None])
-        return ScenePrediction(Scene(self.schema, layout, following), tuple(parts))
+        return ScenePrediction(Scene(scene.schema, layout, following), tuple(parts))
 
     def predict_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> BatchPrediction:
         """Predict what follows n scenes with the same objects; bit for bit what `predict_one` gives.
@@ -376,15 +388,22 @@ class WorldModel:
         extra
             Plain data of the caller's; default: the attribute `extra`, where a learner around an env keeps its spaces.
         """
-        self.finish()
-        arrays: dict[str, NDArray[Any]] | None = None
-        if history:
-            arrays = {}
-            for k, type_name in enumerate(sorted(self._tables)):
-                arrays |= {f"table{k}.{name}": a for name, a in self._tables[type_name].to_arrays().items()}
-            for k, target in enumerate(self.targets):
-                arrays |= {f"target{k}.{name}": a for name, a in self._models[target].to_arrays().items()}
-        write_model(path, self.to_json(history=history) | {"extra": self.extra if extra is None else extra}, arrays)
+        if not history:
+            finished = copy.deepcopy(self)  # saving must not change what is learned from here on
+            finished.finish()
+            write_model(path, finished.to_json() | {"extra": self.extra if extra is None else extra}, None)
+            return
+        if self.frozen:
+            raise ModelFileError(
+                "this model was loaded without its history: save it with history=False, or load it from a file "
+                "that was saved with history=True"
+            )
+        arrays: dict[str, NDArray[Any]] = {}
+        for k, type_name in enumerate(sorted(self._tables)):
+            arrays |= {f"table{k}.{name}": a for name, a in self._tables[type_name].to_arrays().items()}
+        for k, target in enumerate(self.targets):
+            arrays |= {f"target{k}.{name}": a for name, a in self._models[target].to_arrays().items()}
+        write_model(path, self.to_json(history=True) | {"extra": self.extra if extra is None else extra}, arrays)
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
@@ -453,6 +472,21 @@ def with_action(scene: Scene, values: Sequence[float] | NDArray[np.float64]) -> 
         raise ObservationError(f"action: expected {vector[where].shape} values, got shape {np.shape(values)}")
     vector[where] = values
     return Scene(scene.schema, layout, vector)
+
+
+def _mismatch(schema: SceneSchema, known: SceneSchema) -> str:
+    """What keeps a model of one schema from speaking of scenes of another; empty if nothing does."""
+    if (schema.up, schema.planar) != (known.up, known.planar):
+        return f"up={schema.up!r}, planar={schema.planar} instead of up={known.up!r}, planar={known.planar}"
+    types = {t.name: t for t in known.types}
+    for t in schema.types:
+        if t.name not in types:
+            return f"unknown type {t.name!r}, expected one of {sorted(types)}"
+        if t.properties != types[t.name].properties:
+            return f"type {t.name!r} has properties {t.properties}, expected {types[t.name].properties}"
+        if t != types[t.name]:
+            return f"type {t.name!r} has another shape, parent, pose or velocity"
+    return ""
 
 
 def _following(before: Scene, after: Scene) -> NDArray[np.float64]:
