@@ -258,15 +258,20 @@ class WorldModel:
         layout, percept = scene.layout, self._perceive(scene)
         following = scene.vector.copy()
         parts: list[Prediction] = []
+        lost: set[tuple[str, str]] = set()
         for target in self.targets:
             for index in layout.of_type(target.type):
                 verdict = self._models[target].predict_one(percept, index, following)
+                if not lost.isdisjoint(target.given):
+                    verdict = Prediction("", "", np.nan, Outcome.DEPENDS)
                 column = layout.column(index, target.property)
                 if not np.isfinite(verdict.value):
                     # A mode whose value overflows has left its experience; other verdicts say why they are empty.
                     outcome = Outcome.OUTSIDE if verdict.ok else verdict.outcome
                     verdict = replace(verdict, value=float(scene.vector[column]), outcome=outcome, mode=0)
                 following[column] = verdict.value
+                if not verdict.ok:
+                    lost.add((target.type, target.property))
                 parts.append(replace(verdict, object=layout.names[index], property=target.property))
         self._derive(layout, scene.vector[None], following[None])
         return ScenePrediction(Scene(scene.schema, layout, following), tuple(parts))
@@ -291,15 +296,22 @@ class WorldModel:
         following = vectors.copy()
         keys: list[tuple[str, str]] = []
         verdicts: list[Verdict] = []
+        lost: dict[tuple[str, str], NDArray[np.bool_]] = {}
+        nowhere = np.zeros(len(vectors), dtype=bool)
         for target in self.targets:
             for index in layout.of_type(target.type):
                 verdict = self._models[target].predict_batch(percept, index, following)
+                for pair in target.given:
+                    verdict.values[lost.get(pair, nowhere)] = np.nan
+                    verdict.outcomes[lost.get(pair, nowhere)] = OUTCOMES.index(Outcome.DEPENDS)
                 column = layout.column(index, target.property)
                 known = np.isfinite(verdict.values)
                 following[known, column] = verdict.values[known]
                 overflowed = ~known & (verdict.outcomes == OUTCOMES.index(Outcome.PREDICTED))
                 verdict.outcomes[overflowed] = OUTCOMES.index(Outcome.OUTSIDE)
                 verdict.modes[~known] = 0
+                key = (target.type, target.property)
+                lost[key] = lost.get(key, nowhere) | ~known
                 keys.append((layout.names[index], target.property))
                 verdicts.append(verdict)
         self._derive(layout, vectors, following)

@@ -146,6 +146,14 @@ def test_r3_learning_under_other_names(
     assert_alike(variant(vary(room_steps, change)), room_model, vary(FRESH, change))
 
 
+@pytest.mark.parametrize("change", [renamed, reordered, exchanged])
+def test_r3_a_model_speaks_of_other_names(change: Callable[[Raw], Raw], room_model: WorldModel) -> None:
+    fresh = vary(FRESH, change)
+    schema = schema_of(fresh, ROOM_TARGETS)
+    found = [[p.value for p in room_model.predict_one(scene(schema, before)).parts] for before, _ in fresh]
+    assert np.array(found) == pytest.approx(answers(room_model, FRESH), abs=1e-9)
+
+
 def test_r3_a_model_meets_other_numbers_of_objects(room_steps: list[RawStep]) -> None:
     more = room(2, 100, boxes=5)
     model = learned(schema_of([*room_steps, *more], ROOM_TARGETS), room_steps)

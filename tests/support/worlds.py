@@ -133,7 +133,8 @@ def _beside(
     side, touches = rng.choice([-1.0, 1.0]), rng.random() < 0.5
     d = rng.uniform(0.2, 0.4)
     gap = -rng.uniform(0.001, 0.01) if touches else rng.uniform(0.05, 0.3)
-    ball = {"d": d, "vx": rng.uniform(-0.05, 0.05), "vy": rng.uniform(-0.05, 0.05)}
+    velocity = {"vx": rng.uniform(-0.05, 0.05), "vy": rng.uniform(-0.05, 0.05)}
+    ball = {"px": 0.0, "py": 0.0, "d": d} | velocity
     ball[f"p{along}"] = box[f"p{along}"] + side * (box[f"s{along}"] / 2 + d / 2 + gap)
     ball[f"p{across}"] = box[f"p{across}"] + rng.uniform(-0.3, 0.3) * box[f"s{across}"]
     change = {"vx": ball["vx"], "vy": ball["vy"] - GRAVITY}
