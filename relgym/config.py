@@ -228,8 +228,8 @@ class ModelConfig:
     geometry
         ``"arrays"`` (default, batched) or ``"fcl"`` (any shapes, scene by scene); a model always uses the same one.
     abstain
-        Whether a situation whose relational state was never seen, and in which no clause speaks for a mode, is called
-        *outside experience* instead of being predicted. Default true.
+        Whether a situation that differs from all seen ones in what the clauses look at is called *outside experience*
+        instead of being predicted. Default true; false: the votes decide there as everywhere.
     work_per_step
         Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
         literals examined). Default 400,000, some 50 ms. Raising it makes rules fresher and single steps slower.

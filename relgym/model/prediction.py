@@ -25,6 +25,7 @@ class Outcome(enum.Enum):
     NO_MODE = "no mode learned yet: learn from more transitions"
     NO_ROLES = "no mode's roles could be filled by the objects in the scene"
     OUTSIDE = "outside experience: nothing like this situation was seen in training"
+    DEPENDS = "depends on another property that could not be predicted"
 
 
 OUTCOMES = tuple(Outcome)

@@ -248,7 +248,7 @@ class PropertyModel:
         x = percept.rows(index, following[None])[0].tolist()
         example = replace(situation.examples[0], key=situation.keys[0])
         ranking = self.classifier.rank(example, self._values_one(situation.signature, x))
-        if self.config.abstain and not ranking.familiar and len(self.classifier.modes) > 1:
+        if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
             return replace(nothing, outcome=Outcome.OUTSIDE)
         layout = percept.layout
         for place, mode in enumerate(ranking.modes):
@@ -292,7 +292,7 @@ class PropertyModel:
         verdict.outcomes[:] = _NO_ROLES
         waiting = np.ones(n, dtype=bool)
         if self.config.abstain and len(modes) > 1:
-            waiting = ranking.familiar.copy()
+            waiting = ranking.seen.copy()
             verdict.outcomes[~waiting] = _OUTSIDE
         for place in range(len(modes)):
             for mode in np.unique(ranking.modes[waiting, place]):
