@@ -18,6 +18,7 @@ from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryEr
 from relgym.model.perception import Percept, Perception, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.property_model import PropertyModel, Verdict, bodies_of
+from relgym.model.scenes import mismatch, next_values, with_action
 from relgym.model.storage import (
     read_model,
     schema_from_json,
@@ -28,7 +29,7 @@ from relgym.model.storage import (
 )
 from relgym.scene.objects import ACTION, Scene, SceneLayout, SceneSchema, Target, Transition
 
-__all__ = ["LearnReport", "WorldModel"]
+__all__ = ["LearnReport", "WorldModel", "with_action"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,12 +181,12 @@ class WorldModel:
         if self._open:
             self._discover_targets(before, after)
         percept = self._perceive(before)
-        following = _following(before, after)
+        after_values = next_values(before, after)
         parts: dict[tuple[str, str], ClusterReport] = {}
         for type_name in dict.fromkeys(t.type for t in self.targets):
             for index in before.layout.of_type(type_name):
                 if before.layout.names[index] in after:
-                    self._learn_object(percept, index, following, parts)
+                    self._learn_object(percept, index, after_values, parts)
         self.seen += 1
         work = self._refresh()
         return LearnReport(parts, work)
@@ -229,10 +230,10 @@ class WorldModel:
     def _check(self, scene: Scene) -> None:
         schema = scene.schema
         if schema is not self.schema and id(schema) not in self._kin:
-            mismatch = _mismatch(schema, self.schema)
-            if mismatch:
+            difference = mismatch(schema, self.schema)
+            if difference:
                 raise ObservationError(
-                    f"the scene follows another schema than the model: {mismatch}; numbers and names of objects may "
+                    f"the scene follows another schema than the model: {difference}; numbers and names of objects may "
                     "differ, their types may not"
                 )
             self._kin[id(schema)] = schema  # kept alive, so that its id stays its own
@@ -415,7 +416,9 @@ class WorldModel:
             arrays |= {f"table{k}.{name}": a for name, a in self._tables[type_name].to_arrays().items()}
         for k, target in enumerate(self.targets):
             arrays |= {f"target{k}.{name}": a for name, a in self._models[target].to_arrays().items()}
-        write_model(path, self.to_json(history=True) | {"extra": self.extra if extra is None else extra}, arrays)
+        write_model(
+            path, self.to_json(history=True) | {"extra": self.extra if extra is None else extra}, arrays
+        )
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
@@ -473,40 +476,3 @@ class WorldModel:
             part = {n.split(".", 1)[1]: a for n, a in (arrays or {}).items() if n.startswith(f"target{k}.")}
             model._models[target].restore(body["targets"][k]["model"], part)
         return model
-
-
-def with_action(scene: Scene, values: Sequence[float] | NDArray[np.float64]) -> Scene:
-    """The scene with other values of the action object's properties (physical units)."""
-    layout = scene.layout
-    where = layout.slice(layout.index(ACTION))
-    vector = scene.vector.copy()
-    if np.shape(values) != vector[where].shape:
-        raise ObservationError(f"action: expected {vector[where].shape} values, got shape {np.shape(values)}")
-    vector[where] = values
-    return Scene(scene.schema, layout, vector)
-
-
-def _mismatch(schema: SceneSchema, known: SceneSchema) -> str:
-    """What keeps a model of one schema from speaking of scenes of another; empty if nothing does."""
-    if (schema.up, schema.planar) != (known.up, known.planar):
-        return f"up={schema.up!r}, planar={schema.planar} instead of up={known.up!r}, planar={known.planar}"
-    types = {t.name: t for t in known.types}
-    for t in schema.types:
-        if t.name not in types:
-            return f"unknown type {t.name!r}, expected one of {sorted(types)}"
-        if t.properties != types[t.name].properties:
-            return f"type {t.name!r} has properties {t.properties}, expected {types[t.name].properties}"
-        if t != types[t.name]:
-            return f"type {t.name!r} has another shape, parent, pose or velocity"
-    return ""
-
-
-def _following(before: Scene, after: Scene) -> NDArray[np.float64]:
-    """The next values in the layout of the scene before; objects that vanished keep theirs."""
-    if after.layout is before.layout:
-        return after.vector
-    following = before.vector.copy()
-    for i, name in enumerate(before.layout.names):
-        if name in after and after[name].type == before.layout.types[i]:
-            following[before.layout.slice(i)] = after[name].values
-    return following

@@ -1,0 +1,50 @@
+"""Scenes of one model put together and compared: actions filled in, next values lined up, schemas matched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.errors import ObservationError
+from relgym.scene.objects import ACTION, Scene, SceneSchema
+
+__all__ = ["mismatch", "next_values", "with_action"]
+
+
+def with_action(scene: Scene, values: Sequence[float] | NDArray[np.float64]) -> Scene:
+    """The scene with other values of the action object's properties (physical units)."""
+    layout = scene.layout
+    where = layout.slice(layout.index(ACTION))
+    vector = scene.vector.copy()
+    if np.shape(values) != vector[where].shape:
+        raise ObservationError(f"action: expected {vector[where].shape} values, got shape {np.shape(values)}")
+    vector[where] = values
+    return Scene(scene.schema, layout, vector)
+
+
+def mismatch(schema: SceneSchema, known: SceneSchema) -> str:
+    """What keeps a model of one schema from speaking of scenes of another; empty if nothing does."""
+    if (schema.up, schema.planar) != (known.up, known.planar):
+        return f"up={schema.up!r}, planar={schema.planar} instead of up={known.up!r}, planar={known.planar}"
+    types = {t.name: t for t in known.types}
+    for t in schema.types:
+        if t.name not in types:
+            return f"unknown type {t.name!r}, expected one of {sorted(types)}"
+        if t.properties != types[t.name].properties:
+            return f"type {t.name!r} has properties {t.properties}, expected {types[t.name].properties}"
+        if t != types[t.name]:
+            return f"type {t.name!r} has another shape, parent, pose or velocity"
+    return ""
+
+
+def next_values(before: Scene, after: Scene) -> NDArray[np.float64]:
+    """The next values in the layout of the scene before; objects that vanished keep theirs."""
+    if after.layout is before.layout:
+        return after.vector
+    following = before.vector.copy()
+    for i, name in enumerate(before.layout.names):
+        if name in after and after[name].type == before.layout.types[i]:
+            following[before.layout.slice(i)] = after[name].values
+    return following
