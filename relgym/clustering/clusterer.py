@@ -12,10 +12,10 @@ from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import Scale, find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
+from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
-from relgym.clustering.roles import identify_roles
-from relgym.clustering.unification import covering, reordered, unified, unified_family
+from relgym.clustering.unification import reordered
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import Target
@@ -24,9 +24,6 @@ __all__ = ["ClusterReport", "ModeClusterer"]
 
 ESTIMATE_AT = (64, 512, 4096)
 """Numbers of examples after which the noise is estimated anew."""
-
-FAMILY = 4
-"""Modes that differ in their constant only are unified all at once when there are at least so many."""
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
@@ -288,89 +285,18 @@ class ModeClusterer:
 
     def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit, members: NDArray[np.intp]) -> None:
         """Make a mode of a function: unify it with the known ones (§3.2.5), reassign examples (§3.2.4)."""
-        cluster = self._cluster(fit, table, signature)
+        known = Known(
+            table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
+        )
+        cluster = known.cluster(fit, signature)
         members = self._explained(table, cluster, self._noise())
-        absorbed: list[int] = []
-        while (wider := self._unify_once(table, cluster, members, absorbed)) is not None:
-            cluster, members, gone = wider
-            absorbed.append(gone)
-        if (family := self._unify_family(table, cluster, members, absorbed)) is not None:
-            cluster, members, gone_too = family
-            absorbed += gone_too
-            while (wider := self._unify_once(table, cluster, members, absorbed)) is not None:
-                cluster, members, gone = wider
-                absorbed.append(gone)
+        cluster, absorbed = generalise(known, cluster, members, rng=self._rng)
         for i in absorbed:
             self._remove(i)
         new = self._next_id
         self._next_id += 1
         self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
         self._reassign(table, new)
-
-    def _unify_once(
-        self, table: ExampleTable, cluster: Cluster, members: NDArray[np.intp], absorbed: list[int]
-    ) -> tuple[Cluster, NDArray[np.intp], int] | None:
-        """Unify with the largest mode possible: the general function, its examples, the mode it absorbs."""
-        rivals = [i for i in self.clusters if i not in absorbed]
-        for i in sorted(rivals, key=lambda k: (-int((self.labels == k).sum()), k)):
-            theirs = np.flatnonzero(self.labels == i)
-            both = np.concatenate([members, theirs])
-            if covering(cluster, table, self.rows[theirs], self.y[theirs], self.scale, self.config):
-                return cluster, both, i
-            general = unified(
-                table,
-                self.rows,
-                self.y,
-                members,
-                theirs,
-                target=self.target,
-                scale=self.scale,
-                config=self.config,
-                simpler_than=(cluster.mode, self.clusters[i].mode),
-            )
-            if general is not None:
-                return self._cluster(general[1], table, general[0]), both, i
-        return None
-
-    def _unify_family(
-        self, table: ExampleTable, cluster: Cluster, members: NDArray[np.intp], absorbed: list[int]
-    ) -> tuple[Cluster, NDArray[np.intp], list[int]] | None:
-        """Unify with all modes that differ in their constant only; as `_unify_once`, absorbing several."""
-        siblings = [
-            i
-            for i, c in sorted(self.clusters.items())
-            if i not in absorbed
-            and c.mode.intercept != 0.0
-            and c.mode.same_function(cluster.mode, constant=False)
-        ]
-        if (
-            cluster.mode.intercept == 0.0
-            or any(r.terms for r in cluster.mode.open_roles)
-            or len(siblings) < FAMILY
-        ):
-            return None
-        families = [np.flatnonzero(self.labels == i) for i in siblings]
-        found = unified_family(
-            table,
-            self.rows,
-            self.y,
-            [*families, members],
-            cluster.mode.roles[0].terms,
-            target=self.target,
-            scale=self.scale,
-            config=self.config,
-            rng=self._rng,
-        )
-        if found is None or len(siblings) not in found[2]:
-            return None
-        signature, fit, which = found
-        gone = [siblings[k] for k in which if k < len(siblings)]
-        everyone = np.concatenate([members, *(families[k] for k in which if k < len(siblings))])
-        return self._cluster(fit, table, signature), everyone, gone
-
-    def _cluster(self, fit: LinearFit, table: ExampleTable, signature: int) -> Cluster:
-        roles = identify_roles(fit, table.signatures[signature])
-        return Cluster(Mode(0, self.target, roles, fit.intercept, sigma=self.scale.sigma))
 
     def _noise(self) -> NDArray[np.intp]:
         return np.flatnonzero(self.labels == NOISE)
