@@ -23,6 +23,10 @@ class ClassificationConfig:
     votes
         How binary classifiers are combined (§3.4.3). ``"hard"``: one vote each, as in the thesis. ``"soft"``
         (default): log-probabilities of the clause that fired, so that one unsure pair decides nothing.
+    runoff
+        Whether the mode with fewest votes drops out and the others' votes are counted again, until one is left.
+        Default true: a pair says nothing sensible of examples of a third mode. False: the most votes win, as in
+        the thesis.
     context
         Which objects clauses of mode classifiers speak of. ``"touching"``: the target and all that touch it,
         or else the nearest one. ``"all"``: every object. ``"auto"`` (default): both vocabularies are tried
@@ -94,6 +98,7 @@ class ClassificationConfig:
     """
 
     votes: Literal["soft", "hard"] = "soft"
+    runoff: bool = True
     context: Literal["auto", "touching", "all"] = "auto"
     contact_facts: bool = True
     numeric_literals: bool = True
@@ -315,6 +320,7 @@ def _unit(config: object, *names: str) -> None:
 
 _THESIS = ClassificationConfig(
     votes="hard",
+    runoff=False,
     context="touching",
     contact_facts=False,
     numeric_literals=False,

@@ -289,7 +289,8 @@ class ModeClassifier:
         self._pairs = pairs
 
     def _reset_caches(self) -> None:
-        self._voting = Voting(self.vocabulary, self.modes, self.config.votes)
+        votes, runoff = self.config.votes, self.config.runoff
+        self._voting = Voting(self.vocabulary, self.modes, votes, runoff=runoff)
         self._pairs_changed()
 
     def _remember(self, seen: Iterable[int], covered: set[tuple[int, int]]) -> None:

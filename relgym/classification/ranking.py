@@ -64,9 +64,9 @@ class Ranking:
     modes
         Mode ids, the winner first; empty while there is no mode.
     scores
-        Their votes: log-probabilities, or numbers of votes if votes are hard.
+        Their votes in the first count: log-probabilities, or numbers of votes if votes are hard.
     margin
-        Votes between winner and runner-up; infinite if there is one mode only.
+        Votes between winner and runner-up in the last count; infinite if there is one mode only.
     familiar
         False if no clause spoke for the winner and nothing like the example was seen in training: the winner
         is a guess.

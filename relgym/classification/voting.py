@@ -1,6 +1,18 @@
 """One-against-one voting (§3.4.3): the winner is the mode that most pairs, or the surest ones, vote for.
 
 Votes are integers, so that single and batch evaluation agree bit for bit whatever the order of summation.
+
+Deviation from the thesis
+-------------------------
+Two modes are told apart by what tells *their* examples apart; of any other situation their pair says something
+arbitrary, and says it with confidence. In a run-off it is not heard: the mode with fewest votes drops out, and the
+votes of the others' pairs are counted again, until one is left (Baldwin's method). A mode that wins all its pairs
+always wins.
+
+References
+----------
+J. M. Baldwin, "The technique of the Nanson preferential majority system of election", Proceedings of the Royal
+Society of Victoria 39 (1926).
 """
 
 from __future__ import annotations
@@ -19,7 +31,7 @@ from relgym.classification.plans import Key, Planner
 from relgym.classification.ranking import Ranking, RankingBatch, Verdict, verdict
 from relgym.classification.views import View
 
-__all__ = ["Voting"]
+__all__ = ["Voting", "run_off_batch"]
 
 
 class Voting:
@@ -33,11 +45,21 @@ class Voting:
         Mode ids in the order of the values that come with an example.
     how
         Soft or hard votes.
+    runoff
+        Whether the mode with fewest votes drops out and the rest is counted again, until one is left.
     """
 
-    def __init__(self, vocabulary: Vocabulary, modes: tuple[int, ...], how: Literal["soft", "hard"]) -> None:
+    def __init__(
+        self,
+        vocabulary: Vocabulary,
+        modes: tuple[int, ...],
+        how: Literal["soft", "hard"],
+        *,
+        runoff: bool = False,
+    ) -> None:
         self.modes = modes
         self.how: Literal["soft", "hard"] = how
+        self.runoff = runoff
         self._planner = Planner(vocabulary, modes)
         self.set_pairs(())
 
@@ -69,16 +91,21 @@ class Voting:
         plan = self._planner.plan(example)
         outcomes = self._planner.run(plan, example, values)
         modes, scores = self.modes, [0] * len(self.modes)
-        for (a, b), votes, outcome in zip(self._places, self._votes, outcomes, strict=True):
-            for_a, for_b = votes[outcome]
+        cast = [votes[outcome] for votes, outcome in zip(self._votes, outcomes, strict=True)]
+        for (a, b), (for_a, for_b) in zip(self._places, cast, strict=True):
             scores[a] += for_a
             scores[b] += for_b
-        order = sorted(range(len(modes)), key=lambda m: (-scores[m], -counts[modes[m]], modes[m]))
+        by_tie = self._by_tie(counts)
+        if self.runoff:
+            order, margin = self._run_off(cast, by_tie)
+        else:
+            order = sorted(by_tie, key=lambda m: -scores[m])
+            margin = scores[order[0]] - scores[order[1]] if len(order) > 1 else None
         seen = known.is_seen(example, plan.key)
         return Ranking(
             modes=tuple([modes[m] for m in order]),
             scores=tuple([scores[m] / VOTE_UNIT for m in order]),
-            margin=(scores[order[0]] - scores[order[1]]) / VOTE_UNIT if len(order) > 1 else math.inf,
+            margin=math.inf if margin is None else margin / VOTE_UNIT,
             familiar=seen or self._spoke(modes[order[0]], outcomes),
             seen=seen,
         )
@@ -92,14 +119,19 @@ class Voting:
             none, no = np.empty((n, 0)), np.zeros(n, dtype=np.bool_)
             return RankingBatch(none.astype(np.int64), none, np.zeros(n), no, no)
         view = View.of_batch(batch, self.modes, np.asarray(values, dtype=np.float64))
-        scores, spoken = self._scores(view)
-        by_tie = sorted(range(m), key=lambda k: (-counts[self.modes[k]], self.modes[k]))
-        order = np.array(by_tie)[np.argsort(-scores[:, by_tie], axis=1, kind="stable")]
-        ranked = np.take_along_axis(scores, order, axis=1)
-        margin = (ranked[:, 0] - ranked[:, 1]) / VOTE_UNIT if m > 1 else np.full(n, math.inf)
+        cast, spoken = self._cast(view)
+        scores = cast.sum(axis=2)
+        by_tie = self._by_tie(counts)
+        if self.runoff:
+            order, lead = run_off_batch(cast - cast.transpose(0, 2, 1), by_tie)
+        else:
+            order = np.array(by_tie)[np.argsort(-scores[:, by_tie], axis=1, kind="stable")]
+            lead = -np.diff(np.take_along_axis(scores, order[:, :2], axis=1), axis=1).reshape(n, -1)
+        margin = lead.reshape(n) / VOTE_UNIT if m > 1 else np.full(n, math.inf)
         seen = known.is_seen_batch(view)
         familiar = seen | spoken[np.arange(n), order[:, 0]]
-        return RankingBatch(np.array(self.modes)[order], ranked / VOTE_UNIT, margin, familiar, seen)
+        ranked = np.take_along_axis(scores, order, axis=1) / VOTE_UNIT
+        return RankingBatch(np.array(self.modes)[order], ranked, margin, familiar, seen)
 
     def verdicts(self, example: Example, values: Sequence[float], ranked: tuple[int, ...]) -> list[Verdict]:
         """How the first of some ranked modes fared against each of the others."""
@@ -110,20 +142,46 @@ class Voting:
                 found[rival] = verdict(classifier, outcome)
         return [found[mode] for mode in ranked[1:]]
 
-    def _scores(self, view: View) -> tuple[NDArray[np.int64], Bools]:
-        """Votes of every mode, and whether a clause spoke for it, both of shape ``(n, M)``."""
+    def _by_tie(self, counts: Mapping[int, float]) -> list[int]:
+        """Places of the modes, those that win ties first."""
+        return sorted(range(len(self.modes)), key=lambda k: (-counts[self.modes[k]], self.modes[k]))
+
+    def _run_off(
+        self, cast: Sequence[tuple[int, int]], by_tie: Sequence[int]
+    ) -> tuple[list[int], int | None]:
+        """Places of the modes, the winner first, and by how much it won the last count; see `run_off_batch`."""
+        lead = [[0] * len(by_tie) for _ in by_tie]
+        for (a, b), (for_a, for_b) in zip(self._places, cast, strict=True):
+            lead[a][b], lead[b][a] = for_a - for_b, for_b - for_a
+        totals, alive, out = [sum(row) for row in lead], list(by_tie), []
+        margin = None
+        while len(alive) > 1:
+            least = min([totals[m] for m in alive])
+            worst = next(m for m in reversed(alive) if totals[m] == least)
+            alive.remove(worst)
+            out.append(worst)
+            margin = lead[alive[0]][worst]
+            for m in alive:
+                totals[m] -= lead[m][worst]
+        return [*alive, *reversed(out)], margin
+
+    def _cast(self, view: View) -> tuple[NDArray[np.int64], Bools]:
+        """Votes that each mode gets from its pair with each other one, and whether a clause spoke for it.
+
+        Shapes ``(n, M, M)`` and ``(n, M)``.
+        """
         rows = np.arange(len(view))
-        scores = np.zeros((len(view), len(self.modes)), dtype=np.int64)
-        spoken = np.zeros(scores.shape, dtype=np.bool_)
+        cast = np.zeros((len(view), len(self.modes), len(self.modes)), dtype=np.int64)
+        spoken = np.zeros(cast.shape[:2], dtype=np.bool_)
         for (a, b), votes, classifier in zip(self._places, self._votes, self._classifiers, strict=True):
             outcome = classifier.decide_batch(view, rows)
             gained = np.array(votes, dtype=np.int64)[outcome]
-            scores[:, a] += gained[:, 0]
-            scores[:, b] += gained[:, 1]
+            cast[:, a, b] = gained[:, 0]
+            cast[:, b, a] = gained[:, 1]
             last = len(classifier.definition.clauses)
             by_clause = np.array([o.stage < last for o in classifier.outcomes])
             spoken[:, a if classifier.positive == classifier.i else b] |= by_clause[outcome]
-        return scores, spoken
+        return cast, spoken
 
     def _spoke(self, mode: int, outcomes: Sequence[int]) -> bool:
         """Whether a clause of some pair spoke for a mode."""
@@ -132,3 +190,38 @@ class Voting:
                 if classifier.outcomes[outcome].stage < len(classifier.definition.clauses):
                     return True
         return False
+
+
+def run_off_batch(
+    lead: NDArray[np.int64], by_tie: Sequence[int]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Drop the mode that leads least over the ones still in, until one is left.
+
+    Parameters
+    ----------
+    lead
+        By how many votes each mode leads over each other one, shape ``(n, M, M)``.
+    by_tie
+        All modes' places; of equals the last one drops out.
+
+    Returns
+    -------
+    Places of the modes in the order in which they would win, shape ``(n, M)``, and the winner's lead over the last
+    one to drop out, shape ``(n,)`` (zeros if there is a single mode).
+    """
+    n, m = lead.shape[:2]
+    backwards, rows = np.array(by_tie[::-1]), np.arange(n)
+    lead = lead[:, backwards][:, :, backwards]
+    totals = lead.sum(axis=2)
+    order = np.zeros((n, m), dtype=np.int64)
+    out = np.zeros((n, m), dtype=np.bool_)
+    margin = np.zeros(n, dtype=np.int64)
+    for place in range(m - 1, 0, -1):
+        worst = np.argmin(np.where(out, np.iinfo(np.int64).max, totals), axis=1)
+        out[rows, worst] = True
+        order[:, place] = worst
+        totals -= lead[rows, :, worst]
+    order[:, 0] = np.argmin(out, axis=1)
+    if m > 1:
+        margin = lead[rows, order[:, 0], order[:, 1]]
+    return backwards[order], margin

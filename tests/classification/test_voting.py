@@ -6,13 +6,15 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from toy_situations import BALL_VOCABULARY, ball_stream
 
 from relgym.classification.binary import VOTE_UNIT, BinaryClassifier
 from relgym.classification.examples import ExampleBatch
 from relgym.classification.familiarity import Familiarity
 from relgym.classification.views import Scope
-from relgym.classification.voting import Voting
+from relgym.classification.voting import Voting, run_off_batch
 from relgym.config import ClassificationConfig
 from relgym.logic.clause import Clause, Definition, Literal
 
@@ -28,8 +30,8 @@ def _pair(i: int, j: int, counts: list[list[float]], fires: bool) -> BinaryClass
     return BinaryClassifier(i, j, scope, "touching", Definition((clause,)), counts=counts)
 
 
-def _voting(how: str) -> Voting:
-    voting = Voting(BALL_VOCABULARY, (1, 2, 3), how)  # type: ignore[arg-type]
+def _voting(how: str, *, runoff: bool = False) -> Voting:
+    voting = Voting(BALL_VOCABULARY, (1, 2, 3), how, runoff=runoff)  # type: ignore[arg-type]
     # 1 beats 2 for sure; 3 narrowly beats 1; 2 narrowly beats 3.
     pairs = [
         _pair(1, 2, [[98.0, 0.0], [0.0, 98.0]], fires=True),
@@ -57,6 +59,33 @@ def test_soft_votes_let_the_sure_pair_decide() -> None:
     assert ranking.modes == (1, 3, 2)
     assert ranking.scores == pytest.approx([expected[mode] for mode in ranking.modes], abs=1e-9)
     assert ranking.margin == pytest.approx(expected[1] - expected[3], abs=1e-9)
+
+
+def test_in_a_run_off_the_pairs_of_modes_that_dropped_out_are_not_heard() -> None:
+    ranking = _voting("soft", runoff=True).rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
+    assert ranking.modes == (3, 1, 2)  # 2 loses most by far; without it, 3 beats 1
+    assert ranking.margin == pytest.approx(math.log(6 / 5), abs=1e-9)
+
+
+@pytest.mark.parametrize("runoff", [False, True])
+@pytest.mark.parametrize("how", ["soft", "hard"])
+def test_a_batch_is_ranked_as_each_of_its_examples(how: str, runoff: bool) -> None:
+    voting = _voting(how, runoff=runoff)
+    one = voting.rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
+    batch = voting.rank_batch(ExampleBatch.of(_ITEM.example), np.zeros((1, 3)), _COUNTS, _EVERYTHING_SEEN)
+    assert batch[0] == one
+
+
+@given(st.integers(1, 6), st.integers(0, 2**32 - 1))
+def test_a_mode_that_wins_all_its_pairs_wins_the_run_off(modes: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    lead = np.triu(rng.integers(-5, 6, (20, modes, modes)), 1)
+    lead[:, 0, 1:] = rng.integers(1, 3, (20, modes - 1))
+    lead -= lead.transpose(0, 2, 1)
+    order, margin = run_off_batch(lead, tuple(rng.permutation(modes).tolist()))
+    assert (order[:, 0] == 0).all()
+    assert (np.sort(order, axis=1) == np.arange(modes)).all()
+    assert ((margin > 0) == (modes > 1)).all()
 
 
 def test_votes_are_whole_units() -> None:
