@@ -59,7 +59,7 @@ def test_types_that_differ_are_refused(model: WorldModel) -> None:
     before = model.to_json(history=True)
     more = altered(scene, {"properties": (*scene.schema.type("box").properties, "colour")}, "box")
     values = {k: np.append(v, 0.0) if k.startswith("box") else v for k, v in scene.values().items()}
-    with pytest.raises(ObservationError, match="type 'box' has properties .*colour.*expected"):
+    with pytest.raises(ObservationError, match=r"type 'box' has properties .*colour.*expected"):
         model.predict_one(more.scene(values))
     stranger = SceneSchema((ObjectType("kite", ("height",)),), (("kite", "kite"),), planar=False)
     with pytest.raises(ObservationError, match="unknown type 'kite'"):
