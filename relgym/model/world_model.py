@@ -178,9 +178,9 @@ class WorldModel:
                 "this model was loaded without its history and can only predict; "
                 "save it with save(path, history=True) to go on learning"
             )
+        percept = self._perceive(before)  # first, for it may refuse a shape
         if self._open:
             self._discover_targets(before, after)
-        percept = self._perceive(before)
         after_values = next_values(before, after)
         parts: dict[tuple[str, str], ClusterReport] = {}
         for type_name in dict.fromkeys(t.type for t in self.targets):

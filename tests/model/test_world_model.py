@@ -302,17 +302,22 @@ def test_a_batch_of_another_width_is_refused() -> None:
         model.predict_batch(CART.layout(), np.zeros((3, 5)))
 
 
-def test_a_shape_that_cant_be_changes_nothing(room_steps: list[RawStep]) -> None:
-    schema = schema_of(room_steps, ROOM_TARGETS)
-    model = learned(schema, room_steps[:30])
-    (step,) = transitions(schema, room_steps[30:31])
-    flat = Transition(step.before.replace({("box0", "sx"): -1.0}), step.after)
-    before = state(model)
-    with pytest.raises(RelgymError, match="box0"):
-        model.learn_one(flat)
-    assert state(model) == before
-    model.learn_one(step)
-    assert model.seen == 31
+@pytest.mark.parametrize("targets", [ROOM_TARGETS, None])
+def test_a_shape_that_cant_be_changes_nothing(
+    targets: tuple[Target, ...] | None, room_steps: list[RawStep]
+) -> None:
+    schema = schema_of(room_steps, targets)
+    model = WorldModel(schema)
+    for step in transitions(schema, room_steps[:5]):
+        before = state(model)
+        flat = Transition(step.before.replace({("box0", "sx"): -1.0}), step.after)
+        with pytest.raises(RelgymError, match="box0"):
+            model.learn_one(flat)
+        with pytest.raises(RelgymError, match="box0"):
+            model.predict_one(flat.before)
+        assert state(model) == before
+        model.learn_one(step)
+    assert model.seen == 5
 
 
 def test_an_equal_schema_is_the_same_schema() -> None:
