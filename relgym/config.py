@@ -238,8 +238,6 @@ class ModelConfig:
     work_per_step
         Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
         literals examined). Default 400,000, some 50 ms. Raising it makes rules fresher and single steps slower.
-    max_examples
-        Examples kept per object type for refits and searches. Default 200,000.
     """
 
     clustering: ClusteringConfig = field(default_factory=ClusteringConfig)
@@ -248,12 +246,10 @@ class ModelConfig:
     geometry: Literal["arrays", "fcl"] = "arrays"
     abstain: bool = True
     work_per_step: int = 400_000
-    max_examples: int = 200_000
 
     def __post_init__(self) -> None:
         _one_of(self, geometry=("arrays", "fcl"))
         _at_least(self, 0, "seed", "work_per_step")
-        _at_least(self, 1000, "max_examples")
 
     @classmethod
     def thesis(cls, **changes: Any) -> ModelConfig:
