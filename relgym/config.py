@@ -235,6 +235,10 @@ class ModelConfig:
         literals examined). Default 400,000, some 50 ms. Raising it makes rules fresher and single steps slower.
     max_examples
         Examples kept per object type for refits and searches. Default 200,000.
+    frames
+        Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
+        or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
+        do. ``"world"``: modes along the world's axes for everything, as in the thesis.
     """
 
     clustering: ClusteringConfig = field(default_factory=ClusteringConfig)
@@ -244,9 +248,10 @@ class ModelConfig:
     abstain: bool = True
     work_per_step: int = 400_000
     max_examples: int = 200_000
+    frames: Literal["auto", "world"] = "auto"
 
     def __post_init__(self) -> None:
-        _one_of(self, geometry=("arrays", "fcl"))
+        _one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
         _at_least(self, 0, "seed", "work_per_step")
         _at_least(self, 1000, "max_examples")
 
@@ -260,7 +265,7 @@ class ModelConfig:
         end learning; errors are counted on all examples; residuals within the noise are ties.
         """
         clustering = ClusteringConfig(min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9)
-        return replace(cls(clustering=clustering, classification=ClassificationConfig.thesis()), **changes)
+        return cls._world(clustering, ClassificationConfig.thesis(), **changes)
 
     @classmethod
     def original(cls, **changes: Any) -> ModelConfig:
@@ -277,7 +282,14 @@ class ModelConfig:
             unify_ratio=0.9,
             stickiness="nearest",
         )
-        return replace(cls(clustering=clustering, classification=ClassificationConfig.original()), **changes)
+        return cls._world(clustering, ClassificationConfig.original(), **changes)
+
+    @classmethod
+    def _world(
+        cls, clustering: ClusteringConfig, classification: ClassificationConfig, **changes: Any
+    ) -> ModelConfig:
+        """A preset of the thesis' learner, which knows the world's axes only."""
+        return replace(cls(clustering, classification, frames="world"), **changes)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""

@@ -74,25 +74,25 @@ class LawBook:
         self.pair: PairLaw | None = None
         self.shares: dict[Kind, Share] = {}
         self.tolerance = 1e-15
-        self._casts: dict[int, tuple[SceneLayout, Cast]] = {}
-        self._rounded: dict[int, NDArray[np.intp]] = {}
-        self._engaged: dict[int, list[Engaged]] = {}
+        self._casts: dict[SceneLayout, Cast] = {}
+        self._rounded: dict[SceneLayout, NDArray[np.intp]] = {}
+        self._engaged: dict[SceneLayout, list[Engaged]] = {}
 
     def cast(self, layout: SceneLayout) -> Cast:
         """What a layout means for the laws; cached."""
-        if (known := self._casts.get(id(layout))) is None:
-            known = self._casts[id(layout)] = (layout, Cast.of(self.schema, layout, self.sources))
-        return known[1]
+        if (known := self._casts.get(layout)) is None:
+            known = self._casts[layout] = Cast.of(self.schema, layout, self.sources)
+        return known
 
     def rounded(self, cast: Cast) -> NDArray[np.intp]:
         """Columns of the movers' positions and velocities, whose rounding the laws inherit; cached."""
-        if (known := self._rounded.get(id(cast))) is None:
+        if (known := self._rounded.get(cast.layout)) is None:
             places = []
             for body in cast.movers:
                 i = cast.layout.bodies[body]
                 own = (*cast.layout.types[i].pose_columns()[:3], *cast.layout.types[i].velocity_columns())
                 places += [cast.layout.offsets[i] + k for k in own if k >= 0]
-            known = self._rounded[id(cast)] = np.array(places, dtype=np.intp)
+            known = self._rounded[cast.layout] = np.array(places, dtype=np.intp)
         return known
 
     def forget(self) -> None:
@@ -152,8 +152,8 @@ class LawBook:
             known[scenes] &= ~involved
             return
         share = self._share(contacts, group, columns)
-        found = np.asarray((laws[0].chosen[:, group.pairs] >= 0).all(axis=0) & np.isfinite(share))
-        spoken = found.all(axis=1)[:, None]
+        chosen = laws[0].chosen[:, group.pairs]
+        spoken = np.all((chosen >= 0).all(axis=0) & np.isfinite(share), axis=1)[:, None]
         before, free = now[:, scenes], velocity[:, scenes]
         after, _ = compose(laws[0], group, share, before, free)
         sure = np.isfinite(after).all(axis=0) | ~involved
@@ -194,10 +194,10 @@ class LawBook:
     # ------------------------------------------------------------------ laws in force
     def _engaged_pairs(self, cast: Cast) -> list[Engaged]:
         """The law of pairs laid over a cast, then its rivals; cached."""
-        if (known := self._engaged.get(id(cast))) is None:
+        if (known := self._engaged.get(cast.layout)) is None:
             laws = [] if self.pair is None else [self.pair, *_rivals(self.pair)]
             known = [Engaged(law, _chosen(law, cast.kinds), cast.first, cast.second) for law in laws]
-            self._engaged[id(cast)] = known
+            self._engaged[cast.layout] = known
         return known
 
 

@@ -15,6 +15,8 @@ from relgym.clustering.clusterer import ClusterReport
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, SchemaError
+from relgym.laws.book import LawBook
+from relgym.model.motion import Laws
 from relgym.model.perception import Percept, Perception, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.property_model import PropertyModel, Verdict, bodies_of
@@ -102,6 +104,9 @@ class WorldModel:
         self._models: dict[Target, PropertyModel] = {}
         self._tables: dict[str, ExampleTable] = {}
         self._percept: tuple[Scene, Percept] | None = None
+        self._laws: Laws | None = None
+        if self.config.frames == "auto":
+            self._laws = Laws(schema, None if named is None else tuple(named), self.config)
         for target in named or ():
             self._add_target(target)
 
@@ -186,6 +191,9 @@ class WorldModel:
             for index in before.layout.of_type(type_name):
                 if before.layout.names[index] in after:
                     self._learn_object(percept, index, following, parts)
+        if self._laws is not None:
+            stays = {i: name in after for i, name in enumerate(before.layout.names)}
+            self._laws.learn_one(percept, following, stays, self._models)
         self.seen += 1
         work = self._refresh()
         return LearnReport(parts, work)
@@ -214,7 +222,8 @@ class WorldModel:
     def _refresh(self) -> int:
         budget, spent = self.config.work_per_step, 0
         for target in self.targets:
-            spent += self._models[target].refresh(budget - spent)
+            if not self.governs(target):  # no clause is asked where laws predict
+                spent += self._models[target].refresh(budget - spent)
             if spent >= budget:
                 break
         return spent
@@ -224,7 +233,18 @@ class WorldModel:
 
         A model without its history has nothing to learn from and stays as it is.
         """
-        return 0 if self.frozen else sum(self._models[t].refresh(None) for t in self.targets)
+        if self.frozen:
+            return 0
+        return sum(self._models[t].refresh(None) for t in self.targets if not self.governs(t))
+
+    @property
+    def laws(self) -> LawBook | None:
+        """Laws of motion learned so far, in force or not; None with ``frames="world"``."""
+        return None if self._laws is None else self._laws.learner.book
+
+    def governs(self, target: Target) -> bool:
+        """Whether laws of motion, not modes, predict a target: they describe its transitions in fewer bits."""
+        return self._laws is not None and self._laws.governs(target)
 
     def _check(self, scene: Scene) -> None:
         schema = scene.schema
@@ -259,9 +279,13 @@ class WorldModel:
         following = scene.vector.copy()
         parts: list[Prediction] = []
         lost: set[tuple[str, str]] = set()
+        motion = None if self._laws is None else self._laws.speak(percept)
         for target in self.targets:
             for index in layout.of_type(target.type):
-                verdict = self._models[target].predict_one(percept, index, following)
+                if motion is not None and self._laws is not None and self._laws.governs(target):
+                    verdict = self._laws.prediction(motion, percept, index, target)
+                else:
+                    verdict = self._models[target].predict_one(percept, index, following)
                 if not lost.isdisjoint(target.given):
                     verdict = Prediction("", "", np.nan, Outcome.DEPENDS)
                 column = layout.column(index, target.property)
@@ -298,9 +322,13 @@ class WorldModel:
         verdicts: list[Verdict] = []
         lost: dict[tuple[str, str], NDArray[np.bool_]] = {}
         nowhere = np.zeros(len(vectors), dtype=bool)
+        motion = None if self._laws is None else self._laws.speak(percept)
         for target in self.targets:
             for index in layout.of_type(target.type):
-                verdict = self._models[target].predict_batch(percept, index, following)
+                if motion is not None and self._laws is not None and self._laws.governs(target):
+                    verdict = self._laws.verdict(motion, percept, index, target)
+                else:
+                    verdict = self._models[target].predict_batch(percept, index, following)
                 for pair in target.given:
                     verdict.values[lost.get(pair, nowhere)] = np.nan
                     verdict.outcomes[lost.get(pair, nowhere)] = OUTCOMES.index(Outcome.DEPENDS)
@@ -323,7 +351,13 @@ class WorldModel:
             np.stack([v.modes for v in verdicts], axis=1) if keys else np.zeros((n, 0), dtype=np.int64),
             np.stack([v.outcomes for v in verdicts], axis=1) if keys else np.zeros((n, 0), dtype=np.int8),
             np.stack([v.margins for v in verdicts], axis=1) if keys else np.zeros((n, 0)),
+            tuple(self._frame(target) for target in self.targets for _ in layout.of_type(target.type)),
         )
+
+    def _frame(self, target: Target) -> str:
+        """Axes in which a target's contacts are described."""
+        pair = None if self.laws is None else self.laws.pair
+        return pair.frame if pair is not None and self.governs(target) else "world"
 
     def _derive(self, layout: SceneLayout, now: NDArray[np.float64], following: NDArray[np.float64]) -> None:
         """Declared kinematics, in place: simulate, then derive (§4.8)."""
@@ -415,6 +449,8 @@ class WorldModel:
             arrays |= {f"table{k}.{name}": a for name, a in self._tables[type_name].to_arrays().items()}
         for k, target in enumerate(self.targets):
             arrays |= {f"target{k}.{name}": a for name, a in self._models[target].to_arrays().items()}
+        if self._laws is not None:
+            arrays |= {f"laws.{name}": a for name, a in self._laws.learner.to_arrays().items()}
         write_model(path, self.to_json(history=True) | {"extra": self.extra if extra is None else extra}, arrays)
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
@@ -430,6 +466,7 @@ class WorldModel:
                 for t in self.targets
             ],
             "tables": [self._tables[name].to_json() for name in sorted(self._tables)] if history else [],
+            "laws": None if self._laws is None else self._laws.to_json(history=history),
         }
 
     @classmethod
@@ -462,6 +499,8 @@ class WorldModel:
         targets = [target_from_json(part["target"]) for part in body["targets"]]
         model = cls(schema, ModelConfig.from_json(body["config"]), targets=targets)
         model._open = bool(body["open"])
+        if model._laws is not None and model._open:
+            model._laws = Laws(schema, None, model.config)
         model.seen = int(body["seen"])
         model.frozen = arrays is None
         for k, type_name in enumerate(sorted(model._tables)):
@@ -472,6 +511,9 @@ class WorldModel:
         for k, target in enumerate(targets):
             part = {n.split(".", 1)[1]: a for n, a in (arrays or {}).items() if n.startswith(f"target{k}.")}
             model._models[target].restore(body["targets"][k]["model"], part)
+        if model._laws is not None and body["laws"] is not None:
+            part = {n.split(".", 1)[1]: a for n, a in (arrays or {}).items() if n.startswith("laws.")}
+            model._laws.restore(body["laws"], part)
         return model
 
 
