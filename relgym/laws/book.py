@@ -113,6 +113,18 @@ class LawBook:
             Whether rival laws are asked too: where they disagree, nothing is known.
         """
         cast = contacts.cast
+        now, velocity, columns = self.free_motion(cast, vectors)
+        known = np.zeros((len(vectors), len(cast.layout.bodies)), dtype=bool)
+        known[:, cast.movers] = np.isfinite(velocity[..., cast.movers]).all(axis=0)
+        touched = np.zeros_like(known)
+        for group in contacts.groups():
+            self._collide(contacts, group, now, velocity, known, touched, columns, checking=checking)
+        return Motion(velocity, known, touched, columns)
+
+    def free_motion(
+        self, cast: Cast, vectors: NDArray[np.float64]
+    ) -> tuple[FloatArray, FloatArray, dict[int, FloatArray]]:
+        """Velocities now and next, if nothing touched anything, and what the free laws read (`Motion`)."""
         state = cast.padded(vectors)
         now = state[cast.velocities].transpose(0, 2, 1)
         velocity, columns = now.copy(), {}
@@ -120,13 +132,9 @@ class LawBook:
             sources, places = cast.sources[body]
             columns[body] = state[places]
             law = self.free.get(sources.type.name)
-            velocity[..., body] = np.nan if law is None else free_motion(law, sources.names, columns[body])
-        known = np.zeros((len(vectors), len(cast.layout.bodies)), dtype=bool)
-        known[:, cast.movers] = np.isfinite(velocity[..., cast.movers]).all(axis=0)
-        touched = np.zeros_like(known)
-        for group in contacts.groups():
-            self._collide(contacts, group, now, velocity, known, touched, columns, checking=checking)
-        return Motion(velocity, known, touched, columns)
+            free = np.nan if law is None else free_motion(law, sources.names, columns[body])
+            velocity[..., body] = free
+        return now, velocity, columns
 
     def _collide(
         self,
@@ -151,7 +159,7 @@ class LawBook:
         if not laws:
             known[scenes] &= ~involved
             return
-        share = self._share(contacts, group, columns)
+        share = self.share(contacts, group, columns)
         chosen = laws[0].chosen[:, group.pairs]
         spoken = np.all((chosen >= 0).all(axis=0) & np.isfinite(share), axis=1)[:, None]
         before, free = now[:, scenes], velocity[:, scenes]
@@ -164,7 +172,7 @@ class LawBook:
         velocity[:, scenes] = np.where(involved & sure, after, velocity[:, scenes])
         known[scenes] &= sure
 
-    def _share(
+    def share(
         self, contacts: Contacts, group: Group, columns: Mapping[int, FloatArray]
     ) -> NDArray[np.float64]:
         """The first body's share of each impulse, shape ``(m, c)``; 1 where the other doesn't move."""
@@ -192,6 +200,10 @@ class LawBook:
         return own | {EXTENT: contacts.pose[scenes, body, 6 + contacts.cast.axes.used[0]]}
 
     # ------------------------------------------------------------------ laws in force
+    def engaged(self, cast: Cast) -> Engaged | None:
+        """The law of pairs laid over a cast; None while there is none."""
+        return next(iter(self._engaged_pairs(cast)), None)
+
     def _engaged_pairs(self, cast: Cast) -> list[Engaged]:
         """The law of pairs laid over a cast, then its rivals; cached."""
         if (known := self._engaged.get(cast.layout)) is None:

@@ -39,6 +39,9 @@ ESTIMATE_AT = (64, 256, 1024)
 
 FEWEST_CONTACTS = 3
 
+SETTLED = 500
+"""Transitions without a surprise after which laws count as settled."""
+
 
 @dataclass(slots=True)
 class _Tally:
@@ -115,6 +118,11 @@ class LawLearner:
     def seen(self, type_name: str) -> int:
         """Number of a type's transitions."""
         return self._tallies[type_name].seen
+
+    def settled(self, type_name: str) -> bool:
+        """Whether the laws have long been as they are, and never wrong since."""
+        tally = self._tallies[type_name]
+        return tally.wrong == 0 and tally.since >= SETTLED
 
     def bits(self, type_name: str) -> float:
         """Description length of a type's transitions with the laws: statements, then exceptions."""
@@ -235,12 +243,15 @@ class LawLearner:
             return False
         self._news = 0
         found = fit_pair(encounters, rng=self._rng)
-        before = (self.book.pair, self.book.shares)
+        before = (None if self.book.pair is None else self.book.pair.says(), self.book.shares)
         self.book.pair = found.law
         self.book.shares = self._store.shares(self.book)
         self._stored_wrong = int((~found.explained).sum())
-        self._settle()
-        return before != (self.book.pair, self.book.shares)
+        changed = before != (found.law.says(), self.book.shares)
+        if changed:
+            self._settle()
+        self.book.forget()
+        return changed
 
     def _settle(self) -> None:
         self.book.forget()

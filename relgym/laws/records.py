@@ -156,6 +156,13 @@ class PairLaw:
         known = next((law for law in laws if kind in law.kinds), None)
         return laws[0] if known is None and len(laws) == 1 else known
 
+    def says(self) -> tuple[Any, ...]:
+        """What the law states: equal for laws that differ in their numbers of examples only."""
+        laws = [
+            [(law.pieces, law.operator, law.kinds, law.rivals, law.trusted()) for law in a] for a in self.axes
+        ]
+        return self.frame, laws
+
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
         axes = [[law.to_json() for law in laws] for laws in self.axes]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
+from relgym.laws.account import accounts
 from relgym.laws.book import Motion
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.learner import LawLearner
@@ -64,6 +65,14 @@ class Laws:
     def governs(self, target: Target) -> bool:
         """Whether the laws predict a target."""
         return target.type in self.governed and (target.type, target.property) in self._components
+
+    def suffice(self, type_name: str, targets: Sequence[Target]) -> bool:
+        """Whether the laws predict all targets of a type and have long been right: its modes may rest.
+
+        Modes rest until the laws are wrong for the first time, and go on learning then.
+        """
+        own = [t for t in targets if t.type == type_name]
+        return all(self.governs(t) for t in own) and self.learner.settled(type_name)
 
     # ------------------------------------------------------------------ learning
     def learn_one(
@@ -132,6 +141,22 @@ class Laws:
         outcome = OUTCOMES[int(verdict.outcomes[0])]
         margin = float(verdict.margins[0])
         return Prediction("", "", float(verdict.values[0]), outcome, mode, roles, margin, frame)
+
+    def lines(self, percept: Percept, index: int, digits: int) -> tuple[str, ...]:
+        """What the laws say of an object of a single scene, for people: the free law, then each contact."""
+        layout, book = percept.layout, self.learner.book
+        name = layout.types[index].name
+        free = book.free.get(name)
+        if free is None:
+            return ()
+        pairs = zip(self.learner.sources[name].velocity, free.components, strict=True)
+        first = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
+        contacts = Contacts.of(book.cast(layout), percept.relations, percept.vectors)
+        told = [
+            a for a in accounts(book, contacts, percept.vectors, digits) if layout.names[index] in a.objects
+        ]
+        head = f"free: {first}" if told else f"{first}, since it touches nothing"
+        return (head, *(line for account in told for line in str(account).split("\n")))
 
     # ------------------------------------------------------------------ saving
     def to_json(self, *, history: bool) -> dict[str, Any]:

@@ -40,7 +40,7 @@ class LearnReport:
     Attributes
     ----------
     parts
-        Per (object, property): what its clusterer did.
+        Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice.
     work
         Deterministic units of work spent on re-learning classifiers.
     """
@@ -188,6 +188,8 @@ class WorldModel:
         following = _following(before, after)
         parts: dict[tuple[str, str], ClusterReport] = {}
         for type_name in dict.fromkeys(t.type for t in self.targets):
+            if self._laws is not None and self._laws.suffice(type_name, self.targets):
+                continue
             for index in before.layout.of_type(type_name):
                 if before.layout.names[index] in after:
                     self._learn_object(percept, index, following, parts)
@@ -241,6 +243,11 @@ class WorldModel:
     def laws(self) -> LawBook | None:
         """Laws of motion learned so far, in force or not; None with ``frames="world"``."""
         return None if self._laws is None else self._laws.learner.book
+
+    @property
+    def governed(self) -> frozenset[str]:
+        """Names of the types whose velocity laws of motion predict at present."""
+        return frozenset() if self._laws is None else self._laws.governed
 
     def governs(self, target: Target) -> bool:
         """Whether laws of motion, not modes, predict a target: they describe its transitions in fewer bits."""
@@ -399,11 +406,21 @@ class WorldModel:
         return predictions
 
     # ------------------------------------------------------------------ for people
-    def describe(self, *, digits: int = 7) -> str:
-        """Modes, functions, clauses and roles as text (tables 3.1-3.2, 4.2-4.5)."""
+    def describe(
+        self, *, digits: int = 7, frame: str | None = None, incline: float | Sequence[float] = (0.0, 90.0)
+    ) -> str:
+        """Laws, modes, functions, clauses and roles as text (tables 3.1-3.2, 4.2-4.5).
+
+        With ``frame="world"`` also what the laws in force give along the world's axes on surfaces with some
+        inclines, in degrees (`relgym.model.report.describe`).
+        """
         from relgym.model.report import describe
 
-        return describe(self, digits=digits)
+        return describe(self, digits=digits, frame=frame, incline=incline)
+
+    def law_lines(self, scene: Scene, index: int, digits: int = 7) -> tuple[str, ...]:
+        """What laws of motion say of an object: its free law, then every contact, a line each."""
+        return () if self._laws is None else self._laws.lines(self._perceive(scene), index, digits)
 
     def explain(self, scene: Scene) -> str:
         """Why this prediction: mode, function, roles, clause and rival of every target."""
