@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.laws.description import EXCEPTION_BITS
 from relgym.laws.frames import FRAMES, Bearings, axes_of, axis_names
 from relgym.laws.pieces import AxisExamples
-from relgym.laws.records import ONE, AxisLaw, Kind, PairLaw
+from relgym.laws.records import ONE, AxisLaw, Kind, Operator, PairLaw, Piece
 from relgym.laws.selection import AxisFit, fit_axis, refitted
 from relgym.scene.geometry.vectors import FloatArray, dot, norm
 
@@ -134,7 +134,7 @@ def _fit_kinds(
     pooled = _law(whole, everyone, len(examples))
     if whole.explained.all() or len(present) == 1:
         return (pooled,), whole.explained
-    groups = _groups(examples, encounters.kinds, present, rng=rng)
+    groups = _alike(examples, _groups(examples, encounters.kinds, present, rng=rng))
     if len(groups) == 1:
         return (pooled,), whole.explained
     explained = np.zeros(len(examples), dtype=bool)
@@ -169,6 +169,26 @@ def _groups(
         else:
             groups.append((fit_axis(examples.rows(rows), rng=rng), [kind], rows))
     return groups
+
+
+def _alike(
+    examples: AxisExamples, groups: list[tuple[AxisFit, list[int], NDArray[np.intp]]]
+) -> list[tuple[AxisFit, list[int], NDArray[np.intp]]]:
+    """Decide ties by analogy: a form that a law without rivals has needs to be stated only once."""
+    settled = {_form(fit.operator, fit.pieces) for fit, _, _ in groups if not fit.rivals}
+    result = []
+    for fit, members, rows in groups:
+        every = [(fit.operator, fit.pieces), *fit.rivals]
+        familiar = [each for each in every if _form(*each) in settled]
+        if fit.rivals and len(familiar) == 1:
+            fit = refitted(examples.rows(rows), *familiar[0])
+        result.append((fit, members, rows))
+    return result
+
+
+def _form(operator: Operator, pieces: tuple[Piece, ...]) -> tuple[Operator, tuple[tuple[str, ...], ...]]:
+    """A law without its numbers."""
+    return operator, tuple(sorted(tuple(name for name, _ in piece.terms) for piece in pieces))
 
 
 def _law(fit: AxisFit, kinds: tuple[Kind, ...], examples: int) -> AxisLaw:
