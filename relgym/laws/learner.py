@@ -95,6 +95,7 @@ class LawLearner:
         self._tallies = {name: _Tally() for name in self.sources}
         self._news = 0
         self._stored_wrong = 0
+        self._lost = 0  # contacts that a model loaded without its history once kept
 
     # ------------------------------------------------------------------ what is known
     @property
@@ -112,7 +113,7 @@ class LawLearner:
         lost = float(tally.wrong)
         if free.law is not None:
             lost += free.law.unexplained * free.seen / max(1, free.law.examples)
-        kept = len(self._store)
+        kept = self._kept()[0]
         return lost + self._stored_wrong * self._store.seen / max(1, kept)
 
     def seen(self, type_name: str) -> int:
@@ -291,7 +292,7 @@ class LawLearner:
             ],
             "tallies": [[name, t.seen, t.wrong, t.since] for name, t in sorted(self._tallies.items())],
             "stored_wrong": self._stored_wrong,
-            "kept": [len(self._store), self._store.seen],
+            "kept": self._kept(),
         }
         if history:
             data |= {
@@ -301,6 +302,10 @@ class LawLearner:
                 "learners": [[name, *f.to_json()] for name, f in sorted(self._free.items())],
             }
         return data
+
+    def _kept(self) -> list[int]:
+        """Numbers of contacts kept and seen, those of a model that was loaded without them included."""
+        return [len(self._store) or self._lost, self._store.seen]
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """The examples kept."""
@@ -322,7 +327,7 @@ class LawLearner:
         for name, learner in self._free.items():
             learner.law = book.free.get(name)
         if not arrays:
-            self._store.seen = int(data["kept"][1])
+            self._lost, self._store.seen = (int(n) for n in data["kept"])
             return
         self._news = int(data["news"])
         self._rng.bit_generator.state = data["random"]
