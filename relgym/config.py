@@ -238,6 +238,10 @@ class ModelConfig:
     work_per_step
         Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
         literals examined). Default 400,000, some 50 ms. Raising it makes rules fresher and single steps slower.
+    frames
+        Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
+        or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
+        do. ``"world"``: modes along the world's axes for everything, as in the thesis.
     """
 
     clustering: ClusteringConfig = field(default_factory=ClusteringConfig)
@@ -246,9 +250,10 @@ class ModelConfig:
     geometry: Literal["arrays", "fcl"] = "arrays"
     abstain: bool = True
     work_per_step: int = 400_000
+    frames: Literal["auto", "world"] = "auto"
 
     def __post_init__(self) -> None:
-        _one_of(self, geometry=("arrays", "fcl"))
+        _one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
         _at_least(self, 0, "seed", "work_per_step")
 
     @classmethod
@@ -261,7 +266,7 @@ class ModelConfig:
         end learning; errors are counted on all examples; residuals within the noise are ties.
         """
         clustering = ClusteringConfig(min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9)
-        return replace(cls(clustering=clustering, classification=ClassificationConfig.thesis()), **changes)
+        return cls._world(clustering, ClassificationConfig.thesis(), **changes)
 
     @classmethod
     def original(cls, **changes: Any) -> ModelConfig:
@@ -278,7 +283,14 @@ class ModelConfig:
             unify_ratio=0.9,
             stickiness="nearest",
         )
-        return replace(cls(clustering=clustering, classification=ClassificationConfig.original()), **changes)
+        return cls._world(clustering, ClassificationConfig.original(), **changes)
+
+    @classmethod
+    def _world(
+        cls, clustering: ClusteringConfig, classification: ClassificationConfig, **changes: Any
+    ) -> ModelConfig:
+        """A preset of the thesis' learner, which knows the world's axes only."""
+        return replace(cls(clustering, classification, frames="world"), **changes)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""

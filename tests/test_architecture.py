@@ -17,7 +17,7 @@ from source_tree import FOLDERS, ROOT, Import, Module, modules, room_of
 
 FOUNDATION = frozenset({"errors", "config"})
 ROOMS = FOUNDATION | {"scene", "numeric", "logic"}
-LEARNERS = ROOMS | {"clustering", "classification"}
+LEARNERS = ROOMS | {"clustering", "classification", "laws"}
 CORE = LEARNERS | {"model"}
 
 MAY_IMPORT = {
@@ -28,6 +28,7 @@ MAY_IMPORT = {
     "logic": FOUNDATION,
     "clustering": ROOMS,
     "classification": ROOMS,
+    "laws": ROOMS | {"clustering"},
     "model": LEARNERS,
     "baselines": CORE,
     "envs": CORE,

@@ -7,7 +7,7 @@ from typing import Any
 
 from relgym.scene.objects import Target
 
-__all__ = ["NOISE", "Mode", "Role"]
+__all__ = ["NOISE", "Mode", "Role", "sum_text"]
 
 NOISE = 0
 """Id of the noise mode, the catch-all for examples that no mode explains (§3.2)."""
@@ -93,7 +93,7 @@ class Mode:
         terms = []
         for label, role in zip(self.role_labels(), self.roles, strict=True):
             terms += [(weight, f"{label}.{prop}" if label else prop) for prop, weight in role.terms]
-        text = _sum_text(terms, self.intercept, digits)
+        text = sum_text(terms, self.intercept, digits)
         return f"{self.target.property}' = {text}"
 
     def role_labels(self) -> tuple[str, ...]:
@@ -136,7 +136,8 @@ class Mode:
         )
 
 
-def _sum_text(terms: list[tuple[float, str]], intercept: float, digits: int) -> str:
+def sum_text(terms: list[tuple[float, str]], intercept: float, digits: int) -> str:
+    """Weighted names and a constant as text: ``-0.9 v + 1``."""
     pieces = []
     for weight, name in terms:
         size = f"{abs(weight):.{digits}g}"

@@ -21,6 +21,9 @@ __all__ = ["Course", "follow", "learned"]
 
 _Bools: TypeAlias = NDArray[np.bool_]
 
+_THESIS_AXES = ModelConfig(frames="world")
+"""The thesis' results are those of modes, not of contact laws."""
+
 
 @dataclass(slots=True)
 class Course:
@@ -60,7 +63,7 @@ def follow(
     blocks
         Blocks of one schema.
     config
-        Free parameters of the model.
+        Free parameters of the model; default: along the world's axes, as in the thesis.
     laws
         The ball world's linear laws, for `Course.counted`.
 
@@ -70,7 +73,7 @@ def follow(
     """
     course: Course | None = None
     for block in blocks:
-        course = course or Course(WorldModel(block.schema, config))
+        course = course or Course(WorldModel(block.schema, config or _THESIS_AXES))
         seconds, wrong = _learn(course.model, block)
         course.seconds.append(seconds)
         for target, counted in explicable(block, laws).items():
@@ -83,7 +86,7 @@ def learned(blocks: Iterable[Block], *, config: ModelConfig | None = None) -> Wo
     """The model that some blocks teach, its classifiers up to date; nothing is predicted on the way."""
     model: WorldModel | None = None
     for block in blocks:
-        model = model or WorldModel(block.schema, config)
+        model = model or WorldModel(block.schema, config or _THESIS_AXES)
         for transition in block.transitions():
             model.learn_one(transition)
     assert model is not None, "no blocks, no schema"

@@ -72,6 +72,9 @@ class Explanation:
         Significant digits in the text.
     reasons
         The mode against every other one, in the order of the ranking; the first is its strongest rival.
+    laws
+        What laws of motion predicted it, a line each, where they and no mode did: the free law, then every
+        contact.
     """
 
     prediction: Prediction
@@ -79,10 +82,15 @@ class Explanation:
     mode: Mode | None
     digits: int
     reasons: tuple[Reason, ...]
+    laws: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         p, d = self.prediction, self.digits
         name = f"{p.object}.{p.property}"
+        if self.laws:
+            first, *rest = self.laws
+            head = f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"
+            return "\n".join([head, f"  laws      {first}", *(f"            {line}" for line in rest)])
         if self.mode is None:
             return f"{name}: {self.now:.{d}g} kept for want of a prediction\n  outcome   {p.outcome.value}"
         lines = [f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"]
@@ -136,6 +144,10 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
         for index in scene.layout.of_type(target.type):
             one = next(parts)
             now = float(scene.vector[scene.layout.column(index, target.property)])
+            if model.governs(target):
+                lines = model.law_lines(scene, index, digits) if one.ok else ()
+                found.append(Explanation(one, now, None, digits, (), lines))
+                continue
             mode = next(m for m in part.modes if m.id == one.mode) if one.ok else None
             reasons = () if mode is None else _reasons(model, part, scene, index, prediction.scene, mode.id)
             found.append(Explanation(one, now, mode, digits, reasons))

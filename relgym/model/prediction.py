@@ -50,6 +50,9 @@ class Prediction:
         Names of the objects that play the mode's roles, the target first.
     margin
         Lead of the mode over its rival, in log-odds; infinite with a single mode, 0 with none.
+    frame
+        Axes in which what predicted it is stated: ``"world"`` for modes; laws of touching pairs name their own
+        (`relgym.laws.frames`), and then the roles are the target and all that it touches.
     """
 
     object: str
@@ -59,6 +62,7 @@ class Prediction:
     mode: int = 0
     roles: tuple[str, ...] = ()
     margin: float = 0.0
+    frame: str = "world"
 
     @builtins.property  # `property` is a field here
     def ok(self) -> bool:
@@ -112,6 +116,8 @@ class BatchPrediction:
         Position in `OUTCOMES`, shape ``(n, len(parts))``.
     margins
         Shape ``(n, len(parts))``.
+    frames
+        Per part the axes in which its laws of contacts are stated; ``"world"`` where modes predict.
     """
 
     layout: SceneLayout
@@ -120,6 +126,7 @@ class BatchPrediction:
     modes: NDArray[np.int64]
     outcomes: NDArray[np.int8]
     margins: NDArray[np.float64]
+    frames: tuple[str, ...] = ()
 
     @property
     def ok(self) -> NDArray[np.bool_]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from relgym.classification.binary import BinaryClassifier
 from relgym.classification.role_classifier import RoleKind
+from relgym.errors import ConfigError
+from relgym.laws.text import LEGEND, LawRow, WorldRow, law_rows, world_rows
 from relgym.model.text import Cell, amount, indented, table, wrapped
 
 if TYPE_CHECKING:
@@ -162,16 +165,28 @@ class TargetReport:
 
 @dataclass(frozen=True, slots=True)
 class ModelReport:
-    """A whole model as tables; its text is what `describe` returns."""
+    """A whole model as tables; its text is what `describe` returns.
+
+    Attributes
+    ----------
+    transitions
+        How many it has learned from.
+    targets
+        Tables of the targets that modes predict.
+    laws
+        Laws of motion that are in force, a sentence each; they predict the targets that have no tables.
+    """
 
     transitions: int
     targets: tuple[TargetReport, ...]
+    laws: tuple[LawRow, ...] = ()
 
     def __str__(self) -> str:
-        if not self.targets:
+        if not self.targets and not self.laws:
             return f"No targets yet: nothing changed in {amount(self.transitions, 'transition')}."
         head = f"Learned from {amount(self.transitions, 'transition')}."
-        parts = [head, *(f"{'─' * 80}\n{target}" for target in self.targets)]
+        parts = [head, *([_law_text(self.laws)] if self.laws else [])]
+        parts += [f"{'─' * 80}\n{target}" for target in self.targets]
         legend = _legend(self.targets)
         return "\n\n".join([*parts, f"{'─' * 80}\n{legend}"] if legend else parts)
 
@@ -186,13 +201,67 @@ def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
     digits
         Significant digits of coefficients.
     """
-    parts = [model.property_model(target.type, target.property) for target in model.targets]
-    return ModelReport(model.seen, tuple(_target_report(part, digits) for part in parts))
+    parts = [
+        model.property_model(target.type, target.property)
+        for target in model.targets
+        if not model.governs(target)
+    ]
+    laws: tuple[LawRow, ...] = ()
+    if model.laws is not None and model.governed:
+        laws = law_rows(model.laws, model.governed, digits)
+    return ModelReport(model.seen, tuple(_target_report(part, digits) for part in parts), laws)
 
 
-def describe(model: WorldModel, *, digits: int = 7) -> str:
-    """Modes, functions, clauses and roles of every target as text, for people."""
-    return str(report(model, digits=digits))
+def describe(
+    model: WorldModel,
+    *,
+    digits: int = 7,
+    frame: str | None = None,
+    incline: float | Sequence[float] = (0.0, 90.0),
+) -> str:
+    """Laws, modes, functions, clauses and roles of every target as text, for people.
+
+    Parameters
+    ----------
+    model
+        The model; unchanged.
+    digits
+        Significant digits of coefficients.
+    frame
+        ``"world"``: behind the laws, also the functions along the world's axes that follow from them.
+    incline
+        For which surfaces: their angles in degrees (`relgym.laws.text.world_rows`).
+
+    Raises
+    ------
+    ConfigError
+        Another frame; or ``"world"`` where the laws in force aren't stated along the normals of a planar world.
+    """
+    if frame not in (None, "world"):
+        raise ConfigError(f"frame={frame!r}: expected None (as learned) or 'world'")
+    text = str(report(model, digits=digits))
+    if frame is None or model.laws is None or not model.governed:
+        return text
+    angles = (incline,) if isinstance(incline, (int, float)) else tuple(incline)
+    tables = [
+        _world_text(name, angle, world_rows(model.laws, name, angle, digits))
+        for name in sorted(model.governed)
+        for angle in angles
+    ]
+    return "\n\n".join([text, *tables])
+
+
+def _law_text(rows: tuple[LawRow, ...]) -> str:
+    lines = [[str(r), r.examples or "", r.unexplained if r.examples else ""] for r in rows]
+    return f"{'─' * 80}\n{table(['law', 'examples', 'unexplained'], lines)}\n\n{LEGEND}"
+
+
+def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
+    lines: list[list[Cell] | str] = []
+    for row in rows:
+        lines.append(f"where {row.case}:")
+        lines += [[f"  {function}"] for function in row.functions]
+    return table([f"{name} touching a surface at {incline:g} degrees, along the world's axes"], lines)
 
 
 def _target_report(part: PropertyModel, digits: int) -> TargetReport:

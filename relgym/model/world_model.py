@@ -15,6 +15,8 @@ from relgym.clustering.clusterer import ClusterReport
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, SchemaError
+from relgym.laws.book import LawBook
+from relgym.model.motion import Laws
 from relgym.model.perception import Percept, Perception, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.property_model import PropertyModel, Verdict, bodies_of
@@ -39,7 +41,7 @@ class LearnReport:
     Attributes
     ----------
     parts
-        Per (object, property): what its clusterer did.
+        Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice.
     work
         Deterministic units of work spent on re-learning classifiers.
     """
@@ -103,6 +105,9 @@ class WorldModel:
         self._models: dict[Target, PropertyModel] = {}
         self._tables: dict[str, ExampleTable] = {}
         self._percept: tuple[Scene, Percept] | None = None
+        self._laws: Laws | None = None
+        if self.config.frames == "auto":
+            self._laws = Laws(schema, None if named is None else tuple(named), self.config)
         for target in named or ():
             self._add_target(target)
 
@@ -184,9 +189,14 @@ class WorldModel:
         after_values = next_values(before, after)
         parts: dict[tuple[str, str], ClusterReport] = {}
         for type_name in dict.fromkeys(t.type for t in self.targets):
+            if self._laws is not None and self._laws.suffice(type_name, self.targets):
+                continue
             for index in before.layout.of_type(type_name):
                 if before.layout.names[index] in after:
                     self._learn_object(percept, index, after_values, parts)
+        if self._laws is not None:
+            stays = {i: name in after for i, name in enumerate(before.layout.names)}
+            self._laws.learn_one(percept, after_values, stays, self._models)
         self.seen += 1
         work = self._refresh()
         return LearnReport(parts, work)
@@ -215,7 +225,8 @@ class WorldModel:
     def _refresh(self) -> int:
         budget, spent = self.config.work_per_step, 0
         for target in self.targets:
-            spent += self._models[target].refresh(budget - spent)
+            if not self.governs(target):  # no clause is asked where laws predict
+                spent += self._models[target].refresh(budget - spent)
             if spent >= budget:
                 break
         return spent
@@ -225,7 +236,23 @@ class WorldModel:
 
         A model without its history has nothing to learn from and stays as it is.
         """
-        return 0 if self.frozen else sum(self._models[t].refresh(None) for t in self.targets)
+        if self.frozen:
+            return 0
+        return sum(self._models[t].refresh(None) for t in self.targets if not self.governs(t))
+
+    @property
+    def laws(self) -> LawBook | None:
+        """Laws of motion learned so far, in force or not; None with ``frames="world"``."""
+        return None if self._laws is None else self._laws.learner.book
+
+    @property
+    def governed(self) -> frozenset[str]:
+        """Names of the types whose velocity laws of motion predict at present."""
+        return frozenset() if self._laws is None else self._laws.governed
+
+    def governs(self, target: Target) -> bool:
+        """Whether laws of motion, not modes, predict a target: they describe its transitions in fewer bits."""
+        return self._laws is not None and self._laws.governs(target)
 
     def _check(self, scene: Scene) -> None:
         schema = scene.schema
@@ -260,9 +287,13 @@ class WorldModel:
         following = scene.vector.copy()
         parts: list[Prediction] = []
         lost: set[tuple[str, str]] = set()
+        motion = None if self._laws is None else self._laws.speak(percept)
         for target in self.targets:
             for index in layout.of_type(target.type):
-                verdict = self._models[target].predict_one(percept, index, following)
+                if motion is not None and self._laws is not None and self._laws.governs(target):
+                    verdict = self._laws.prediction(motion, percept, index, target)
+                else:
+                    verdict = self._models[target].predict_one(percept, index, following)
                 if not lost.isdisjoint(target.given):
                     verdict = Prediction("", "", np.nan, Outcome.DEPENDS)
                 column = layout.column(index, target.property)
@@ -299,9 +330,13 @@ class WorldModel:
         verdicts: list[Verdict] = []
         lost: dict[tuple[str, str], NDArray[np.bool_]] = {}
         nowhere = np.zeros(len(vectors), dtype=bool)
+        motion = None if self._laws is None else self._laws.speak(percept)
         for target in self.targets:
             for index in layout.of_type(target.type):
-                verdict = self._models[target].predict_batch(percept, index, following)
+                if motion is not None and self._laws is not None and self._laws.governs(target):
+                    verdict = self._laws.verdict(motion, percept, index, target)
+                else:
+                    verdict = self._models[target].predict_batch(percept, index, following)
                 for pair in target.given:
                     verdict.values[lost.get(pair, nowhere)] = np.nan
                     verdict.outcomes[lost.get(pair, nowhere)] = OUTCOMES.index(Outcome.DEPENDS)
@@ -324,7 +359,13 @@ class WorldModel:
             np.stack([v.modes for v in verdicts], axis=1) if keys else np.zeros((n, 0), dtype=np.int64),
             np.stack([v.outcomes for v in verdicts], axis=1) if keys else np.zeros((n, 0), dtype=np.int8),
             np.stack([v.margins for v in verdicts], axis=1) if keys else np.zeros((n, 0)),
+            tuple(self._frame(target) for target in self.targets for _ in layout.of_type(target.type)),
         )
+
+    def _frame(self, target: Target) -> str:
+        """Axes in which a target's contacts are described."""
+        pair = None if self.laws is None else self.laws.pair
+        return pair.frame if pair is not None and self.governs(target) else "world"
 
     def _derive(self, layout: SceneLayout, now: NDArray[np.float64], following: NDArray[np.float64]) -> None:
         """Declared kinematics, in place: simulate, then derive (§4.8)."""
@@ -366,11 +407,21 @@ class WorldModel:
         return predictions
 
     # ------------------------------------------------------------------ for people
-    def describe(self, *, digits: int = 7) -> str:
-        """Modes, functions, clauses and roles as text (tables 3.1-3.2, 4.2-4.5)."""
+    def describe(
+        self, *, digits: int = 7, frame: str | None = None, incline: float | Sequence[float] = (0.0, 90.0)
+    ) -> str:
+        """Laws, modes, functions, clauses and roles as text (tables 3.1-3.2, 4.2-4.5).
+
+        With ``frame="world"`` also what the laws in force give along the world's axes on surfaces with some
+        inclines, in degrees (`relgym.model.report.describe`).
+        """
         from relgym.model.report import describe
 
-        return describe(self, digits=digits)
+        return describe(self, digits=digits, frame=frame, incline=incline)
+
+    def law_lines(self, scene: Scene, index: int, digits: int = 7) -> tuple[str, ...]:
+        """What laws of motion say of an object: its free law, then every contact, a line each."""
+        return () if self._laws is None else self._laws.lines(self._perceive(scene), index, digits)
 
     def explain(self, scene: Scene) -> str:
         """Why this prediction: mode, function, roles, clause and rival of every target."""
@@ -416,6 +467,8 @@ class WorldModel:
             arrays |= {f"table{k}.{name}": a for name, a in self._tables[type_name].to_arrays().items()}
         for k, target in enumerate(self.targets):
             arrays |= {f"target{k}.{name}": a for name, a in self._models[target].to_arrays().items()}
+        if self._laws is not None:
+            arrays |= {f"laws.{name}": a for name, a in self._laws.learner.to_arrays().items()}
         write_model(
             path, self.to_json(history=True) | {"extra": self.extra if extra is None else extra}, arrays
         )
@@ -433,6 +486,7 @@ class WorldModel:
                 for t in self.targets
             ],
             "tables": [self._tables[name].to_json() for name in sorted(self._tables)] if history else [],
+            "laws": None if self._laws is None else self._laws.to_json(history=history),
         }
 
     @classmethod
@@ -465,6 +519,8 @@ class WorldModel:
         targets = [target_from_json(part["target"]) for part in body["targets"]]
         model = cls(schema, ModelConfig.from_json(body["config"]), targets=targets)
         model._open = bool(body["open"])
+        if model._laws is not None and model._open:
+            model._laws = Laws(schema, None, model.config)
         model.seen = int(body["seen"])
         model.frozen = arrays is None
         for k, type_name in enumerate(sorted(model._tables)):
@@ -475,4 +531,7 @@ class WorldModel:
         for k, target in enumerate(targets):
             part = {n.split(".", 1)[1]: a for n, a in (arrays or {}).items() if n.startswith(f"target{k}.")}
             model._models[target].restore(body["targets"][k]["model"], part)
+        if model._laws is not None and body["laws"] is not None:
+            part = {n.split(".", 1)[1]: a for n, a in (arrays or {}).items() if n.startswith("laws.")}
+            model._laws.restore(body["laws"], part)
         return model

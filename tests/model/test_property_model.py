@@ -88,7 +88,7 @@ def test_situations_never_seen_are_outside_experience() -> None:
 def test_roles_name_the_objects_that_play_them(room_model: WorldModel) -> None:
     before, _ = room(1, 1)[0]
     part = room_model.predict_one(scene(room_model.schema, before))["ball0", "vx"]
-    assert part.roles == ("ball0",)
+    assert part.roles[0] == "ball0"
 
 
 def test_unknown_targets_are_named(room_model: WorldModel) -> None:

@@ -187,7 +187,7 @@ def test_a_sphere_among_rotated_boxes() -> None:
 
 # ---------------------------------------------------------------------- chapter III's truck, chapter IV's ball
 def train(blocks: Sequence[Block]) -> WorldModel:
-    model = WorldModel(blocks[0].schema)
+    model = WorldModel(blocks[0].schema, ModelConfig(frames="world"))
     for block in blocks:
         for each in block.transitions():
             model.learn_one(each)

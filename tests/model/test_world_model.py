@@ -357,7 +357,7 @@ def test_the_seed_decides_the_draws_and_nothing_else(room_steps: list[RawStep]) 
 
 def test_work_is_spent_within_its_budget(room_steps: list[RawStep]) -> None:
     schema = schema_of(room_steps, ROOM_TARGETS)
-    model = WorldModel(schema, ModelConfig(work_per_step=0))
+    model = WorldModel(schema, ModelConfig(work_per_step=0, frames="world"))
     for each in transitions(schema, room_steps[:150]):
         assert model.learn_one(each).work == 0
     assert model.finish() > 0

@@ -1,0 +1,139 @@
+"""Why the laws say what they say of one scene: each contact, its laws and the piece that holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.laws.book import LawBook
+from relgym.laws.composition import Engaged, compose
+from relgym.laws.frames import axes_of, axis_names
+from relgym.laws.records import AxisLaw
+from relgym.laws.touching import Contacts, Group
+from relgym.scene.geometry.vectors import FloatArray, dot
+
+__all__ = ["AxisAccount", "ContactAccount", "accounts"]
+
+
+@dataclass(frozen=True, slots=True)
+class AxisAccount:
+    """One axis of a contact.
+
+    Attributes
+    ----------
+    axis
+        Its letter.
+    direction
+        Its unit vector.
+    law
+        The law, such as ``max(u_n, -0.9 v_n)``.
+    piece
+        The piece that holds.
+    value
+        Relative velocity after the contact along the axis.
+    impulse
+        By how much the contact changed it.
+    """
+
+    axis: str
+    direction: tuple[float, ...]
+    law: str
+    piece: str
+    value: float
+    impulse: float
+
+
+@dataclass(frozen=True, slots=True)
+class ContactAccount:
+    """One contact of a scene: its objects, the first of which moves, and what happens along each axis."""
+
+    objects: tuple[str, str]
+    frame: str
+    axes: tuple[AxisAccount, ...]
+
+    def __str__(self) -> str:
+        lines = [f"{self.objects[0]} touches {self.objects[1]}"]
+        for axis in self.axes:
+            where = ", ".join(f"{c:.4g}" for c in axis.direction)
+            lines.append(
+                f"  v'_{axis.axis} = {axis.law}: {axis.piece} holds, {axis.value:.7g}"
+                f" (impulse {axis.impulse:.4g}, {axis.axis} = ({where}))"
+            )
+        return "\n".join(lines)
+
+
+def accounts(
+    book: LawBook, contacts: Contacts, vectors: NDArray[np.float64], digits: int = 7
+) -> tuple[ContactAccount, ...]:
+    """Every contact of a single scene on which the laws have a say, in the order of the pairs.
+
+    Parameters
+    ----------
+    book, contacts, vectors
+        The laws, the scene's contacts and its state vector as a row, shape ``(1, layout.width)``.
+    digits
+        Significant digits of coefficients.
+    """
+    motion = book.motion(contacts, vectors)
+    engaged = book.engaged(contacts.cast)
+    if engaged is None:
+        return ()
+    return tuple(
+        account
+        for group in contacts.groups()
+        if motion.known[0, contacts.cast.first[group.pairs[0]]].all()
+        for account in _of_group(book, engaged, contacts, vectors, group, digits)
+    )
+
+
+def _of_group(
+    book: LawBook,
+    engaged: Engaged,
+    contacts: Contacts,
+    vectors: NDArray[np.float64],
+    group: Group,
+    digits: int,
+) -> Iterator[ContactAccount]:
+    cast = contacts.cast
+    now, free, columns = book.free_motion(cast, vectors)
+    share = book.share(contacts, group, columns)
+    velocity, impulse = compose(engaged, group, share, now, free)
+    for k, pair in enumerate(group.pairs[0].tolist()):
+        a, b = int(cast.first[pair]), int(cast.second[pair])
+        others = velocity[:, :, a] - velocity[:, :, b] - impulse[:, :, k]
+        axes = axes_of(engaged.law.frame, group.bearings.take((slice(None), k)), others)
+        before = now[:, :, a] - now[:, :, b]
+        told = _axes(engaged, pair, axes, before, others, digits)
+        names = [cast.layout.names[cast.layout.bodies[body]] for body in (a, b)]
+        yield ContactAccount((names[0], names[1]), engaged.law.frame, tuple(told))
+
+
+def _axes(
+    engaged: Engaged,
+    pair: int,
+    axes: list[FloatArray],
+    before: FloatArray,
+    others: FloatArray,
+    digits: int,
+) -> Iterator[AxisAccount]:
+    letters = axis_names(engaged.law.frame, len(before))
+    features: dict[str, FloatArray] = {}
+    for letter, axis in zip(letters, axes, strict=True):
+        features[f"u_{letter}"], features[f"v_{letter}"] = dot(others, axis), dot(before, axis)
+    for k, (letter, axis) in enumerate(zip(letters, axes, strict=True)):
+        law: AxisLaw = engaged.law.axes[k][engaged.chosen[k, pair]]
+        free = features[f"u_{letter}"]
+        values = [float(piece.values(features, free)[0]) for piece in law.pieces]
+        holds = int(np.argmax(values) if law.operator == "max" else np.argmin(values))
+        features[f"J_{letter}"] = np.array([values[holds]]) - free
+        yield AxisAccount(
+            letter,
+            tuple(float(c) + 0.0 for c in axis[:, 0]),
+            law.formula(digits),
+            law.pieces[holds].formula(digits),
+            values[holds],
+            float(features[f"J_{letter}"][0]),
+        )

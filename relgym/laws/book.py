@@ -1,0 +1,234 @@
+"""The laws of a world in force: what they say of the next velocities in a batch of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.laws.columns import Sources
+from relgym.laws.composition import Engaged, compose
+from relgym.laws.free import free_motion
+from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
+from relgym.laws.shares import EXTENT, share_values
+from relgym.laws.touching import Cast, Contacts, Group
+from relgym.scene.geometry.vectors import FloatArray
+from relgym.scene.objects import SceneLayout, SceneSchema
+
+__all__ = ["LawBook", "Motion"]
+
+SPREAD = 100.0
+"""Rival laws agree where their predictions differ by at most this many tolerances."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What the laws say of n scenes.
+
+    Attributes
+    ----------
+    velocity
+        Next velocities of all K bodies, shape ``(d, n, K)``; NaN where no law speaks.
+    known
+        Whether a law says so, shape ``(n, K)``. False for bodies that aren't movers.
+    touched
+        Whether the body touches something, shape ``(n, K)``.
+    columns
+        What the laws read of each mover, by body number: shape ``(names, n)``.
+    """
+
+    velocity: FloatArray
+    known: NDArray[np.bool_]
+    touched: NDArray[np.bool_]
+    columns: Mapping[int, FloatArray]
+
+
+class LawBook:
+    """Free laws, the law of pairs, and how moving pairs share an impulse.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    sources
+        Columns of each type whose velocity is learned.
+
+    Attributes
+    ----------
+    free
+        The free law of each type that has one.
+    pair
+        The law of touching pairs, once there is one.
+    shares
+        Shares of moving pairs, by kind.
+    tolerance
+        Largest residual of an explained velocity component.
+    """
+
+    def __init__(self, schema: SceneSchema, sources: Mapping[str, Sources]) -> None:
+        self.schema = schema
+        self.sources = sources
+        self.free: dict[str, FreeLaw] = {}
+        self.pair: PairLaw | None = None
+        self.shares: dict[Kind, Share] = {}
+        self.tolerance = 1e-15
+        self._casts: dict[SceneLayout, Cast] = {}
+        self._rounded: dict[SceneLayout, NDArray[np.intp]] = {}
+        self._engaged: dict[SceneLayout, list[Engaged]] = {}
+
+    def cast(self, layout: SceneLayout) -> Cast:
+        """What a layout means for the laws; cached."""
+        if (known := self._casts.get(layout)) is None:
+            known = self._casts[layout] = Cast.of(self.schema, layout, self.sources)
+        return known
+
+    def rounded(self, cast: Cast) -> NDArray[np.intp]:
+        """Columns of the movers' positions and velocities, whose rounding the laws inherit; cached."""
+        if (known := self._rounded.get(cast.layout)) is None:
+            places = []
+            for body in cast.movers:
+                i = cast.layout.bodies[body]
+                own = (*cast.layout.types[i].pose_columns()[:3], *cast.layout.types[i].velocity_columns())
+                places += [cast.layout.offsets[i] + k for k in own if k >= 0]
+            known = self._rounded[cast.layout] = np.array(places, dtype=np.intp)
+        return known
+
+    def forget(self) -> None:
+        """The laws changed: forget what was worked out from them."""
+        self._engaged.clear()
+
+    # ------------------------------------------------------------------ prediction
+    def motion(self, contacts: Contacts, vectors: NDArray[np.float64], *, checking: bool = True) -> Motion:
+        """Next velocities in n scenes.
+
+        Parameters
+        ----------
+        contacts
+            Who touches whom.
+        vectors
+            State vectors, shape ``(n, layout.width)``.
+        checking
+            Whether rival laws are asked too: where they disagree, nothing is known.
+        """
+        cast = contacts.cast
+        now, velocity, columns = self.free_motion(cast, vectors)
+        known = np.zeros((len(vectors), len(cast.layout.bodies)), dtype=bool)
+        known[:, cast.movers] = np.isfinite(velocity[..., cast.movers]).all(axis=0)
+        touched = np.zeros_like(known)
+        for group in contacts.groups():
+            self._collide(contacts, group, now, velocity, known, touched, columns, checking=checking)
+        return Motion(velocity, known, touched, columns)
+
+    def free_motion(
+        self, cast: Cast, vectors: NDArray[np.float64]
+    ) -> tuple[FloatArray, FloatArray, dict[int, FloatArray]]:
+        """Velocities now and next, if nothing touched anything, and what the free laws read (`Motion`)."""
+        state = cast.padded(vectors)
+        now = state[cast.velocities].transpose(0, 2, 1)
+        velocity, columns = now.copy(), {}
+        for body in cast.movers:
+            sources, places = cast.sources[body]
+            columns[body] = state[places]
+            law = self.free.get(sources.type.name)
+            free = np.nan if law is None else free_motion(law, sources.names, columns[body])
+            velocity[..., body] = free
+        return now, velocity, columns
+
+    def _collide(
+        self,
+        contacts: Contacts,
+        group: Group,
+        now: FloatArray,
+        velocity: FloatArray,
+        known: NDArray[np.bool_],
+        touched: NDArray[np.bool_],
+        columns: Mapping[int, FloatArray],
+        *,
+        checking: bool,
+    ) -> None:
+        """Let the contacts of some scenes act, in place."""
+        cast, scenes = contacts.cast, group.scenes
+        involved = np.zeros((len(scenes), known.shape[1]), dtype=bool)
+        rows = np.arange(len(scenes))[:, None]
+        involved[rows, cast.first[group.pairs]] = True
+        involved[rows, cast.second[group.pairs]] = True
+        touched[scenes] = involved
+        laws = self._engaged_pairs(cast)
+        if not laws:
+            known[scenes] &= ~involved
+            return
+        share = self.share(contacts, group, columns)
+        chosen = laws[0].chosen[:, group.pairs]
+        spoken = np.all((chosen >= 0).all(axis=0) & np.isfinite(share), axis=1)[:, None]
+        before, free = now[:, scenes], velocity[:, scenes]
+        after, _ = compose(laws[0], group, share, before, free)
+        sure = np.isfinite(after).all(axis=0) | ~involved
+        sure &= ~involved | spoken
+        for rival in laws[1:] if checking else ():
+            other, _ = compose(rival, group, share, before, free)
+            sure &= (np.abs(other - after) <= SPREAD * self.tolerance).all(axis=0) | ~involved
+        velocity[:, scenes] = np.where(involved & sure, after, velocity[:, scenes])
+        known[scenes] &= sure
+
+    def share(
+        self, contacts: Contacts, group: Group, columns: Mapping[int, FloatArray]
+    ) -> NDArray[np.float64]:
+        """The first body's share of each impulse, shape ``(m, c)``; 1 where the other doesn't move."""
+        cast = contacts.cast
+        share = np.where(cast.both[group.pairs], np.nan, 1.0)
+        for pair in np.unique(group.pairs[cast.both[group.pairs]]).tolist():
+            known = self.shares.get(cast.kinds[pair])
+            if known is None:
+                continue
+            rows, k = np.nonzero(group.pairs == pair)
+            scenes = group.scenes[rows]
+            a, b = (
+                self._properties(contacts, int(body), columns, scenes)
+                for body in (cast.first[pair], cast.second[pair])
+            )
+            share[rows, k] = share_values(known, a, b)
+        return share
+
+    def _properties(
+        self, contacts: Contacts, body: int, columns: Mapping[int, FloatArray], scenes: NDArray[np.intp]
+    ) -> dict[str, FloatArray]:
+        """What a share may read of a body: its own properties and its size."""
+        names = contacts.cast.sources[body][0].names
+        own = {name: columns[body][k, scenes] for k, name in enumerate(names) if "." not in name}
+        return own | {EXTENT: contacts.pose[scenes, body, 6 + contacts.cast.axes.used[0]]}
+
+    # ------------------------------------------------------------------ laws in force
+    def engaged(self, cast: Cast) -> Engaged | None:
+        """The law of pairs laid over a cast; None while there is none."""
+        return next(iter(self._engaged_pairs(cast)), None)
+
+    def _engaged_pairs(self, cast: Cast) -> list[Engaged]:
+        """The law of pairs laid over a cast, then its rivals; cached."""
+        if (known := self._engaged.get(cast.layout)) is None:
+            laws = [] if self.pair is None else [self.pair, *_rivals(self.pair)]
+            known = [Engaged(law, _chosen(law, cast.kinds), cast.first, cast.second) for law in laws]
+            self._engaged[cast.layout] = known
+        return known
+
+
+def _chosen(law: PairLaw, kinds: tuple[Kind, ...]) -> NDArray[np.intp]:
+    """Number of the law of each pair along each axis, shape ``(axes, P)``; -1 where none is to be trusted."""
+    numbers = np.full((len(law.axes), len(kinds)), -1, dtype=np.intp)
+    for k, laws in enumerate(law.axes):
+        for pair, kind in enumerate(kinds):
+            found = law.law_of(k, kind)
+            if found is not None and found.trusted():
+                numbers[k, pair] = laws.index(found)
+    return numbers
+
+
+def _rivals(law: PairLaw) -> Iterator[PairLaw]:
+    """The law with one axis' law replaced by one that explains the examples equally well."""
+    for k, laws in enumerate(law.axes):
+        for j, each in enumerate(laws):
+            for operator, pieces in each.rivals:
+                other = replace(each, operator=operator, pieces=pieces, rivals=())
+                changed = (*laws[:j], other, *laws[j + 1 :])
+                yield replace(law, axes=(*law.axes[:k], changed, *law.axes[k + 1 :]))

@@ -1,0 +1,79 @@
+"""Which numbers a law may read: an object's own velocity and properties, and what bodiless objects say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.scene.axes import Axes
+from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, Target
+
+__all__ = ["Sources", "vector_types"]
+
+
+def vector_types(schema: SceneSchema, targets: tuple[Target, ...]) -> tuple[ObjectType, ...]:
+    """Types with a body whose velocity has a component along every axis in use, each of them a target."""
+    used = Axes.of(schema).used
+    known = {(t.type, t.property) for t in targets}
+    found = []
+    for t in schema.types:
+        names = [t.velocity[axis] for axis in used] if t.velocity else [None]
+        if t.has_body and all(name is not None and (t.name, name) in known for name in names):
+            found.append(t)
+    return tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """Columns that the laws of one moving type may read.
+
+    Attributes
+    ----------
+    type
+        The type.
+    velocity
+        Names of the velocity's components along the axes in use.
+    names
+        Names of all columns: the velocity first, then the type's other properties (the pose left out: laws
+        hold everywhere), then those of bodiless objects, as ``type.property``.
+    """
+
+    type: ObjectType
+    velocity: tuple[str, ...]
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, schema: SceneSchema, t: ObjectType) -> Sources:
+        """Return the columns of a type whose velocity is a vector."""
+        velocity = tuple(name for axis in Axes.of(schema).used if (name := t.velocity[axis]) is not None)
+        posed = {t.properties[k] for k in t.pose_columns() if k >= 0}
+        others = [p for p in t.properties if p not in posed and p not in velocity]
+        single = [b for b in schema.types if not b.has_body and _count(schema, b) == 1]
+        outside = [f"{b.name}.{p}" for b in sorted(single, key=_by_name) for p in b.properties]
+        return cls(t, velocity, (*velocity, *others, *outside))
+
+    def places(self, layout: SceneLayout, index: int) -> NDArray[np.intp]:
+        """Where the columns of an object lie in a state vector with NaN appended."""
+        places = []
+        for name in self.names:
+            owner, _, prop = name.rpartition(".")
+            if not owner:
+                places.append(layout.column(index, name))
+                continue
+            where = layout.of_type(owner)
+            places.append(layout.column(where[0], prop) if len(where) == 1 else layout.width)
+        return np.array(places, dtype=np.intp)
+
+    def preference(self, component: int) -> tuple[int, ...]:
+        """Columns in the order in which a component's law prefers them: the component itself first."""
+        return (component, *(k for k in range(len(self.names)) if k != component))
+
+
+def _by_name(t: ObjectType) -> str:
+    return t.name
+
+
+def _count(schema: SceneSchema, t: ObjectType) -> int:
+    return sum(name == t.name for _, name in schema.objects)

@@ -1,0 +1,28 @@
+"""Description length of laws: what is stated costs bits, and so does what is left unexplained."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from relgym.laws.records import Piece
+
+__all__ = ["CONSTANT_BITS", "EXCEPTION_BITS", "function_bits", "piece_bits"]
+
+CONSTANT_BITS = 33.0
+"""Bits of a fitted constant, beside half a bit for every doubling of the examples that it is fitted to."""
+
+EXCEPTION_BITS = 33.0
+"""Bits of one number that no law explains."""
+
+
+def piece_bits(piece: Piece, features: int, examples: int) -> float:
+    """Bits of one linear piece: which features, and their weights unless they are 1 or -1."""
+    constant = CONSTANT_BITS + 0.5 * math.log2(max(examples, 2))
+    return 1.0 + len(piece.terms) * math.log2(max(features, 2)) + constant * piece.free_parameters()
+
+
+def function_bits(pieces: Iterable[Piece], features: int, examples: int) -> float:
+    """Bits of several pieces; whether they are combined by max or min costs one more."""
+    parts = [piece_bits(piece, features, examples) for piece in pieces]
+    return sum(parts) + (len(parts) > 1)

@@ -1,0 +1,184 @@
+"""Single contacts, kept raw: everything that laws are derived from can be derived again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.laws.book import LawBook
+from relgym.laws.columns import Sources
+from relgym.laws.frames import Bearings
+from relgym.laws.free import free_motion
+from relgym.laws.pair import Encounters
+from relgym.laws.records import Kind, Share
+from relgym.laws.shares import EXTENT, find_share
+from relgym.laws.store import Store
+from relgym.laws.touching import Contacts
+from relgym.scene.axes import Axes
+from relgym.scene.geometry.vectors import FloatArray
+from relgym.scene.objects import SceneSchema
+
+__all__ = ["EncounterStore"]
+
+KEPT = 3_000
+"""Contacts kept."""
+
+
+class EncounterStore:
+    """A bounded number of single contacts, as they were observed.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    sources
+        Columns of each type whose velocity is learned.
+    seed
+        Seed of the choice of contacts that make room.
+    """
+
+    def __init__(self, schema: SceneSchema, sources: Mapping[str, Sources], *, seed: int) -> None:
+        self.sources = sources
+        self.kinds: list[Kind] = []
+        d = len(Axes.of(schema).used)
+        columns = max((len(s.names) for s in sources.values()), default=0)
+        widths = {
+            "kind": 1, "now_a": d, "now_b": d, "after_a": d, "after_b": d, "normal": d, "centres": d,
+            "angles": 3, "extent_a": 1, "extent_b": 1, "x_a": columns, "x_b": columns,
+        }  # fmt: skip
+        ends = np.cumsum(list(widths.values())).tolist()
+        self._at = {name: slice(end - w, end) for (name, w), end in zip(widths.items(), ends, strict=True)}
+        self._store = Store(ends[-1], KEPT, seed=seed)
+
+    def __len__(self) -> int:
+        return len(self._store.rows)
+
+    @property
+    def seen(self) -> int:
+        """Number of contacts so far, those no longer kept included."""
+        return self._store.seen
+
+    @seen.setter
+    def seen(self, count: int) -> None:
+        self._store.seen = count
+
+    def add(
+        self,
+        contacts: Contacts,
+        pair: int,
+        vector: NDArray[np.float64],
+        after: NDArray[np.float64],
+        *,
+        wrong: bool,
+    ) -> None:
+        """Keep a contact of a single scene; `after` are all bodies' next velocities, shape ``(d, K)``."""
+        cast = contacts.cast
+        a, b = int(cast.first[pair]), int(cast.second[pair])
+        kind = cast.kinds[pair]
+        if kind not in self.kinds:
+            self.kinds.append(kind)
+        state = cast.padded(vector[None])[:, 0]
+        there = contacts.bearings(np.zeros(1, dtype=np.intp), np.array([pair]))
+        row = np.zeros(self._store.rows.shape[1])
+        row[self._at["kind"]] = self.kinds.index(kind)
+        for side, body in (("a", a), ("b", b)):
+            row[self._at[f"now_{side}"]] = state[cast.velocities[:, body]]
+            row[self._at[f"after_{side}"]] = after[:, body]
+            row[self._at[f"extent_{side}"]] = contacts.pose[0, body, 6 + cast.axes.used[0]]
+            if body in cast.sources:
+                start = self._at[f"x_{side}"].start
+                places = cast.sources[body][1]
+                row[start : start + len(places)] = state[places]
+        if not cast.both[pair]:  # what isn't learned keeps its velocity
+            row[self._at["after_b"]] = row[self._at["now_b"]]
+        row[self._at["normal"]], row[self._at["centres"]] = there.normal[:, 0], there.centres[:, 0]
+        row[self._at["angles"]] = there.angles[:, 0]
+        if np.isfinite(row).all():
+            self._store.add(row, cell=2 * self.kinds.index(kind) + wrong)
+
+    def encounters(self, book: LawBook) -> Encounters | None:
+        """The contacts as laws see them, with the present free laws; None where none has one."""
+        rows = self._store.rows
+        kinds = self._column("kind")[0].astype(np.intp)
+        usable = [
+            k
+            for k, (a, b) in enumerate(self.kinds)
+            if a in book.free and (b in book.free or b not in self.sources)
+        ]
+        part = np.flatnonzero(np.isin(kinds, usable))
+        if not len(part):
+            return None
+        free_a, free_b = self._free(book, kinds, "a"), self._free(book, kinds, "b")
+        take = np.take
+        return Encounters(
+            take(self._column("now_a") - self._column("now_b"), part, axis=1),
+            take(free_a - free_b, part, axis=1),
+            take(self._column("after_a") - self._column("after_b"), part, axis=1),
+            Bearings(
+                *(np.ascontiguousarray(rows[part, self._at[n]].T) for n in ("normal", "centres", "angles"))
+            ),
+            kinds[part],
+            tuple(self.kinds),
+            book.tolerance,
+        )
+
+    def shares(self, book: LawBook) -> dict[Kind, Share]:
+        """How the two bodies of each kind of moving pair share an impulse, as far as that is known."""
+        found: dict[Kind, Share] = {}
+        kinds = self._column("kind")[0].astype(np.intp)
+        free = [self._free(book, kinds, side) for side in "ab"]
+        after = [self._column(f"after_{side}") for side in "ab"]
+        for k, (a, b) in enumerate(self.kinds):
+            if a not in book.free or b not in book.free:
+                continue
+            part = np.flatnonzero(kinds == k)
+            mine, theirs = ((after[s] - free[s])[:, part] for s in (0, 1))
+            share = find_share(
+                mine,
+                mine - theirs,
+                self._properties(a, "a", part),
+                self._properties(b, "b", part),
+                alike=a == b,
+                tolerance=book.tolerance,
+            )
+            if share is not None:
+                found[a, b] = share
+        return found
+
+    def _properties(self, name: str, side: str, part: NDArray[np.intp]) -> dict[str, FloatArray]:
+        columns = self._column(f"x_{side}")[:, part]
+        names = self.sources[name].names
+        own = {n: columns[k] for k, n in enumerate(names) if "." not in n}
+        return own | {EXTENT: self._column(f"extent_{side}")[0, part]}
+
+    def _free(self, book: LawBook, kinds: NDArray[np.intp], side: str) -> FloatArray:
+        """Free motion of one side of all contacts; the present velocity of what isn't learned."""
+        velocity = self._column(f"now_{side}").copy()
+        for k, kind in enumerate(self.kinds):
+            name = kind["ab".index(side)]
+            if name in book.free:
+                part = np.flatnonzero(kinds == k)
+                columns = self._column(f"x_{side}")[: len(self.sources[name].names), part]
+                velocity[:, part] = free_motion(book.free[name], self.sources[name].names, columns)
+        return velocity
+
+    def _column(self, name: str) -> FloatArray:
+        """One field of all contacts, components first."""
+        return np.ascontiguousarray(self._store.rows[:, self._at[name]].T)
+
+    # ------------------------------------------------------------------ saving
+    def to_json(self) -> dict[str, Any]:
+        """Everything but the contacts."""
+        return {"kinds": [list(kind) for kind in self.kinds], "store": self._store.to_json()}
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """The contacts."""
+        return self._store.to_arrays()
+
+    def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take over what `to_json` and `to_arrays` wrote."""
+        self.kinds = [(str(a), str(b)) for a, b in data["kinds"]]
+        self._store.restore(data["store"], arrays)

@@ -1,0 +1,190 @@
+"""The free law: how an object moves that touches nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.laws.columns import Sources
+from relgym.laws.description import EXCEPTION_BITS, function_bits, piece_bits
+from relgym.laws.records import ONE, FreeLaw, Piece
+from relgym.laws.store import Store
+from relgym.numeric.ransac import consensus
+from relgym.numeric.stepwise import LinearFit, forward_stepwise
+from relgym.scene.geometry.vectors import FloatArray
+
+__all__ = ["FreeLearner", "free_motion"]
+
+KEPT = 600
+FEWEST = 6
+"""Examples that found a free law."""
+
+EXPLAINS = 0.9
+"""A free law that explains a smaller share of the examples is none."""
+
+MOST_TERMS = 6
+
+_FEW = 3
+"""Constants whose bits no longer form could save."""
+
+
+def free_motion(law: FreeLaw, names: tuple[str, ...], x: FloatArray) -> FloatArray:
+    """Next velocities of free objects, shape ``(d, ...)``, from columns ``(len(names), ...)``."""
+    columns = dict(zip(names, x, strict=True))
+    return np.stack([piece.values(columns, x[0]) for piece in law.components])
+
+
+class FreeLearner:
+    """Learns the free law of one type from a stream; an over-specific law is revised when it fails.
+
+    Parameters
+    ----------
+    sources
+        Columns it may read.
+    seed
+        Seed of the choice of examples that are kept.
+    """
+
+    def __init__(self, sources: Sources, *, seed: int) -> None:
+        self.sources = sources
+        self.law: FreeLaw | None = None
+        self._d = len(sources.velocity)
+        self.store = Store(len(sources.names) + self._d, KEPT, seed=seed)
+        self._rng = np.random.default_rng([seed, 1])
+        self._news = 0
+
+    @property
+    def seen(self) -> int:
+        """Number of examples so far."""
+        return self.store.seen
+
+    def learn_one(
+        self, x: NDArray[np.float64], after: NDArray[np.float64], right: bool, tolerance: float
+    ) -> bool:
+        """Take up one example; whether the law changed.
+
+        Parameters
+        ----------
+        x
+            The object's columns, shape ``(len(names),)``.
+        after
+            Its next velocity, shape ``(d,)``.
+        right
+            Whether the law explained it.
+        tolerance
+            Largest residual of an explained component.
+        """
+        if not np.isfinite(x).all():
+            return False
+        self.store.add(np.concatenate([x, after]), cell=int(not right))
+        if right and not _power_of_two(self.seen):
+            return False
+        self._news += 1
+        unexplained = 0 if self.law is None else self.law.unexplained
+        if len(self.store.rows) < FEWEST or self._news <= unexplained // 4:
+            return False
+        self._news = 0
+        return self.fit(tolerance)
+
+    def fit(self, tolerance: float) -> bool:
+        """Learn the law anew from the examples kept; whether it changed."""
+        found = self._fitted(tolerance)
+        same = found is not None and self.law is not None and found.components == self.law.components
+        self.law, before = found, self.law
+        return not same and (found is not None or before is not None)
+
+    def _fitted(self, tolerance: float) -> FreeLaw | None:
+        rows = self.store.rows
+        x, y = rows[:, : -self._d], rows[:, -self._d :]
+        if len(rows) < FEWEST:
+            return None
+        components = tuple(self._component(x, y[:, k], k, tolerance) for k in range(self._d))
+        columns = dict(zip(self.sources.names, x.T, strict=True))
+        values = np.stack([piece.values(columns, y[:, 0]) for piece in components], axis=1)
+        wrong = int((np.abs(values - y) > tolerance).any(axis=1).sum())
+        if wrong > (1.0 - EXPLAINS) * len(rows):
+            return None
+        bits = function_bits(components, len(self.sources.names) + 1, len(rows))
+        return FreeLaw(
+            self.sources.type.name, components, len(rows), wrong, bits + self._d * EXCEPTION_BITS * wrong
+        )
+
+    def _component(self, x: NDArray[np.float64], y: NDArray[np.float64], k: int, tolerance: float) -> Piece:
+        """One component's law: the shortest description among a few forms, the plainest first.
+
+        A body that keeps its velocity, or changes it steadily, is described so as long as that holds; else
+        whatever happened to be constant so far (a velocity, say) would stand in for the constant term.
+        """
+        order = list(self.sources.preference(k))
+        names = [self.sources.names[c] for c in order]
+        columns, sigma = x[:, order], tolerance / 4.0
+        steady = float(np.median(y - columns[:, 0]))
+        forms = [
+            Piece(((names[0], 1.0),)),
+            _simplest(LinearFit((0,), (1.0,), steady, 0.0), names, columns, y, tolerance),
+        ]
+        least = min(_bits(piece, names, columns, y, tolerance) for piece in forms)
+        if least > EXCEPTION_BITS * _FEW:
+            fit = forward_stepwise(columns, y, sigma=sigma, max_terms=MOST_TERMS)
+            if np.abs(y - fit.predict(columns)).max() > tolerance:
+                terms = min(len(order), MOST_TERMS)
+                found = consensus(
+                    columns, y, sigma=sigma, tolerance=tolerance, terms=terms, size=terms + 3, draws=256,
+                    rng=self._rng,
+                )  # fmt: skip
+                fit = fit if found is None else found.fit
+            forms.append(_simplest(fit, names, columns, y, tolerance))
+        return min(forms, key=lambda piece: _bits(piece, names, columns, y, tolerance))
+
+    def spread(self) -> float:
+        """Standard deviation of what a linear function of all columns leaves, robustly estimated."""
+        x, y = self.store.rows[:, : -self._d], self.store.rows[:, -self._d :]
+        left = []
+        for k in range(self._d):
+            columns = x[:, list(self.sources.preference(k))]
+            start = float(np.abs(y[:, k]).max(initial=0.0)) * 1e-12 + 1e-300
+            fit = forward_stepwise(columns, y[:, k], sigma=start, max_terms=MOST_TERMS, eliminate=False)
+            left.append(1.4826 * float(np.median(np.abs(y[:, k] - fit.predict(columns)))))
+        return max(left)
+
+    def to_json(self) -> list[Any]:
+        """What further learning needs, but the law and the examples."""
+        return [self._news, self._rng.bit_generator.state, self.store.to_json()]
+
+    def restore(self, data: list[Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take over what `to_json` wrote, and the examples."""
+        self._news = int(data[0])
+        self._rng.bit_generator.state = data[1]
+        self.store.restore(data[2], arrays)
+
+
+def _simplest(
+    fit: LinearFit, names: list[str], x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float
+) -> Piece:
+    """The fit as a piece, weights next to 1 or -1 made exactly that where it explains as much."""
+    weights = [float(round(w)) if abs(abs(w) - 1.0) <= 1e-9 else w for w in fit.weights]
+    total = np.zeros(len(y))
+    for column, weight in zip(fit.columns, weights, strict=True):
+        total = total + weight * x[:, column]
+    constant = float(np.median(y - total)) if fit.intercept != 0.0 else 0.0
+    was, now = (np.abs(y - v) <= tolerance for v in (fit.predict(x), total + constant))
+    if now.sum() < was.sum():
+        weights, constant = list(fit.weights), fit.intercept
+    elif constant != 0.0:
+        constant = float((y - total)[now].mean())
+    terms = [(names[c], w) for c, w in zip(fit.columns, weights, strict=True)]
+    return Piece((*terms, *([(ONE, constant)] if constant != 0.0 else [])))
+
+
+def _bits(
+    piece: Piece, names: list[str], x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float
+) -> float:
+    wrong = np.abs(y - piece.values(dict(zip(names, x.T, strict=True)), y)) > tolerance
+    return piece_bits(piece, len(names) + 1, len(y)) + EXCEPTION_BITS * float(wrong.sum())
+
+
+def _power_of_two(n: int) -> bool:
+    return n & (n - 1) == 0

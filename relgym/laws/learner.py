@@ -1,0 +1,345 @@
+"""Learns laws of motion from a stream of transitions: a free law per type, one law of touching pairs.
+
+Single contacts teach the law of pairs; transitions in which a body has several check how laws compose. Every
+contact is judged before it is learned from. One that the laws don't explain is news: the law of pairs is
+sought again, in all frames, among the bounded number of contacts kept. When a free law turns out to have been
+over-specific, all that was derived from it is derived again from the raw contacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.laws.book import LawBook, Motion
+from relgym.laws.columns import Sources, vector_types
+from relgym.laws.description import EXCEPTION_BITS
+from relgym.laws.encounters import EncounterStore
+from relgym.laws.free import FreeLearner
+from relgym.laws.pair import fit_pair
+from relgym.laws.records import FreeLaw, PairLaw, Share
+from relgym.laws.touching import Cast, Contacts
+from relgym.scene.objects import SceneLayout, SceneSchema, Target
+from relgym.scene.relations import Relations
+
+__all__ = ["LawLearner"]
+
+ROUNDINGS = 32.0
+"""A law on differences of stored positions carries at most about this many roundings."""
+
+STDS = 4.0
+"""Residual of an explained velocity, in standard deviations of the noise."""
+
+ESTIMATE_AT = (64, 256, 1024)
+"""Numbers of free examples at which the noise is estimated, if the free law doesn't hold exactly."""
+
+FEWEST_CONTACTS = 3
+
+SETTLED = 500
+"""Transitions without a surprise after which laws count as settled."""
+
+
+@dataclass(slots=True)
+class _Tally:
+    """Transitions of one type: all; since the laws last changed, and how many of those they had wrong."""
+
+    seen: int = 0
+    wrong: int = 0
+    since: int = 0
+
+
+class LawLearner:
+    """Laws of all types whose velocity is a vector of learned properties.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    targets
+        What is learned; a type takes part when all components of its velocity do.
+    seed
+        Seed of everything random.
+    noise_std
+        Standard deviation of the noise on velocities, or ``"auto"``.
+
+    Attributes
+    ----------
+    book
+        The laws learned so far.
+
+    Notes
+    -----
+    Cost per transition: the laws' evaluation, some 0.1 ms a moving body that touches something; a search, up
+    to some 0.1 s, when a contact is news, and ever more rarely while searches fail.
+    """
+
+    def __init__(
+        self,
+        schema: SceneSchema,
+        targets: tuple[Target, ...],
+        *,
+        seed: int,
+        noise_std: float | str = "auto",
+    ) -> None:
+        self.schema = schema
+        self.sources = {t.name: Sources.of(schema, t) for t in vector_types(schema, targets)}
+        self.book = LawBook(schema, self.sources)
+        self._noise = None if noise_std == "auto" else float(noise_std)
+        self._free = {name: FreeLearner(s, seed=seed) for name, s in self.sources.items()}
+        self._store = EncounterStore(schema, self.sources, seed=seed)
+        self._rng = np.random.default_rng([seed, 3])
+        self._tallies = {name: _Tally() for name in self.sources}
+        self._news = 0
+        self._stored_wrong = 0
+        self._lost = 0  # contacts that a model loaded without its history once kept
+
+    # ------------------------------------------------------------------ what is known
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Names of the types that take part."""
+        return tuple(self.sources)
+
+    def ready(self, type_name: str) -> bool:
+        """Whether there are a free law of the type and a law of pairs."""
+        return type_name in self.book.free and self.book.pair is not None
+
+    def unexplained(self, type_name: str) -> float:
+        """About how many of a type's transitions the present laws don't explain."""
+        tally, free = self._tallies[type_name], self._free[type_name]
+        lost = float(tally.wrong)
+        if free.law is not None:
+            lost += free.law.unexplained * free.seen / max(1, free.law.examples)
+        kept = self._kept()[0]
+        return lost + self._stored_wrong * self._store.seen / max(1, kept)
+
+    def seen(self, type_name: str) -> int:
+        """Number of a type's transitions."""
+        return self._tallies[type_name].seen
+
+    def settled(self, type_name: str) -> bool:
+        """Whether the laws have long been as they are, and never wrong since."""
+        tally = self._tallies[type_name]
+        return tally.wrong == 0 and tally.since >= SETTLED
+
+    def bits(self, type_name: str) -> float:
+        """Description length of a type's transitions with the laws: statements, then exceptions."""
+        if not self.ready(type_name) or self.book.pair is None:
+            return float("inf")
+        stated = self.book.free[type_name].bits + self.book.pair.bits
+        d = len(self.sources[type_name].velocity)
+        return stated + EXCEPTION_BITS * d * self.unexplained(type_name)
+
+    # ------------------------------------------------------------------ learning
+    def learn_one(
+        self,
+        layout: SceneLayout,
+        relations: Relations,
+        vector: NDArray[np.float64],
+        following: NDArray[np.float64],
+        stays: Mapping[int, bool],
+    ) -> bool:
+        """Take up one transition; whether the laws changed.
+
+        Parameters
+        ----------
+        layout, relations, vector
+            The scene, its relations (of this one scene), and its state vector.
+        following
+            The next state vector in the same layout.
+        stays
+            Whether each object (by index) is there in the next scene as well.
+        """
+        cast = self.book.cast(layout)
+        if not cast.movers:
+            return False
+        self._rescale(cast, vector)
+        contacts = Contacts.of(cast, relations, vector[None])
+        motion = self.book.motion(contacts, vector[None], checking=False)
+        after = cast.padded(following[None])[cast.velocities][..., 0]
+        touching = np.flatnonzero(contacts.hits[0])
+        changed = False
+        right = {}
+        for body in cast.movers:
+            if stays[layout.bodies[body]]:
+                right[body] = self._judge(motion, body, after)
+                self._count(cast, body, right[body])
+                if not (cast.first[touching] == body).any() and not (cast.second[touching] == body).any():
+                    changed |= self._learn_free(cast, body, motion, after[:, body], right[body])
+        if changed:
+            self._restate()
+        news = [
+            self._meet(contacts, pair, vector, after, right) for pair in self._single(cast, touching, stays)
+        ]
+        if any(news) or (news and _doubled(self._store.seen, len(news))):
+            changed |= self._derive(sum(news))
+        return changed
+
+    def _judge(self, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
+        value = motion.velocity[:, 0, body]
+        return bool(motion.known[0, body] and (np.abs(value - after[:, body]) <= self.book.tolerance).all())
+
+    def _count(self, cast: Cast, body: int, right: bool) -> None:
+        tally = self._tallies[cast.sources[body][0].type.name]
+        tally.seen += 1
+        tally.since += 1
+        tally.wrong += not right
+
+    def _learn_free(
+        self, cast: Cast, body: int, motion: Motion, after: NDArray[np.float64], right: bool
+    ) -> bool:
+        name = cast.sources[body][0].type.name
+        learner = self._free[name]
+        changed = learner.learn_one(motion.columns[body][:, 0], after, right, self.book.tolerance)
+        if learner.seen in ESTIMATE_AT and self._noise is None:
+            changed |= self._estimate(learner)
+        return changed
+
+    def _single(self, cast: Cast, touching: NDArray[np.intp], stays: Mapping[int, bool]) -> list[int]:
+        """Pairs whose bodies touch nothing else; what a body that never moves touches is all the same."""
+        degree = np.zeros(len(cast.layout.bodies), dtype=np.int64)
+        np.add.at(degree, cast.first[touching], 1)
+        np.add.at(degree, cast.second[touching], 1)
+        found = []
+        for pair in touching.tolist():
+            a, b = int(cast.first[pair]), int(cast.second[pair])
+            alone = degree[a] == 1 and (degree[b] == 1 or not cast.both[pair])
+            if alone and stays[cast.layout.bodies[a]] and stays[cast.layout.bodies[b]]:
+                found.append(pair)
+        return found
+
+    def _meet(
+        self,
+        contacts: Contacts,
+        pair: int,
+        vector: NDArray[np.float64],
+        after: NDArray[np.float64],
+        right: Mapping[int, bool],
+    ) -> bool:
+        """Keep a single contact; whether the laws had it wrong."""
+        cast = contacts.cast
+        a, b = int(cast.first[pair]), int(cast.second[pair])
+        wrong = not right[a] or not right.get(b, True)
+        self._store.add(contacts, pair, vector, after, wrong=wrong)
+        return wrong
+
+    # ------------------------------------------------------------------ deriving
+    def _restate(self) -> None:
+        """A free law changed: what was derived from it is derived again."""
+        self.book.free = {name: f.law for name, f in self._free.items() if f.law is not None}
+        self._settle()
+        if len(self._store):
+            self._derive(len(self._store))
+
+    def _derive(self, news: int) -> bool:
+        """Seek the law of pairs again, if enough contacts are news; whether it changed."""
+        self._news += news
+        if self._news and self._news <= self._stored_wrong // 4:
+            return False
+        encounters = self._store.encounters(self.book)
+        if encounters is None or len(encounters) < FEWEST_CONTACTS:
+            return False
+        self._news = 0
+        found = fit_pair(encounters, rng=self._rng)
+        before = (None if self.book.pair is None else self.book.pair.says(), self.book.shares)
+        self.book.pair = found.law
+        self.book.shares = self._store.shares(self.book)
+        self._stored_wrong = int((~found.explained).sum())
+        changed = before != (found.law.says(), self.book.shares)
+        if changed:
+            self._settle()
+        self.book.forget()
+        return changed
+
+    def _settle(self) -> None:
+        self.book.forget()
+        for tally in self._tallies.values():
+            tally.wrong = tally.since = 0
+
+    # ------------------------------------------------------------------ noise
+    def _rescale(self, cast: Cast, vector: NDArray[np.float64]) -> None:
+        """The tolerance covers the rounding of the largest position and velocity so far."""
+        if self._noise is not None:
+            self.book.tolerance = STDS * self._noise
+            return
+        largest = float(np.abs(vector[self.book.rounded(cast)]).max(initial=0.0))
+        floor = STDS * ROUNDINGS * float(np.finfo(np.float64).eps) * largest
+        self.book.tolerance = max(self.book.tolerance, floor)
+
+    def _estimate(self, learner: FreeLearner) -> bool:
+        """Estimate the noise where the free law holds for few examples only; whether that gave a law."""
+        law = learner.law
+        if law is not None and law.unexplained <= 0.02 * law.examples:
+            return False
+        spread = learner.spread()
+        if STDS * spread <= self.book.tolerance:
+            return False
+        self.book.tolerance = STDS * spread
+        return learner.fit(self.book.tolerance)
+
+    # ------------------------------------------------------------------ saving
+    def to_json(self, *, history: bool) -> dict[str, Any]:
+        """Plain data: the laws; with history all that further learning needs but the examples."""
+        data: dict[str, Any] = {
+            "tolerance": self.book.tolerance,
+            "free": [law.to_json() for _, law in sorted(self.book.free.items())],
+            "pair": None if self.book.pair is None else self.book.pair.to_json(),
+            "shares": [
+                [*kind, s.property, s.power, s.constant] for kind, s in sorted(self.book.shares.items())
+            ],
+            "tallies": [[name, t.seen, t.wrong, t.since] for name, t in sorted(self._tallies.items())],
+            "stored_wrong": self._stored_wrong,
+            "kept": self._kept(),
+        }
+        if history:
+            data |= {
+                "news": self._news,
+                "random": self._rng.bit_generator.state,
+                "store": self._store.to_json(),
+                "learners": [[name, *f.to_json()] for name, f in sorted(self._free.items())],
+            }
+        return data
+
+    def _kept(self) -> list[int]:
+        """Numbers of contacts kept and seen, those of a model that was loaded without them included."""
+        return [len(self._store) or self._lost, self._store.seen]
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """The examples kept."""
+        arrays = {f"contacts.{name}": a for name, a in self._store.to_arrays().items()}
+        for k, (_, learner) in enumerate(sorted(self._free.items())):
+            arrays |= {f"free{k}.{name}": a for name, a in learner.store.to_arrays().items()}
+        return arrays
+
+    def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]] | None) -> None:
+        """Take over what `to_json` and `to_arrays` wrote; without arrays the laws can only predict."""
+        book = self.book
+        book.tolerance = float(data["tolerance"])
+        book.free = {law.type: law for law in map(FreeLaw.from_json, data["free"])}
+        book.pair = None if data["pair"] is None else PairLaw.from_json(data["pair"])
+        book.shares = {(a, b): Share(p, int(k), float(c)) for a, b, p, k, c in data["shares"]}
+        book.forget()
+        self._tallies = {name: _Tally(int(n), int(w), int(s)) for name, n, w, s in data["tallies"]}
+        self._stored_wrong = int(data["stored_wrong"])
+        for name, learner in self._free.items():
+            learner.law = book.free.get(name)
+        if not arrays:
+            self._lost, self._store.seen = (int(n) for n in data["kept"])
+            return
+        self._news = int(data["news"])
+        self._rng.bit_generator.state = data["random"]
+        self._store.restore(data["store"], _part(arrays, "contacts"))
+        for k, (name, *state) in enumerate(data["learners"]):
+            self._free[name].restore(state, _part(arrays, f"free{k}"))
+
+
+def _part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[Any]]:
+    return {name.split(".", 1)[1]: a for name, a in arrays.items() if name.startswith(f"{prefix}.")}
+
+
+def _doubled(seen: int, more: int) -> bool:
+    """Whether the number of contacts has just passed a power of two."""
+    return seen >= 8 and seen.bit_length() != (seen - more).bit_length()

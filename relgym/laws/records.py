@@ -1,0 +1,234 @@
+"""What was learned, as frozen records: pieces, laws of one axis, laws of a pair, free laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from relgym.clustering.mode import sum_text
+from relgym.scene.geometry.vectors import FloatArray
+
+__all__ = ["ONE", "ZERO", "AxisLaw", "FreeLaw", "Kind", "Operator", "PairLaw", "Piece", "Share"]
+
+ONE = "1"
+"""Name of the feature whose weight is a constant term."""
+
+Kind: TypeAlias = tuple[str, str]
+"""Types of the two bodies of a contact: the first one moves."""
+
+Operator: TypeAlias = Literal["max", "min"]
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A linear function of features, ``sum(weight * feature)``; without terms it is 0."""
+
+    terms: tuple[tuple[str, float], ...]
+
+    def values(self, features: Mapping[str, FloatArray], like: FloatArray) -> FloatArray:
+        """The function on arrays of features, of the shape of `like`; summed term by term (bit for bit)."""
+        total = np.zeros(like.shape)
+        for name, weight in self.terms:
+            total = total + (weight if name == ONE else weight * features[name])
+        return total
+
+    def formula(self, digits: int = 7) -> str:
+        """Such as ``u_t - 0.2 J_n``."""
+        constant = sum(weight for name, weight in self.terms if name == ONE)
+        return sum_text([(weight, name) for name, weight in self.terms if name != ONE], constant, digits)
+
+    def free_parameters(self) -> int:
+        """Number of weights that are neither 1 nor -1."""
+        return sum(abs(weight) != 1.0 for _, weight in self.terms)
+
+    def releases(self, free: str) -> bool:
+        """Whether the piece is the free motion as soon as no impulse acts: ``free`` plus impulses."""
+        others = [name for name, _ in self.terms if name != free]
+        return (free, 1.0) in self.terms and all(name.startswith("J_") for name in others)
+
+
+ZERO = Piece(())
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLaw:
+    """The velocity after a contact along one axis of its frame: the maximum or minimum of pieces.
+
+    A continuous function made of two linear pieces *is* their maximum or minimum, so no classifier says
+    which piece holds.
+
+    Attributes
+    ----------
+    pieces
+        One to three of them.
+    operator
+        How they are combined.
+    kinds
+        Kinds of contacts that it was learned from.
+    rivals
+        Other choices of (operator, pieces) that explain every example just as well and as briefly. Where they
+        differ, the law claims nothing.
+    examples, unexplained
+        Of these kinds, among the stored contacts.
+    bits
+        Description length, the unexplained examples included.
+    """
+
+    pieces: tuple[Piece, ...]
+    operator: Operator
+    kinds: tuple[Kind, ...]
+    rivals: tuple[tuple[Operator, tuple[Piece, ...]], ...] = ()
+    examples: int = 0
+    unexplained: int = 0
+    bits: float = 0.0
+
+    def values(self, features: Mapping[str, FloatArray], like: FloatArray) -> FloatArray:
+        """Velocity after the contact along the axis."""
+        return combined(self.operator, [piece.values(features, like) for piece in self.pieces])
+
+    def formula(self, digits: int = 7) -> str:
+        """Such as ``max(u_n, -0.9 v_n)``."""
+        texts = [piece.formula(digits) for piece in self.pieces]
+        return texts[0] if len(texts) == 1 else f"{self.operator}({', '.join(texts)})"
+
+    def trusted(self) -> bool:
+        """Whether it explains nearly all of its own examples: what it doesn't, it must not claim."""
+        return self.unexplained <= 0.02 * self.examples
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back."""
+        return {
+            "pieces": _pieces_to_json(self.pieces),
+            "operator": self.operator,
+            "kinds": [list(kind) for kind in self.kinds],
+            "rivals": [[operator, _pieces_to_json(pieces)] for operator, pieces in self.rivals],
+            "examples": self.examples,
+            "unexplained": self.unexplained,
+            "bits": self.bits,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> AxisLaw:
+        """Read what `to_json` wrote."""
+        return cls(
+            _pieces_from_json(data["pieces"]),
+            data["operator"],
+            tuple((str(a), str(b)) for a, b in data["kinds"]),
+            tuple((operator, _pieces_from_json(pieces)) for operator, pieces in data["rivals"]),
+            int(data["examples"]),
+            int(data["unexplained"]),
+            float(data["bits"]),
+        )
+
+
+def combined(operator: Operator, values: list[FloatArray]) -> FloatArray:
+    """Maximum or minimum of several arrays, element by element."""
+    total = values[0]
+    for each in values[1:]:
+        total = np.maximum(total, each) if operator == "max" else np.minimum(total, each)
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class PairLaw:
+    """What a contact does to the relative velocity of its two bodies.
+
+    Attributes
+    ----------
+    frame
+        Name of the frame (`relgym.laws.frames`) along whose axes the laws are stated.
+    axes
+        For each axis the laws of different kinds of contacts (one law, unless materials differ).
+    bits
+        Description length of all of them.
+    """
+
+    frame: str
+    axes: tuple[tuple[AxisLaw, ...], ...]
+    bits: float
+
+    def law_of(self, axis: int, kind: Kind) -> AxisLaw | None:
+        """The law for a kind of contact; that of all kinds, if they agree, for one never seen."""
+        laws = self.axes[axis]
+        known = next((law for law in laws if kind in law.kinds), None)
+        return laws[0] if known is None and len(laws) == 1 else known
+
+    def says(self) -> tuple[Any, ...]:
+        """What the law states: equal for laws that differ in their numbers of examples only."""
+        laws = [
+            [(law.pieces, law.operator, law.kinds, law.rivals, law.trusted()) for law in a] for a in self.axes
+        ]
+        return self.frame, laws
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back."""
+        axes = [[law.to_json() for law in laws] for laws in self.axes]
+        return {"frame": self.frame, "axes": axes, "bits": self.bits}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> PairLaw:
+        """Read what `to_json` wrote."""
+        axes = tuple(tuple(AxisLaw.from_json(law) for law in laws) for laws in data["axes"])
+        return cls(str(data["frame"]), axes, float(data["bits"]))
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Which part of a contact's impulse changes the first body's velocity; the second one gets the rest.
+
+    Attributes
+    ----------
+    property
+        The share is ``b^power / (a^power + b^power)`` for this property of the two bodies (a mass, say);
+        empty: it is `constant`.
+    """
+
+    property: str = ""
+    power: int = 1
+    constant: float = 0.5
+
+    def formula(self, digits: int = 7) -> str:
+        """Such as ``m_B / (m_A + m_B)``."""
+        if not self.property:
+            return f"{self.constant:.{digits}g}"
+        power = "" if self.power == 1 else f"^{self.power}"
+        a, b = (f"{self.property}_{side}{power}" for side in "AB")
+        return f"{b} / ({a} + {b})"
+
+
+@dataclass(frozen=True, slots=True)
+class FreeLaw:
+    """The next velocity of an object that touches nothing, along each world axis."""
+
+    type: str
+    components: tuple[Piece, ...]
+    examples: int = 0
+    unexplained: int = 0
+    bits: float = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back."""
+        return {
+            "type": self.type,
+            "components": _pieces_to_json(self.components),
+            "examples": self.examples,
+            "unexplained": self.unexplained,
+            "bits": self.bits,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> FreeLaw:
+        """Read what `to_json` wrote."""
+        numbers = (int(data["examples"]), int(data["unexplained"]), float(data["bits"]))
+        return cls(str(data["type"]), _pieces_from_json(data["components"]), *numbers)
+
+
+def _pieces_to_json(pieces: tuple[Piece, ...]) -> list[Any]:
+    return [[[name, weight] for name, weight in piece.terms] for piece in pieces]
+
+
+def _pieces_from_json(data: list[Any]) -> tuple[Piece, ...]:
+    return tuple(Piece(tuple((str(name), float(weight)) for name, weight in terms)) for terms in data)

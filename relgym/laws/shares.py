@@ -1,0 +1,89 @@
+"""How two moving bodies share the impulse of their contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.laws.records import Share
+from relgym.scene.geometry.vectors import FloatArray, dot
+
+__all__ = ["EXTENT", "find_share", "share_values"]
+
+EXTENT = "extent"
+"""Name under which shares speak of a body's size."""
+
+FEWEST = 3
+"""Contacts in which something passed between the bodies that found a share."""
+
+POWERS = (1, 2, 3)
+
+
+def share_values(share: Share, a: Mapping[str, FloatArray], b: Mapping[str, FloatArray]) -> FloatArray:
+    """The first body's share, from the two bodies' properties."""
+    if not share.property:
+        some = next(iter(a.values()))
+        return np.full(some.shape, share.constant)
+    mine, theirs = np.ones(1), np.ones(1)
+    for _ in range(share.power):
+        mine, theirs = mine * a[share.property], theirs * b[share.property]
+    return np.asarray(theirs / (mine + theirs))
+
+
+def find_share(
+    change_a: FloatArray,
+    change: FloatArray,
+    a: Mapping[str, FloatArray],
+    b: Mapping[str, FloatArray],
+    *,
+    alike: bool,
+    tolerance: float,
+) -> Share | None:
+    """The simplest share that explains every contact; None where there is none or too little to tell.
+
+    Parameters
+    ----------
+    change_a, change
+        Change of the first body's and of the relative velocity, shape ``(d, n)``.
+    a, b
+        Properties of the two bodies by name, shape ``(n,)`` each.
+    alike
+        Whether both are of one type: then no number but one half can be meant by position in the pair.
+    tolerance
+        Largest residual of an explained velocity.
+    """
+    size = dot(change, change)
+    told = np.sqrt(size) > 100.0 * tolerance
+    if told.sum() < FEWEST:
+        return None
+    observed = dot(change_a, change)[told] / size[told]
+    for share in _candidates(sorted(set(a) & set(b)), float(np.median(observed)), alike=alike):
+        values = np.broadcast_to(share_values(share, a, b), size.shape)
+        left = np.abs(change_a - values * change).max(axis=0)
+        if _right(left, told, tolerance) and not _trivial(share, a, b, told):
+            return share
+    return None
+
+
+def _right(left: NDArray[np.float64], told: NDArray[np.bool_], tolerance: float) -> bool:
+    return bool((left[told] <= 2.0 * tolerance).mean() >= 0.98)
+
+
+def _trivial(
+    share: Share, a: Mapping[str, FloatArray], b: Mapping[str, FloatArray], told: NDArray[np.bool_]
+) -> bool:
+    """Whether a property says nothing here, since its ratio never varied."""
+    if not share.property:
+        return False
+    ratio = b[share.property][told] / a[share.property][told]
+    return bool(np.ptp(ratio) <= 1e-9 * np.abs(ratio).max())
+
+
+def _candidates(names: list[str], median: float, *, alike: bool) -> list[Share]:
+    found = [Share(constant=0.5)]
+    found += [Share(name, power) for power in POWERS for name in names]
+    if not alike:
+        found.append(Share(constant=median))
+    return found

@@ -1,0 +1,84 @@
+"""A bounded memory of examples, from which laws are derived again when what they rest on is revised."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Store"]
+
+
+class Store:
+    """At most `limit` rows; when it is full, a row of the most crowded cell makes room.
+
+    So the examples that once were news stay, whatever comes in between.
+
+    Parameters
+    ----------
+    width
+        Numbers in a row.
+    limit
+        Most rows kept.
+    seed
+        Seed of the choice of rows that make room.
+    """
+
+    def __init__(self, width: int, limit: int, *, seed: int) -> None:
+        self.limit = limit
+        self.seen = 0
+        self._rows = np.zeros((64, width))
+        self._cells = np.zeros(64, dtype=np.int64)
+        self._size = 0
+        self._rng = np.random.default_rng([seed, 2])
+
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """The rows kept, shape ``(n, width)``."""
+        return self._rows[: self._size]
+
+    def add(self, row: NDArray[np.float64], *, cell: int) -> None:
+        """Keep a row in a cell."""
+        self.seen += 1
+        if self._size < self.limit:
+            if self._size == len(self._rows):
+                room = min(self.limit, 2 * self._size) - self._size
+                self._rows = np.pad(self._rows, ((0, room), (0, 0)))
+                self._cells = np.pad(self._cells, (0, room))
+            place, self._size = self._size, self._size + 1
+        else:
+            found = self._make_room(cell)
+            if found is None:
+                return
+            place = found
+        self._rows[place], self._cells[place] = row, cell
+
+    def _make_room(self, cell: int) -> int | None:
+        """Place of a row to replace; None where the new row's own cell is crowded and it isn't drawn."""
+        numbers, counts = np.unique(self._cells[: self._size], return_counts=True)
+        crowded = int(numbers[counts.argmax()])
+        members = np.flatnonzero(self._cells[: self._size] == crowded)
+        # A reservoir within the crowded cell: later rows come in ever more rarely.
+        if cell == crowded and self._rng.random() > len(members) / self.seen:
+            return None
+        return int(self._rng.choice(members))
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything but the rows."""
+        return {"seen": self.seen, "random": self._rng.bit_generator.state}
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """The rows and their cells."""
+        return {"rows": self.rows, "cells": self._cells[: self._size]}
+
+    def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take over what `to_json` and `to_arrays` wrote."""
+        self.seen = int(data["seen"])
+        self._rng.bit_generator.state = data["random"]
+        self._rows = np.array(arrays["rows"], dtype=np.float64)
+        self._cells = np.array(arrays["cells"], dtype=np.int64)
+        self._size = len(self._rows)
+        if not self._size:
+            self._rows, self._cells = np.zeros((64, self._rows.shape[1])), np.zeros(64, dtype=np.int64)

@@ -1,0 +1,155 @@
+"""Which bodies touch which, in a batch of scenes: what the laws act on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.laws.columns import Sources
+from relgym.laws.frames import Bearings
+from relgym.laws.records import Kind
+from relgym.scene.axes import Axes
+from relgym.scene.contacts import velocity_columns
+from relgym.scene.geometry.vectors import FloatArray, norm
+from relgym.scene.objects import SceneLayout, SceneSchema, poses
+from relgym.scene.relations import Relations
+
+__all__ = ["Cast", "Contacts", "Group"]
+
+
+@dataclass(frozen=True)
+class Cast:
+    """What a layout means for the laws: who moves, and which pairs may meet.
+
+    Attributes
+    ----------
+    axes
+        The schema's axes.
+    layout
+        The layout.
+    movers
+        Body numbers of objects whose velocity is learned.
+    sources
+        Columns of each mover, by body number, and where they lie.
+    first, second
+        Bodies of every pair that may meet: the first one moves, shape ``(P,)``.
+    kinds
+        Types of each pair.
+    both
+        Whether the second one moves too, shape ``(P,)``.
+    velocities
+        Column of every body's velocity along the axes in use, shape ``(d, K)``; of a 0 where it has none.
+    """
+
+    axes: Axes
+    layout: SceneLayout
+    movers: tuple[int, ...]
+    sources: Mapping[int, tuple[Sources, NDArray[np.intp]]]
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    kinds: tuple[Kind, ...]
+    both: NDArray[np.bool_]
+    velocities: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, schema: SceneSchema, layout: SceneLayout, sources: Mapping[str, Sources]) -> Cast:
+        """Work out the cast of a layout; `sources` are those of the types whose velocity is learned."""
+        axes = Axes.of(schema)
+        types = [layout.types[i] for i in layout.bodies]
+        movers = tuple(k for k, t in enumerate(types) if t.name in sources)
+        pairs = []
+        for a in movers:
+            for b, t in enumerate(types):
+                # A pair of movers counts once, in an order that no body's number decides between types.
+                if a != b and (b not in movers or (types[a].name, a) < (t.name, b)):
+                    pairs.append((a, b))
+        first, second = (np.array([p[k] for p in pairs], dtype=np.intp) for k in (0, 1))
+        columns = velocity_columns(layout, axes)
+        return cls(
+            axes,
+            layout,
+            movers,
+            {
+                k: (sources[types[k].name], sources[types[k].name].places(layout, layout.bodies[k]))
+                for k in movers
+            },
+            first,
+            second,
+            tuple((types[a].name, types[b].name) for a, b in pairs),
+            np.isin(second, np.array(movers, dtype=np.intp)),
+            np.where(columns < 0, layout.width + 1, columns),
+        )
+
+    def padded(self, vectors: NDArray[np.float64]) -> FloatArray:
+        """State vectors, columns first, with NaN and 0 behind them, shape ``(width + 2, n)``."""
+        n = len(vectors)
+        return np.concatenate([vectors.T, np.full((1, n), np.nan), np.zeros((1, n))])
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Scenes with equally many contacts.
+
+    Attributes
+    ----------
+    scenes
+        Their numbers in the batch, shape ``(m,)``.
+    pairs
+        Number of each contact's pair in the cast, shape ``(m, c)``.
+    bearings
+        Directions at the contacts, shape ``(d, m, c)``.
+    """
+
+    scenes: NDArray[np.intp]
+    pairs: NDArray[np.intp]
+    bearings: Bearings
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """Contacts of a batch of scenes.
+
+    Attributes
+    ----------
+    hits
+        Which pairs of the cast touch, shape ``(n, P)``.
+    """
+
+    cast: Cast
+    relations: Relations
+    pose: NDArray[np.float64]
+    hits: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, cast: Cast, relations: Relations, vectors: NDArray[np.float64]) -> Contacts:
+        """Find the contacts of n scenes."""
+        touch = relations.relation("intersect")
+        return cls(cast, relations, poses(cast.layout, vectors), touch[:, cast.first, cast.second])
+
+    def groups(self) -> Iterator[Group]:
+        """Scenes by their number of contacts, those without any left out."""
+        counts = self.hits.sum(axis=1)
+        for count in np.unique(counts[counts > 0]).tolist():
+            scenes = np.flatnonzero(counts == count)
+            pairs = np.nonzero(self.hits[scenes])[1].reshape(len(scenes), count)
+            yield Group(scenes, pairs, self.bearings(scenes[:, None], pairs))
+
+    def bearings(self, scenes: NDArray[np.intp], pairs: NDArray[np.intp]) -> Bearings:
+        """Directions at contacts; the arguments have a common shape after broadcasting."""
+        a, b = self.cast.first[pairs], self.cast.second[pairs]
+        used = list(self.cast.axes.used)
+        pose_a, pose_b = self.pose[scenes, a], self.pose[scenes, b]
+        between = np.moveaxis(pose_a[..., used] - pose_b[..., used], -1, 0)
+        length = norm(between)
+        angles = np.moveaxis(pose_a[..., 3:6], -1, 0)
+        if self.cast.axes.planar:
+            angles = np.repeat(self.cast.axes.turn * angles[self.cast.axes.depth][None], 3, axis=0)
+        normals = np.empty(between.shape)
+        for body in np.unique(a).tolist():
+            part = a == body
+            rows = np.broadcast_to(scenes, a.shape)[part]
+            normals[:, part] = self.relations.normals(body)[rows, b[part]].T
+        return Bearings(normals, between / np.where(length > 0.0, length, 1.0), angles)

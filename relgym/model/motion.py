@@ -1,0 +1,205 @@
+"""Laws of motion beside the property models: which types they govern, and what they say of each target."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.config import ModelConfig
+from relgym.laws.account import accounts
+from relgym.laws.book import Motion
+from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
+from relgym.laws.learner import LawLearner
+from relgym.laws.touching import Contacts
+from relgym.model.perception import Percept
+from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.model.property_model import PropertyModel, Verdict
+from relgym.scene.objects import ACTION, SceneSchema, Target
+
+__all__ = ["FREE", "TOUCHING", "Laws", "mode_bits"]
+
+FREE, TOUCHING = 1, 2
+"""What predictions by laws name in place of a mode: the free law, or laws of touching pairs on top of it."""
+
+WEIGH_EVERY = 50
+"""Laws and modes are weighed against each other after so many transitions, and whenever the laws change."""
+
+_PREDICTED, _OUTSIDE = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.OUTSIDE)
+
+
+class Laws:
+    """The laws of a world model, in force for those types that they describe in fewer bits than modes do.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    targets
+        The model's targets; None: everything that may turn out to change.
+    config
+        Free parameters.
+
+    Attributes
+    ----------
+    learner
+        Learns the laws.
+    governed
+        Names of the types whose velocity the laws predict at present.
+    """
+
+    def __init__(self, schema: SceneSchema, targets: tuple[Target, ...] | None, config: ModelConfig) -> None:
+        noise = config.clustering.noise_std
+        known = _possible(schema) if targets is None else targets
+        self.learner = LawLearner(schema, known, seed=config.seed, noise_std=noise)
+        self.governed: frozenset[str] = frozenset()
+        self._components = {
+            (name, prop): k for name, s in self.learner.sources.items() for k, prop in enumerate(s.velocity)
+        }
+        self._columns = max(2, sum(len(schema.type(t).properties) for _, t in schema.objects))
+        self._seen = 0
+
+    def governs(self, target: Target) -> bool:
+        """Whether the laws predict a target."""
+        return target.type in self.governed and (target.type, target.property) in self._components
+
+    def suffice(self, type_name: str, targets: Sequence[Target]) -> bool:
+        """Whether the laws predict all targets of a type and have long been right: its modes may rest.
+
+        Modes rest until the laws are wrong for the first time, and go on learning then.
+        """
+        own = [t for t in targets if t.type == type_name]
+        return all(self.governs(t) for t in own) and self.learner.settled(type_name)
+
+    # ------------------------------------------------------------------ learning
+    def learn_one(
+        self,
+        percept: Percept,
+        following: NDArray[np.float64],
+        stays: Mapping[int, bool],
+        models: Mapping[Target, PropertyModel],
+    ) -> None:
+        """Take up one transition, then weigh laws against modes if that is due."""
+        if not self.learner.sources:
+            return
+        self._seen += 1
+        changed = self.learner.learn_one(
+            percept.layout, percept.relations, percept.vectors[0], following, stays
+        )
+        if changed or self._seen % WEIGH_EVERY == 0:
+            self.governed = frozenset(name for name in self.learner.types if self._shorter(name, models))
+
+    def _shorter(self, type_name: str, models: Mapping[Target, PropertyModel]) -> bool:
+        """Whether a type's motion takes fewer bits by laws than by modes of every component."""
+        if not self.learner.ready(type_name):
+            return False
+        parts = [
+            part
+            for t, part in models.items()
+            if t.type == type_name and (t.type, t.property) in self._components
+        ]
+        if len(parts) < len(self.learner.sources[type_name].velocity):
+            return False
+        return self.learner.bits(type_name) < sum(mode_bits(part, self._columns) for part in parts)
+
+    # ------------------------------------------------------------------ prediction
+    def speak(self, percept: Percept) -> Motion | None:
+        """What the laws say of a batch of scenes; None where they govern nothing."""
+        if not self.governed:
+            return None
+        cast = self.learner.book.cast(percept.layout)
+        contacts = Contacts.of(cast, percept.relations, percept.vectors)
+        return self.learner.book.motion(contacts, percept.vectors)
+
+    def verdict(self, motion: Motion, percept: Percept, index: int, target: Target) -> Verdict:
+        """What the laws say of one target of an object in n scenes."""
+        body = percept.layout.bodies.index(index)
+        known = motion.known[:, body]
+        value = motion.velocity[self._components[target.type, target.property], :, body]
+        modes = np.where(known, np.where(motion.touched[:, body], TOUCHING, FREE), 0)
+        return Verdict(
+            np.where(known, value, np.nan),
+            modes.astype(np.int64),
+            np.where(known, _PREDICTED, _OUTSIDE).astype(np.int8),
+            np.where(known, np.inf, 0.0),
+        )
+
+    def prediction(self, motion: Motion, percept: Percept, index: int, target: Target) -> Prediction:
+        """`verdict` for a single scene, with the objects that are touched as roles."""
+        verdict = self.verdict(motion, percept, index, target)
+        layout, mode = percept.layout, int(verdict.modes[0])
+        roles: tuple[str, ...] = ()
+        if mode:
+            body = layout.bodies.index(index)
+            touched = percept.relations.relation("intersect")[0, body].nonzero()[0]
+            roles = (layout.names[index], *(layout.names[layout.bodies[k]] for k in touched.tolist()))
+        pair = self.learner.book.pair
+        frame = pair.frame if mode == TOUCHING and pair is not None else "world"
+        outcome = OUTCOMES[int(verdict.outcomes[0])]
+        margin = float(verdict.margins[0])
+        return Prediction("", "", float(verdict.values[0]), outcome, mode, roles, margin, frame)
+
+    def lines(self, percept: Percept, index: int, digits: int) -> tuple[str, ...]:
+        """What the laws say of an object of a single scene, for people: the free law, then each contact."""
+        layout, book = percept.layout, self.learner.book
+        name = layout.types[index].name
+        free = book.free.get(name)
+        if free is None:
+            return ()
+        pairs = zip(self.learner.sources[name].velocity, free.components, strict=True)
+        first = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
+        contacts = Contacts.of(book.cast(layout), percept.relations, percept.vectors)
+        told = [
+            a for a in accounts(book, contacts, percept.vectors, digits) if layout.names[index] in a.objects
+        ]
+        head = f"free: {first}" if told else f"{first}, since it touches nothing"
+        return (head, *(line for account in told for line in str(account).split("\n")))
+
+    # ------------------------------------------------------------------ saving
+    def to_json(self, *, history: bool) -> dict[str, Any]:
+        """Plain data that `restore` reads back."""
+        laws = self.learner.to_json(history=history)
+        return {"laws": laws, "governed": sorted(self.governed), "seen": self._seen}
+
+    def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]] | None) -> None:
+        """Take over what `to_json` and the learner's `to_arrays` wrote."""
+        self.learner.restore(data["laws"], arrays)
+        self.governed = frozenset(str(name) for name in data["governed"])
+        self._seen = int(data["seen"])
+
+
+def mode_bits(part: PropertyModel, columns: int) -> float:
+    """Description length of a target's examples by modes: functions, which mode holds when, and noise.
+
+    Parameters
+    ----------
+    part
+        The target's model.
+    columns
+        Number of columns that a function may use.
+    """
+    noise = part.clusterer.noise_examples
+    counts = [mode.examples for mode in part.modes]
+    n = max(2, sum(counts) + noise)
+    constant = CONSTANT_BITS + 0.5 * math.log2(n)
+    stated = 0.0
+    for mode in part.modes:
+        weights = [weight for role in mode.roles for _, weight in role.terms]
+        stated += 1.0 + len(weights) * math.log2(columns)
+        stated += constant * (sum(abs(w) != 1.0 for w in weights) + (mode.intercept != 0.0))
+    labels = sum(-c * math.log2(c / n) for c in (*counts, noise) if c)
+    return stated + labels + EXCEPTION_BITS * noise
+
+
+def _possible(schema: SceneSchema) -> tuple[Target, ...]:
+    """Everything that may become a target when a model finds its targets itself."""
+    derived = {(k.type, k.property) for k in schema.kinematics}
+    return tuple(
+        Target(t.name, prop)
+        for t in schema.types
+        for prop in t.properties
+        if t.name != ACTION and prop not in t.exogenous and (t.name, prop) not in derived
+    )
