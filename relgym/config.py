@@ -237,7 +237,8 @@ class ModelConfig:
         instead of being predicted. Default true; false: the votes decide there as everywhere.
     work_per_step
         Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
-        literals examined). Default 400,000, some 50 ms. Raising it makes rules fresher and single steps slower.
+        literals examined). Default 400,000, some 20 ms; a search once begun is finished, whatever it costs.
+        Raising it makes rules fresher and single steps slower.
     frames
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from relgym.logic.csp import matches
 from relgym.logic.foil import FoilConfig, learn, learn_both
 from relgym.numeric.tree import DecisionTree, learn_tree
 
-__all__ = ["Lesson", "foil_config", "learn_pair"]
+__all__ = ["Draft", "Lesson", "foil_config", "learn_pair"]
 
 _SHORT: Final = 3  # a faultless definition of so few literals isn't challenged by the other context
 _BITS: Final = 1e-9  # description lengths closer than this are equal
@@ -80,27 +80,61 @@ def foil_config(config: ClassificationConfig) -> FoilConfig:
 def learn_pair(
     i: int, j: int, lesson: Lesson, scope: Scope, config: ClassificationConfig
 ) -> BinaryClassifier:
-    """Learn to tell mode `i` from mode `j`.
+    """Learn to tell mode `i` from mode `j`; see `Draft`, which does it piece by piece."""
+    draft = Draft()
+    while (found := draft.advance(i, j, lesson, scope, config)) is None:
+        pass
+    return found
 
-    With examples of one mode only there is nothing to tell: the result has no clause and votes for that mode.
+
+@dataclass(slots=True)
+class Draft:
+    """A pair that is being learned, one context at a time, so that a single time step can't cost much.
+
+    Parameters
+    ----------
+    definitions
+        What was found so far, by context.
+    work
+        Work spent so far, in FOIL's units.
     """
-    if not all(lesson.counts):
-        return majority(i, j, scope, lesson.counts)
-    taught = lesson.balanced(config.class_balance)
-    contexts: Sequence[Context] = ("touching", "all") if config.context == "auto" else (config.context,)
-    best: tuple[Context, Definition] | None = None
-    work = 0
-    for context in contexts:
-        found = _define(taught, context, scope, config)
-        work += found.work
-        if best is None or found.bits < best[1].bits - _BITS:  # ties: touching
-            best = context, found
-        if found.errors == 0 and sum(map(len, found.clauses)) <= _SHORT:
-            break
-    assert best is not None
-    classifier = _with_trees(BinaryClassifier(i, j, scope, *best, work=work), taught, config)
-    classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
-    return classifier
+
+    definitions: dict[Context, Definition] = field(default_factory=dict)
+    work: int = 0
+
+    def advance(
+        self, i: int, j: int, lesson: Lesson, scope: Scope, config: ClassificationConfig
+    ) -> BinaryClassifier | None:
+        """Learn in the next context; the classifier of modes `i` and `j` when that was the last one.
+
+        With examples of one mode only there is nothing to tell: the result has no clause and votes for that mode.
+        """
+        if not all(lesson.counts):
+            return majority(i, j, scope, lesson.counts)
+        taught = lesson.balanced(config.class_balance)
+        contexts: Sequence[Context] = ("touching", "all") if config.context == "auto" else (config.context,)
+        context = next(each for each in contexts if each not in self.definitions)
+        found = self.definitions[context] = _define(taught, context, scope, config)
+        self.work += found.work
+        simple = found.errors == 0 and sum(map(len, found.clauses)) <= _SHORT
+        if len(self.definitions) < len(contexts) and not simple:
+            return None
+        least = min(each.bits for each in self.definitions.values())
+        best = next(
+            each for each in self.definitions.items() if each[1].bits <= least + _BITS
+        )  # ties: touching
+        classifier = _with_trees(BinaryClassifier(i, j, scope, *best, work=self.work), taught, config)
+        classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
+        return classifier
+
+    def to_list(self) -> list[list[Any]]:
+        """Plain data; the work isn't kept."""
+        return [[context, definition.to_dict()] for context, definition in self.definitions.items()]
+
+    @classmethod
+    def from_list(cls, data: list[list[Any]]) -> Draft:
+        """Inverse of `to_list`."""
+        return cls({context: Definition.from_dict(plain) for context, plain in data})
 
 
 def _define(lesson: Lesson, context: Context, scope: Scope, config: ClassificationConfig) -> Definition:

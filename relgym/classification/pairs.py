@@ -10,7 +10,7 @@ import numpy as np
 from relgym.classification.binary import BinaryClassifier, majority
 from relgym.classification.examples import NOISE
 from relgym.classification.exemplars import Exemplars
-from relgym.classification.learning import Lesson, learn_pair
+from relgym.classification.learning import Draft, Lesson
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
@@ -41,6 +41,8 @@ class PairState:
         Whether it was mended since it was learned.
     stale
         Whether it waits to be learned anew.
+    draft
+        What has been learned anew so far, if that was begun.
     """
 
     classifier: BinaryClassifier
@@ -50,6 +52,7 @@ class PairState:
     contradictions: float = 0.0
     mended: bool = False
     stale: bool = False
+    draft: Draft | None = None
 
     @classmethod
     def new(cls, i: int, j: int, scope: Scope, lesson: Lesson) -> PairState:
@@ -63,9 +66,9 @@ class PairState:
         return self.classifier.i, self.classifier.j
 
     @property
-    def urgency(self) -> tuple[float, float, tuple[int, int]]:
-        """Sorting key: the most contradicted first, then the one with most examples of its rarer mode."""
-        return -self.contradictions, -min(self.seen), self.modes
+    def urgency(self) -> tuple[bool, float, float, tuple[int, int]]:
+        """Sorting key: those begun, the most contradicted, those with most examples of their rarer mode."""
+        return self.draft is None, -self.contradictions, -min(self.seen), self.modes
 
     def observe(self, outcome: int, is_i: bool, growth: float) -> bool:
         """Count one more example; whether it contradicts the classifier."""
@@ -86,33 +89,47 @@ class PairState:
 
     def check(self, lesson: Lesson) -> None:
         """Count everything anew after examples changed labels; stale if the errors became more."""
-        self.seen = list(lesson.counts)
+        self.seen, self.draft = list(lesson.counts), None
         errors = self.classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
         self.contradictions = max(self.contradictions, errors - self.errors)
         self.stale = self.stale or errors > self.errors or (self.unlearned and min(self.seen) > 0)
 
     def refresh(self, lesson: Lesson, config: ClassificationConfig) -> int:
-        """Mend the classifier or learn it anew; the work spent."""
-        found, work = None, 0
-        grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
-        if config.repair and not grown:
-            found = mend(self.classifier, lesson, self.errors, config)
-            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses))
-        self.mended = found is not None
-        if found is None:
-            found = learn_pair(*self.modes, lesson, self.classifier.scope, config)
+        """One step of mending the classifier or learning it anew; the work spent. Not `stale`: done."""
+        if self.draft is None:
+            self.draft = Draft()
+            grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
+            if config.repair and not grown and all(lesson.counts):
+                work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses))
+                mended = mend(self.classifier, lesson, self.errors, config)
+                if mended is not None:
+                    self._adopt(mended, lesson, mended=True)
+                    work += mended.work
+                return work
+        before = self.draft.work
+        found = self.draft.advance(*self.modes, lesson, self.classifier.scope, config)
+        work = self.draft.work - before + len(lesson.rows)
+        if found is not None:
             self.learned = lesson.counts
             right = np.array(found.for_i)[found.decide_batch(lesson.view, lesson.rows)] == lesson.is_i
             self.errors = float(lesson.weights[~right].sum())
-        self.classifier, self.seen = found, list(lesson.counts)
-        self.contradictions, self.stale = 0.0, False
-        return work + found.work
+            self._adopt(found, lesson, mended=False)
+        return work
+
+    def _adopt(self, found: BinaryClassifier, lesson: Lesson, *, mended: bool) -> None:
+        self.classifier, self.seen, self.mended = found, list(lesson.counts), mended
+        self.contradictions, self.stale, self.draft = 0.0, False, None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON-able dictionary."""
         names = ("seen", "errors", "contradictions", "mended", "stale")
         plain = {name: getattr(self, name) for name in names}
-        return plain | {"learned": list(self.learned), "classifier": self.classifier.to_dict()}
+        draft = None if self.draft is None else self.draft.to_list()
+        return plain | {
+            "learned": list(self.learned),
+            "classifier": self.classifier.to_dict(),
+            "draft": draft,
+        }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], scope: Scope) -> PairState:
@@ -120,8 +137,10 @@ class PairState:
         names = ("seen", "errors", "contradictions", "mended", "stale")
         plain = {name: data[name] for name in names}
         plain["seen"] = list(plain["seen"])
+        draft = None if data["draft"] is None else Draft.from_list(data["draft"])
         first, second = data["learned"]
-        return cls(BinaryClassifier.from_dict(data["classifier"], scope), learned=(first, second), **plain)
+        classifier = BinaryClassifier.from_dict(data["classifier"], scope)
+        return cls(classifier, learned=(first, second), draft=draft, **plain)
 
 
 def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, keep: bool) -> Lesson:

@@ -14,6 +14,9 @@ from typing import Any, Final
 
 from relgym.experiments.accuracy import AXES, Outcome, accuracy, ball_bars
 from relgym.experiments.bar import Measure, report
+from relgym.experiments.cost import query_bars, query_cost, step_bars, step_cost
+from relgym.experiments.data import ball_blocks
+from relgym.experiments.online import learned
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 
 __all__ = ["main"]
@@ -40,10 +43,10 @@ def _ball(experiment: int) -> Callable[[Request], tuple[str, list[Measure], list
 
 def _lines(outcome: Outcome) -> list[str]:
     lines = [f"training seed {outcome.seed}:"]
-    for axis, target in outcome.targets.items():
-        lines.append(f"  {axis}: {len(target.stated)} analytic modes, noise {target.noise:.3%}")
-        lines += [f"     missing:  {name}" for name in target.missing]
-        lines += [f"     spurious: {formula}" for formula in target.spurious]
+    for axis, known in outcome.targets.items():
+        lines.append(f"  {axis}: {len(known.stated)} analytic modes, noise {known.noise:.3%}")
+        lines += [f"     missing:  {name}" for name in known.missing]
+        lines += [f"     spurious: {formula}" for formula in known.spurious]
     for test, evaluation in outcome.evaluations.items():
         for axis, target in AXES.items():
             errors = evaluation[target]
@@ -60,7 +63,22 @@ def _lines(outcome: Outcome) -> list[str]:
     return lines
 
 
-ROWS: Final = {1: _ball(1), 2: _ball(2), 3: _ball(3)}
+def _steps(request: Request) -> tuple[str, list[Measure], list[str]]:
+    runs = [step_cost(ball_blocks(1, seed=seed)) for seed in request.training]
+    notes = [
+        f"total {run.total:.1f} s, of which resets {run.resets:.2f} s; the engine alone {run.engine:.2f} s"
+        for run in runs
+    ]
+    return "cost per transition, experiment 1", step_bars(runs), notes
+
+
+def _queries(request: Request) -> tuple[str, list[Measure], list[str]]:
+    model = learned(ball_blocks(1, seed=request.training[0]))
+    costs = [query_cost(model, list(ball_blocks(1, seed=test, test=True))) for test in request.tests]
+    return "cost per query, experiment 1", query_bars(costs), []
+
+
+ROWS: Final = {1: _ball(1), 2: _ball(2), 3: _ball(3), 7: _steps, 8: _queries}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -153,6 +153,22 @@ def test_budget_is_spent_on_the_most_contradicted_pair_first() -> None:
     assert classifier.stale == ()
 
 
+def test_a_pair_learned_in_pieces_is_the_pair_learned_at_once() -> None:
+    whole, pieces = _empty(), _empty()
+    for item in ball_stream(600, rng=np.random.default_rng(3)):
+        for classifier in (whole, pieces):
+            classifier.observe(item.example, item.mode, item.fits, item.values)
+    whole.refresh()
+    begun = 0
+    while pieces.stale:
+        assert pieces.refresh(budget=1) > 0
+        plain = json.loads(json.dumps(pieces.to_dict()))
+        begun += any(pair["draft"] for pair in plain["pairs"])
+        pieces = ModeClassifier.from_dict(plain, pieces.config)  # a file may be written between two pieces
+    assert begun
+    assert pieces.to_dict() == whole.to_dict()
+
+
 def test_a_mode_found_in_noise_is_learned_and_a_lost_one_forgotten(stream: list[Labelled]) -> None:
     items = [item for item in stream if item.mode in (FLY, BOUNCE)][:500]
     classifier = ModeClassifier(BALL_VOCABULARY, ClassificationConfig())

@@ -25,7 +25,8 @@ def test_lessons_are_the_thesis_data() -> None:
 
 def test_what_the_wrapper_sees_are_the_blocks_own_transitions() -> None:
     ball = demonstrations(quick=True)[1]
-    blocks, env, taught = list(ball.training(5))[:2], ball.make(), WorldModel(ball.make().model.schema)
+    blocks, env = list(ball.training(5))[:2], ball.make()
+    taught = WorldModel(env.model.schema, env.model.config)
     lesson = learn_online(env, ball, seed=5)
     for block in blocks:
         next(lesson)
