@@ -14,7 +14,7 @@ from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
 
-__all__ = ["STRAY", "RolloutErrors", "imagined", "rollouts"]
+__all__ = ["STRAY", "RolloutErrors", "imagined", "largest_errors", "rollouts"]
 
 STRAY = 1e-2
 """A roll-out has failed when a position is off by more than this at some step, in units."""
@@ -90,6 +90,16 @@ def rollouts(model: WorldModel, blocks: Sequence[Block]) -> RolloutErrors:
         corner=int(corner.sum()),
         median=median,
     )
+
+
+def largest_errors(model: WorldModel, blocks: Sequence[Block]) -> NDArray[np.float64]:
+    """Largest position error of each block's roll-out, in units; infinite where it stopped early."""
+    errors = []
+    for _, group in groupby(blocks, key=lambda block: block.layout.names):
+        part = list(group)
+        off, early = _roll(model, np.stack([b.vectors for b in part]), part[0].layout)
+        errors.append(np.where(early, np.inf, off))
+    return np.concatenate(errors)
 
 
 def imagined(model: WorldModel, vectors: Float2D, layout: SceneLayout) -> tuple[Float2D, int]:
