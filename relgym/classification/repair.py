@@ -20,6 +20,7 @@ from relgym.logic.clause import ANY, Clause, Definition
 from relgym.logic.csp import matches
 from relgym.logic.facts import Facts
 from relgym.logic.foil import learn
+from relgym.logic.thresholds import rounding
 
 __all__ = ["mend"]
 
@@ -130,7 +131,7 @@ def _best_threshold(values: Floats, positive: Bools, weights: Floats, at_most: b
     """Threshold with the fewest errors, in the widest such gap; none if there is no gap at all."""
     order = np.argsort(values, kind="stable")
     values, signs = values[order], np.where(positive[order] == at_most, weights[order], -weights[order])
-    cuts = np.flatnonzero(values[:-1] < values[1:])
+    cuts = np.flatnonzero(np.diff(values) > rounding(values))
     if not len(cuts):
         return None
     right = np.cumsum(signs)[cuts]  # weight that a cut puts on its right side, up to a constant

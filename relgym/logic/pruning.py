@@ -10,7 +10,7 @@ import numpy as np
 from relgym.logic.batch import extremes, matches
 from relgym.logic.clause import Clause, Coverage, Literal
 from relgym.logic.facts import Bool, Facts, Float, Int
-from relgym.logic.thresholds import simplest_between
+from relgym.logic.thresholds import rounding, simplest_between
 
 __all__ = ["Problem", "center_thresholds", "prune"]
 
@@ -116,7 +116,9 @@ def _widest_cut(values: Float, inside: Bool, problem: Problem, below: bool) -> t
     now = problem.count(inside & np.isfinite(values))
     gaps = np.abs(np.diff(values[order]))
     slack = 1e-9 * (1.0 + now.total)
-    allowed = (gaps > 0) & (good >= now.positives - slack) & (bad <= now.negatives + slack)
+    allowed = (
+        (gaps > rounding(values[order])) & (good >= now.positives - slack) & (bad <= now.negatives + slack)
+    )
     if not allowed.any():
         return None
     best = np.where(allowed, good - bad, -np.inf).max() - slack

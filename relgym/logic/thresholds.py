@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 
 from relgym.logic.facts import Float, Int
 
-__all__ = ["Bins", "bin_values", "simplest_between"]
+__all__ = ["Bins", "bin_values", "rounding", "simplest_between"]
 
 _MAX_BINS: Final = 128
 """Finest histogram; where classes alternate more often, cuts are taken at every m-th boundary."""
+
+
+_ROUNDING: Final = 1e-10
+"""Values that differ by less, relative to the greatest of them, are the same number, computed in two ways."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,16 +81,25 @@ def _bin_one(values: Float, positive: NDArray[np.bool_]) -> tuple[Int, Float, Fl
     if not defined.size:
         return bins, np.empty(0), np.empty(0)
     distinct, place = np.unique(values[defined], return_inverse=True)
-    good = np.bincount(place, positive[defined], len(distinct)) > 0
-    bad = np.bincount(place, ~positive[defined], len(distinct)) > 0
+    groups = np.concatenate([[0], np.cumsum(np.diff(distinct) > rounding(distinct))])
+    ends = np.flatnonzero(np.diff(groups, append=groups[-1] + 1))  # no threshold between a number and itself
+    starts_at, place = np.concatenate([[0], ends[:-1] + 1]), groups[place]
+    lowest, highest, count = distinct[starts_at], distinct[ends], len(ends)
+    good = np.bincount(place, positive[defined], count) > 0
+    bad = np.bincount(place, ~positive[defined], count) > 0
     kind = good + 2 * bad  # 1: positives only, 2: negatives only, 3: both have this value
     starts = np.flatnonzero((kind[1:] != kind[:-1]) | (kind[1:] == 3)) + 1
     if len(starts) >= _MAX_BINS:
         starts = starts[np.linspace(0, len(starts) - 1, _MAX_BINS - 1).round().astype(np.int64)]
     bins[defined] = np.searchsorted(starts, place, side="right")
     first = np.concatenate([[0], starts])
-    last = np.concatenate([starts, [len(distinct)]]) - 1
-    return bins, distinct[first], distinct[last]
+    last = np.concatenate([starts, [count]]) - 1
+    return bins, lowest[first], highest[last]
+
+
+def rounding(values: Float) -> float:
+    """Return the difference up to which two of some finite values count as equal."""
+    return _ROUNDING * float(np.abs(values).max(initial=0.0))
 
 
 def simplest_between(low: float, high: float) -> float:

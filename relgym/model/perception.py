@@ -98,7 +98,7 @@ class Perception:
         binary = tuple(self.extractor.names)
         taken = {*binary, *self._unary_names, *own}
         pair = [*self._contact_names, *(f"other-{p}" if p in taken else p for p in self._pair_names)]
-        contact = frozenset({*self._contact_names, "approaching"})
+        contact = frozenset({*self._contact_names, "approaching", "approaching-fastest"})
         return Vocabulary(binary, self._unary_names, tuple(pair), tuple(own), contact)
 
     def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:

@@ -24,6 +24,7 @@ _Float1D: TypeAlias = NDArray[np.float64]
 _Float2D: TypeAlias = NDArray[np.float64]
 
 _LEAF = -1
+_ROUNDING = 1e-10  # values that differ by less, relative to the greatest, are equal
 _TIE = 1e-9  # entropies (bits per example) closer than this are equal: the wider gap decides
 
 
@@ -262,7 +263,8 @@ class _Grower:
         hits = np.where(self.positive[rows][order], weights, 0.0)
         finite = int(np.isfinite(values).sum())
         last = np.arange(self.min_leaf - 1, min(finite, len(rows) - self.min_leaf + 1) - 1)
-        last = last[values[last] < values[last + 1]] if len(last) else last
+        same = _ROUNDING * float(np.abs(values[:finite]).max(initial=0.0))
+        last = last[values[last + 1] - values[last] > same] if len(last) else last
         if 0 < finite < len(rows) and finite >= self.min_leaf and len(rows) - finite >= self.min_leaf:
             last = np.append(last, finite - 1)  # "is it defined at all?"
         if not len(last):

@@ -2,15 +2,16 @@
 
 Binary relations, for bodies A and B (`box_relations` has the exact definitions of those on bounding boxes):
 
-=============== =============================================================================================
-intersect       signed distance <= `TOUCH_EPS`: touching or overlapping
-approaching     touching, not separating (`APPROACH_EPS`), and at least one of the types has a velocity
-on-top          A's bottom is about at B's top, a tenth of A's extent lies over B, and they touch
-smaller-than    B's bounding box has a diagonal more than 1.1 times as long
-x-less-than     A is left of B, up to 5 % of the smaller extent; likewise y and z, but no depth axis
-x-greater-than  A is right of B
-x-aligned       neither
-=============== =============================================================================================
+=================== =========================================================================================
+intersect           signed distance <= `TOUCH_EPS`: touching or overlapping
+approaching         touching, not separating (`APPROACH_EPS`), and at least one of the types has a velocity
+approaching-fastest approaching, and A approaches no other body faster: of several contacts this one is decisive
+on-top              A's bottom is about at B's top, a tenth of A's extent lies over B, and they touch
+smaller-than        B's bounding box has a diagonal more than 1.1 times as long
+x-less-than         A is left of B, up to 5 % of the smaller extent; likewise y and z, but no depth axis
+x-greater-than      A is right of B
+x-aligned           neither
+=================== =========================================================================================
 
 Beside them, every type name and every ancestor of one is a unary relation.
 """
@@ -182,7 +183,8 @@ class Extractor:
         per_axis = [
             f"{axis}-{kind}" for axis in self.axes.names for kind in ("less-than", "greater-than", "aligned")
         ]
-        self.names = tuple(sorted(["approaching", "intersect", "on-top", "smaller-than", *per_axis]))
+        contact = ["approaching", "approaching-fastest", "intersect"]
+        self.names = tuple(sorted([*contact, "on-top", "smaller-than", *per_axis]))
         self.features = contacts.contact_features(schema)
         self.unary_names = unary_names(schema)
         for name in self.unary_names:
@@ -248,7 +250,10 @@ class Extractor:
             self.axes, pose.take(self.axes.used, axis=0), measured.low, measured.high, touching
         )
         found["intersect"] = touching
-        found["approaching"] = self._approaching(plan, measured.distance, measured.normal, velocity)
+        closing = self._closing(plan, measured.distance, measured.normal, velocity)
+        found["approaching"] = closing < np.inf
+        decisive = closing.min(axis=1, initial=np.inf, keepdims=True) + contacts.APPROACH_EPS
+        found["approaching-fastest"] = found["approaching"] & (closing <= decisive)
         table = np.empty((len(vectors), len(self.names), *plan.pairs.number.shape), dtype=bool)
         for r, name in enumerate(self.names):
             table[:, r] = found[name].transpose(2, 0, 1)
@@ -256,18 +261,20 @@ class Extractor:
         between = np.ascontiguousarray(distance.transpose(2, 0, 1))
         return Relations(layout, self.names, table, between, measured.normal, velocity, plan.pairs)
 
-    def _approaching(
+    def _closing(
         self, plan: _Plan, distance: FloatArray, normal: FloatArray, velocity: FloatArray
-    ) -> _Table:
-        holds = np.zeros((len(distance) + 1, distance.shape[1]), dtype=bool)
+    ) -> FloatArray:
+        """Normal velocities of touching pairs that don't separate, infinite for the others, shape ``(K, K, n)``."""
+        closing = np.full((len(distance) + 1, distance.shape[1]), np.inf)
         pairs, moving = plan.pairs, plan.moving
         if len(moving):
             relative = velocity.take(pairs.first[moving], axis=1) - velocity.take(
                 pairs.second[moving], axis=1
             )
-            closing = dot(relative, normal.take(moving, axis=1)) <= contacts.APPROACH_EPS
-            holds[moving] = closing & (distance.take(moving, axis=0) <= self.eps)
-        return holds.take(pairs.number, axis=0)
+            speed = dot(relative, normal.take(moving, axis=1))
+            near = (speed <= contacts.APPROACH_EPS) & (distance.take(moving, axis=0) <= self.eps)
+            closing[moving] = np.where(near, speed, np.inf)
+        return closing.take(pairs.number, axis=0)
 
     def _plan(self, layout: SceneLayout) -> _Plan:
         if (plan := self._plans.get(layout.names)) is None:

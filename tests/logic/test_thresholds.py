@@ -30,6 +30,16 @@ def test_undefined_values_are_in_no_bin() -> None:
     assert np.isnan(bins.low[1]).all()
 
 
+def test_no_threshold_between_a_number_and_itself_computed_in_another_way() -> None:
+    sine = 0.8660254037844386  # of 60 degrees; the next one is its neighbour
+    bins = bin_values(np.array([[sine, 0.5, math.nextafter(sine, 1.0), 1.0]]), split=2)
+    assert bins.index.tolist() == [[1, 0, 1, 2]]
+    bins = bin_values(
+        np.array([[0.0, -0.04, 1e-8, 0.03]]), split=2
+    )  # a velocity of 1e-8 decides (Figure 1.3)
+    assert bins.index.tolist() == [[0, 0, 1, 1]]
+
+
 def test_the_number_of_bins_is_bounded() -> None:
     values = np.arange(2000.0)
     alternating = np.concatenate([values[::2], values[1::2]])[np.newaxis]

@@ -102,3 +102,21 @@ def test_features_agree_with_the_relations() -> None:
             back = found.contacts(int(other))[:, body]
             np.testing.assert_array_equal(back[:, 1:3], -contacts[:, other, 1:3])
             np.testing.assert_array_equal(back[:, 3:], contacts[:, other, 3:])
+
+
+def test_of_several_contacts_the_one_approached_fastest_is_told_apart() -> None:
+    schema = schema_of(("ball", "box", "box"))
+    still = [0, 0, 0]
+    floor, wall = [0, -1, 0, 0, 0, 0, 4, 2, 1, *still], [1, 0.5, 0, 0, 0, 0, 1, 4, 1, *still]
+    for velocity, fastest in (
+        ((0.3, -0.1), [False, False, True]),
+        ((0.1, -0.3), [False, True, False]),
+        ((0.2, -0.2), [False, True, True]),  # neither is faster
+        ((-0.1, 0.0), [False, True, False]),  # leaves the wall, slides on the floor
+        ((-0.1, 0.2), [False, False, False]),  # leaves both
+    ):
+        ball = [0, 0.5, 0, 0, 0, 0, 1, 1, 1, *velocity, 0]
+        scene = schema.scene({"o0": ball, "o1": floor, "o2": wall})
+        found = Extractor(schema).extract(schema.layout(), scene.vector[None])
+        assert found.relation("approaching-fastest")[0, 0].tolist() == fastest
+        assert (found.relation("approaching") >= found.relation("approaching-fastest")).all()

@@ -45,11 +45,11 @@ def test_names_are_alphabetical_and_leave_out_a_planar_depth_axis() -> None:
     names = Extractor(schema_of(())).names
     assert list(names) == sorted(names)
     assert set(names) == {
-        "approaching", "intersect", "on-top", "smaller-than",
+        "approaching", "approaching-fastest", "intersect", "on-top", "smaller-than",
         "x-aligned", "x-greater-than", "x-less-than", "y-aligned", "y-greater-than", "y-less-than",
     }  # fmt: skip
     assert {n[0] for n in Extractor(schema_of((), up="z")).names if n[1] == "-"} == {"x", "z"}
-    assert len(Extractor(schema_of((), planar=False)).names) == 13
+    assert len(Extractor(schema_of((), planar=False)).names) == 14
 
 
 def test_direction_has_a_margin_of_five_percent_of_the_smaller_extent() -> None:
@@ -288,7 +288,7 @@ def test_inputs_are_left_alone_and_empty_batches_are_fine() -> None:
     np.testing.assert_array_equal(vectors, before)
     assert len(found.rows(slice(0, 0))) == 0
     empty = Extractor(schema).extract(schema.layout(), vectors[:0])
-    assert empty.table.shape == (0, 10, 7, 7) and empty.contacts(2).shape == (0, 7, 5)
+    assert empty.table.shape == (0, 11, 7, 7) and empty.contacts(2).shape == (0, 7, 5)
 
 
 @pytest.mark.parametrize("planar", [True, False])
