@@ -172,8 +172,7 @@ class _Touching:
         found = self._extractor.extract(block.layout, block.vectors[:-1])
         ball = block.layout.bodies.index(block.layout.index("ball"))
         others = [k for k, i in enumerate(block.layout.bodies) if block.layout.types[i].name != self.kind]
-        free: NDArray[np.bool_] = ~found.relation("intersect")[:, ball][:, others].any(axis=1)
-        return free
+        return np.logical_not(found.relation("intersect")[:, ball][:, others].any(axis=1))
 
 
 def _online(seeds: Sequence[int]) -> Rows:
