@@ -62,6 +62,7 @@ class RoleClassifier:
         self.contradictions = 0.0
         self.stale = bool(self.kinds)
         self._answers: dict[tuple[Any, ...], Places | None] = {}
+        self._extensions: dict[tuple[Any, ...], list[set[int]]] = {}
 
     # ----- asking -----
 
@@ -97,12 +98,17 @@ class RoleClassifier:
     def observe(self, example: Example, roles: Sequence[int]) -> bool:
         """Take in who played the roles of one example of the mode; whether that contradicts the descriptions.
 
-        Learns nothing (that is `refresh`).
+        They must tell the players from the others by themselves: that the right objects happened to come first in
+        the order of preference doesn't count. Learns nothing (that is `refresh`).
         """
         if not self.kinds:
             return False
         self.seen += 1.0
-        wrong = not self._same(self.assign(example), roles)
+        wrong = any(
+            described != {roles[at] for at in description.places}
+            for description, described in zip(self.descriptions, self._described(example), strict=True)
+            if description.definition is not None
+        )
         self.contradictions += wrong
         grown = self.errors > 0 and self.seen >= self.config.relearn_growth * max(self.learned, 1.0)
         self.stale = self.stale or self.contradictions > self.errors or grown or self._has_choice(example)
@@ -117,6 +123,7 @@ class RoleClassifier:
         view, weights = View.of_exemplars(exemplars), exemplars.weights()
         work = sum(self._learn(description, view, rows, roles, weights) for description in self.descriptions)
         self._answers.clear()
+        self._extensions.clear()
         self.learned, self.seen = float(weights[rows].sum()), max(self.seen, float(weights[rows].sum()))
         definitions = [d.definition for d in self.descriptions if d.definition is not None]
         self.errors = sum(definition.errors for definition in definitions)
@@ -148,7 +155,7 @@ class RoleClassifier:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_answers": {}}
+        return self.__dict__ | {"_answers": {}, "_extensions": {}}
 
     # ----- inside -----
 
@@ -181,18 +188,14 @@ class RoleClassifier:
 
     def _search(self, example: Example, order: Places) -> Places | None:
         """Joint search over all kinds for the assignment with the highest score."""
-        v = self.vocabulary
-        relations = dict(zip(v.relations, example.table, strict=True)) | dict(
-            zip(v.unary, example.unary, strict=True)
-        )
-        world = World(relations, np.ones(len(order), dtype=np.bool_))
+        world = self._world(example)
         options = []
         for description in self.descriptions:
-            is_type = example.unary[v.unary.index(description.kind.type)]
+            able = set(self._of_type(description, example))
             scored = [
                 (score, -at, each)
                 for at, each in enumerate(order)
-                if is_type[each] and each != example.target
+                if each in able
                 if (score := description.score(world, example.target, each)) is not None
             ]
             # All others together can take no more objects than there are roles: the best few are enough.
@@ -203,13 +206,29 @@ class RoleClassifier:
                 best = total, tuple(each for _, each in sorted(chosen))
         return None if best is None else best[1]
 
-    def _same(self, found: Places | None, roles: Sequence[int]) -> bool:
-        """Whether two assignments agree up to exchanges of interchangeable roles."""
-        if found is None:
-            return False
-        return all(
-            {found[at] for at in d.places} == {roles[at] for at in d.places} for d in self.descriptions
+    def _described(self, example: Example) -> list[set[int]]:
+        """Objects of its type for which each description holds; kept per relational state."""
+        key = (example.target, example.table.tobytes(), example.unary.tobytes())
+        if key not in self._extensions:
+            if len(self._extensions) >= _MOST_ANSWERS:
+                self._extensions.clear()
+            world = self._world(example)
+            self._extensions[key] = [
+                {each for each in self._of_type(d, example) if d.holds(world, example.target, each)}
+                for d in self.descriptions
+            ]
+        return self._extensions[key]
+
+    def _world(self, example: Example) -> World:
+        v = self.vocabulary
+        relations = dict(zip(v.relations, example.table, strict=True)) | dict(
+            zip(v.unary, example.unary, strict=True)
         )
+        return World(relations, np.ones(example.table.shape[-1], dtype=np.bool_))
+
+    def _of_type(self, description: RoleDescription, example: Example) -> list[int]:
+        is_type = example.unary[self.vocabulary.unary.index(description.kind.type)]
+        return [each for each in np.flatnonzero(is_type).tolist() if each != example.target]
 
     def _has_choice(self, example: Example) -> bool:
         """Whether there are more objects of a type than roles, and no description to choose by."""

@@ -65,6 +65,12 @@ class RoleDescription:
         # Only a description that missed some of its own objects leaves room for others.
         return _log_odds(missed) if missed.positives > 0 else None
 
+    def holds(self, world: World, target: int, candidate: int) -> bool:
+        """Whether some clause speaks for a candidate; true without a definition."""
+        if self.definition is None:
+            return True
+        return any(satisfiable(clause, world, (target, candidate)) for clause in self.definition.clauses)
+
     def __str__(self) -> str:
         rule = f"any {self.kind.type}" if self.definition is None else str(self.definition)
         return f"{self.kind.type}: {rule}"
