@@ -7,19 +7,25 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from relgym.experiments.accuracy import AXES, Outcome, accuracy, ball_bars
 from relgym.experiments.bar import Measure, report
 from relgym.experiments.cost import query_bars, query_cost, step_bars, step_cost
-from relgym.experiments.data import ball_blocks
-from relgym.experiments.online import learned
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.online import follow, last, learned
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
+from relgym.experiments.stream import box_then_ramp, prequential_bars, same_model, stream_bars
+from relgym.experiments.truck import bystander_bars, bystanders, counts, per_block, per_block_bars
 
 __all__ = ["main"]
+
+
+Section: TypeAlias = tuple[str, list[Measure], list[str]]
+"""Title, figures and remarks of one row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +36,8 @@ class Request:
     tests: tuple[int, ...]
 
 
-def _ball(experiment: int) -> Callable[[Request], tuple[str, list[Measure], list[str]]]:
-    def measure(request: Request) -> tuple[str, list[Measure], list[str]]:
+def _ball(experiment: int) -> Callable[[Request], Section]:
+    def measure(request: Request) -> Section:
         outcomes = []
         for outcome in accuracy(experiment, training=request.training, tests=request.tests):
             outcomes.append(outcome)
@@ -63,22 +69,62 @@ def _lines(outcome: Outcome) -> list[str]:
     return lines
 
 
-def _steps(request: Request) -> tuple[str, list[Measure], list[str]]:
+def _steps(request: Request) -> Section:
     runs = [step_cost(ball_blocks(1, seed=seed)) for seed in request.training]
     notes = [
-        f"total {run.total:.1f} s, of which resets {run.resets:.2f} s; the engine alone {run.engine:.2f} s"
+        f"total {run.total:.1f} s, of which resets {run.resets:.2f} s; by the clock {run.clock:.1f} s; "
+        f"the engine alone {run.engine:.2f} s"
         for run in runs
     ]
     return "cost per transition, experiment 1", step_bars(runs), notes
 
 
-def _queries(request: Request) -> tuple[str, list[Measure], list[str]]:
+def _queries(request: Request) -> Section:
     model = learned(ball_blocks(1, seed=request.training[0]))
     costs = [query_cost(model, list(ball_blocks(1, seed=test, test=True))) for test in request.tests]
     return "cost per query, experiment 1", query_bars(costs), []
 
 
-ROWS: Final = {1: _ball(1), 2: _ball(2), 3: _ball(3), 7: _steps, 8: _queries}
+def _prequential(request: Request) -> Section:
+    laws = BALL_EXPERIMENTS[1].modes()
+    courses = [last(follow(ball_blocks(1, seed=seed), laws=laws)) for seed in request.training]
+    return "errors while learning, experiment 1", prequential_bars(courses), []
+
+
+def _stream(request: Request) -> Section:
+    same = [same_model(ball_blocks(1, seed=seed, blocks=16), 8) for seed in request.training]
+    kinds = [box_then_ramp(seed=seed, test=request.tests[0]) for seed in request.training]
+    notes = [f"box-only scenes wrong before {each.before}, after {each.after}" for each in kinds]
+    return "what later blocks may not change", stream_bars(same, kinds), notes
+
+
+def _per_block(request: Request) -> Section:
+    outcomes = [per_block(seed=seed, test=request.tests[0]) for seed in request.training]
+    exact = sum(outcome.found == 3 and not outcome.spurious for outcome in outcomes)
+    notes = [f"exactly three modes: {exact} of {len(outcomes)} seeds"]
+    notes += [f"other modes: {each.spurious}; noise: {each.noise}" for each in outcomes if each.spurious]
+    return "truck-push, constants per block", per_block_bars(outcomes), notes
+
+
+def _bystanders(request: Request) -> Section:
+    test = request.tests[0]
+    beside = [bystanders(seed=seed, test=test) for seed in request.training]
+    counted = [counts(seed=seed, test=test) for seed in request.training]
+    return "truck-push, bystanders and 2, 3 and 4 boxes", bystander_bars(beside, counted), []
+
+
+ROWS: Final[Mapping[int, Callable[[Request], Section]]] = {
+    1: _ball(1),
+    2: _ball(2),
+    3: _ball(3),
+    5: _prequential,
+    6: _stream,
+    7: _steps,
+    8: _queries,
+    9: _per_block,
+    10: _bystanders,
+}
+"""Row 4, roll-outs, is measured with rows 1 and 2."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -6,7 +6,7 @@ layout that the truck env drew.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 
 from relgym.envs.arguments import physical_action
 from relgym.envs.ball_box_ramp import BallBoxRampEnv, configurations
+from relgym.envs.ball_scenes import ball_places
 from relgym.envs.physics import Contact
 from relgym.envs.truck_push import TruckPushEnv
 from relgym.envs.truck_scenes import layouts
@@ -36,13 +37,14 @@ __all__ = ["BALL_EXPERIMENTS", "BallExperiment", "Block", "Truth", "ball_blocks"
 
 @dataclass(frozen=True, slots=True)
 class BallExperiment:
-    """Parameters of one of the ball experiments (§4.3–§4.5)."""
+    """Parameters of one of the ball experiments (§4.3–§4.5); `objects` are the kinds that stand in the room."""
 
     incline: float
     elasticity: float
     frictions: tuple[float, ...]
     blocks: int
     type_names: str = "shape"
+    objects: tuple[str, ...] = ("box", "ramp")
 
     def modes(self) -> AnalyticModes:
         """The analytic modes of its rooms."""
@@ -94,7 +96,7 @@ def ball_blocks(
     setting = _experiment(experiment)
     count = blocks if blocks is not None else (TEST_BLOCKS if test else setting.blocks)
     worlds = _worlds(setting)
-    modes, cases = setting.modes(), configurations()
+    modes, cases = setting.modes(), _cases(setting)
     numbers = np.arange(count)
     if order is not None:
         np.random.default_rng([seed, order, int(test)]).shuffle(numbers)
@@ -123,9 +125,18 @@ def _experiment(experiment: int | BallExperiment) -> BallExperiment:
     return BALL_EXPERIMENTS[experiment]
 
 
+def _cases(setting: BallExperiment) -> Sequence[Mapping[str, Any]]:
+    if sorted(setting.objects) == ["box", "ramp"]:
+        return configurations()
+    places, directions = ball_places(len(setting.objects)), ("left", "right")
+    return [{"ball": place, "direction": direction} for place in places for direction in directions]
+
+
 def _worlds(setting: BallExperiment) -> list[_World]:
     envs = [
-        BallBoxRampEnv(setting.incline, setting.elasticity, mu, type_names=setting.type_names)
+        BallBoxRampEnv(
+            setting.incline, setting.elasticity, mu, setting.objects, type_names=setting.type_names
+        )
         for mu in setting.frictions
     ]
     schema, names = _joint_schema([env.schema for env in envs])

@@ -17,7 +17,7 @@ from relgym.experiments.evaluate import TOLERANCE, explicable
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float1D
 
-__all__ = ["Course", "follow", "learned"]
+__all__ = ["Course", "follow", "last", "learned"]
 
 _Bools: TypeAlias = NDArray[np.bool_]
 
@@ -80,6 +80,12 @@ def follow(
             course.counted.setdefault(target, []).append(counted)
             course.wrong.setdefault(target, []).append(wrong[target])
         yield course
+
+
+def last(courses: Iterable[Course]) -> Course:
+    """The course after the last block."""
+    *_, course = courses
+    return course
 
 
 def learned(blocks: Iterable[Block], *, config: ModelConfig | None = None) -> WorldModel:

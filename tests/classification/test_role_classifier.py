@@ -161,6 +161,22 @@ def _observed(classifier: RoleClassifier, exemplars: Exemplars, item: Labelled) 
     return wrong
 
 
+def test_the_right_objects_coming_first_by_luck_is_a_contradiction_all_the_same() -> None:
+    vocabulary = Vocabulary(relations=("intersect",), unary=("ball", "red"))
+    classifier = RoleClassifier(vocabulary, [RoleKind("ball", (("v", 1.0),))], _CONFIG)
+    exemplars = Exemplars(vocabulary, _CONFIG)
+    exemplars.set_modes((1,), np.empty(0, int), np.empty((0, 1), bool), np.empty((0, 1)))
+    exemplars.add(_balls({1}, {1}), 1, np.ones(1, bool), np.zeros(1), roles=(1,))
+    classifier.refresh(exemplars, 1)
+    assert classifier.describe() == ["ball: intersect(A, B)"]  # redness would do as well
+    example = _balls({1, 3}, {1})
+    assert classifier.assign(example) == (1,)  # ball 3 touches A too, but ball 1 comes first
+    assert classifier.observe(example, (1,))
+    exemplars.add(example, 1, np.ones(1, bool), np.zeros(1), roles=(1,))
+    assert classifier.refresh(exemplars, 1) > 0
+    assert classifier.describe() == ["ball: red(B)"]
+
+
 def test_no_roles_need_no_objects() -> None:
     classifier = RoleClassifier(TRUCK_VOCABULARY, [], _CONFIG)
     item = next(truck_stream(1, rng=np.random.default_rng(0)))
