@@ -166,15 +166,18 @@ def test_the_right_objects_coming_first_by_luck_is_a_contradiction_all_the_same(
     classifier = RoleClassifier(vocabulary, [RoleKind("ball", (("v", 1.0),))], _CONFIG)
     exemplars = Exemplars(vocabulary, _CONFIG)
     exemplars.set_modes((1,), np.empty(0, int), np.empty((0, 1), bool), np.empty((0, 1)))
-    exemplars.add(_balls({1}, {1}), 1, np.ones(1, bool), np.zeros(1), roles=(1,))
+    for player in (1, 2, 3) * 3:
+        exemplars.add(_balls({player}, {player}), 1, np.ones(1, bool), np.zeros(1), roles=(player,))
     classifier.refresh(exemplars, 1)
-    assert classifier.describe() == ["ball: intersect(A, B)"]  # redness would do as well
-    example = _balls({1, 3}, {1})
-    assert classifier.assign(example) == (1,)  # ball 3 touches A too, but ball 1 comes first
-    assert classifier.observe(example, (1,))
-    exemplars.add(example, 1, np.ones(1, bool), np.zeros(1), roles=(1,))
+    by_touch = classifier.describe() == ["ball: intersect(A, B)"]
+    assert by_touch or classifier.describe() == ["ball: red(B)"]  # either would do so far
+    example = _balls({1, 3}, {1}) if by_touch else _balls({1}, {1, 3})
+    assert classifier.assign(example) == (1,)  # the description holds for ball 3 too, but ball 1 comes first
+    for _ in range(3):
+        assert classifier.observe(example, (1,))
+        exemplars.add(example, 1, np.ones(1, bool), np.zeros(1), roles=(1,))
     assert classifier.refresh(exemplars, 1) > 0
-    assert classifier.describe() == ["ball: red(B)"]
+    assert classifier.describe() == (["ball: red(B)"] if by_touch else ["ball: intersect(A, B)"])
 
 
 def test_no_roles_need_no_objects() -> None:
