@@ -153,6 +153,25 @@ def test_space_has_the_same_laws_and_obeys_those_of_the_plane() -> None:
     assert errors(learner.book, test) == (0, 0, 1000)
 
 
+@pytest.mark.parametrize("sd", [1e-6, 1e-4])
+def test_noisy_positions(sd: float, rng: np.random.Generator) -> None:
+    noisy = []
+    for stream in blocks(2, 10):
+        vectors = stream.vectors.copy()
+        at = stream.layout.offsets[stream.layout.index("ball")]
+        shift = rng.normal(size=(len(vectors) + 1, 2)) * sd
+        vectors[:, at : at + 2] += shift[1:]
+        vectors[:, at + 9 : at + 11] += shift[1:] - shift[:-1]
+        noisy.append(Stream(stream.schema, stream.layout, vectors))
+    pair = taught(noisy).book.pair
+    assert pair is not None
+    assert pair.frame == "contact"
+    ((normal,), (tangent,)) = pair.axes
+    weights = {name: weight for law in (normal, tangent) for p in law.pieces for name, weight in p.terms}
+    assert weights["v_n"] == pytest.approx(-0.95, rel=0.01)
+    assert weights["J_n"] == pytest.approx(-0.2, rel=0.01)
+
+
 def test_what_the_form_cannot_say_is_left_unsaid() -> None:
     soft = {"friction": 0.0, "restitution": lambda speed: 0.9 - 4.0 * speed}
     learner = taught(space(4, 1, **soft))
