@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bouncing import closed_room, episode, schema_of_blocks
+from law_streams import Stream, errors, formulas, learn, taught
 from numpy.typing import NDArray
-from streams import Stream, errors, formulas, learn, taught
 
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
 from relgym.experiments.data import BallExperiment, ball_blocks

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from streams import Stream, moved, taught
+from law_streams import Stream, moved, taught
 
 from relgym.errors import ConfigError
 from relgym.experiments.data import ball_blocks
