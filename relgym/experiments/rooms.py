@@ -108,7 +108,7 @@ def _room(
         Obstacle(name, _corners(schema.type_of(name), state[name]), elasticity, friction) for name in poses
     ]
     radius = float(rng.uniform(0.08, 0.15))
-    start = (*shift, rng.uniform(0.5, width - 0.5), rng.uniform(_HEIGHT - 0.6, _HEIGHT - 0.2))
+    start = rng.uniform((0.5, _HEIGHT - 0.6), (width - 0.5, _HEIGHT - 0.2)) + shift
     first = (float(rng.choice((-1.0, 1.0)) * rng.uniform(0.005, 0.05)), float(rng.uniform(-0.05, 0.0)))
     world = BallWorld(obstacles, {"ball": radius})
     world.land([(float(start[0]), float(start[1]))], [first])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.laws.columns import Sources
-from relgym.laws.composition import Engaged, compose
+from relgym.laws.composition import Engaged, compose, within
 from relgym.laws.free import free_motion
 from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
 from relgym.laws.shares import EXTENT, share_values
@@ -30,9 +30,12 @@ class Motion:
     Attributes
     ----------
     velocity
-        Next velocities of all K bodies, shape ``(d, n, K)``; NaN where no law speaks.
+        Next velocities of all K bodies, shape ``(d, n, K)``.
     known
-        Whether a law says so, shape ``(n, K)``. False for bodies that aren't movers.
+        Whether that is a claim, shape ``(n, K)``: no rival law disagrees, and it lies within experience. False
+        for bodies that aren't movers.
+    stated
+        Whether the laws say anything at all, shape ``(n, K)``.
     touched
         Whether the body touches something, shape ``(n, K)``.
     columns
@@ -41,6 +44,7 @@ class Motion:
 
     velocity: FloatArray
     known: NDArray[np.bool_]
+    stated: NDArray[np.bool_]
     touched: NDArray[np.bool_]
     columns: Mapping[int, FloatArray]
 
@@ -100,7 +104,7 @@ class LawBook:
         self._engaged.clear()
 
     # ------------------------------------------------------------------ prediction
-    def motion(self, contacts: Contacts, vectors: NDArray[np.float64], *, checking: bool = True) -> Motion:
+    def motion(self, contacts: Contacts, vectors: NDArray[np.float64]) -> Motion:
         """Next velocities in n scenes.
 
         Parameters
@@ -109,17 +113,15 @@ class LawBook:
             Who touches whom.
         vectors
             State vectors, shape ``(n, layout.width)``.
-        checking
-            Whether rival laws are asked too: where they disagree, nothing is known.
         """
         cast = contacts.cast
         now, velocity, columns = self.free_motion(cast, vectors)
-        known = np.zeros((len(vectors), len(cast.layout.bodies)), dtype=bool)
-        known[:, cast.movers] = np.isfinite(velocity[..., cast.movers]).all(axis=0)
-        touched = np.zeros_like(known)
+        stated = np.zeros((len(vectors), len(cast.layout.bodies)), dtype=bool)
+        stated[:, cast.movers] = np.isfinite(velocity[..., cast.movers]).all(axis=0)
+        motion = Motion(velocity, stated.copy(), stated, np.zeros_like(stated), columns)
         for group in contacts.groups():
-            self._collide(contacts, group, now, velocity, known, touched, columns, checking=checking)
-        return Motion(velocity, known, touched, columns)
+            self._collide(contacts, group, now, motion)
+        return motion
 
     def free_motion(
         self, cast: Cast, vectors: NDArray[np.float64]
@@ -136,41 +138,34 @@ class LawBook:
             velocity[..., body] = free
         return now, velocity, columns
 
-    def _collide(
-        self,
-        contacts: Contacts,
-        group: Group,
-        now: FloatArray,
-        velocity: FloatArray,
-        known: NDArray[np.bool_],
-        touched: NDArray[np.bool_],
-        columns: Mapping[int, FloatArray],
-        *,
-        checking: bool,
-    ) -> None:
+    def _collide(self, contacts: Contacts, group: Group, now: FloatArray, motion: Motion) -> None:
         """Let the contacts of some scenes act, in place."""
         cast, scenes = contacts.cast, group.scenes
-        involved = np.zeros((len(scenes), known.shape[1]), dtype=bool)
+        involved = np.zeros((len(scenes), len(cast.layout.bodies)), dtype=bool)
         rows = np.arange(len(scenes))[:, None]
         involved[rows, cast.first[group.pairs]] = True
         involved[rows, cast.second[group.pairs]] = True
-        touched[scenes] = involved
+        motion.touched[scenes] = involved
         laws = self._engaged_pairs(cast)
         if not laws:
-            known[scenes] &= ~involved
+            motion.stated[scenes] &= ~involved
+            motion.known[scenes] &= ~involved
             return
-        share = self.share(contacts, group, columns)
-        chosen = laws[0].chosen[:, group.pairs]
-        spoken = np.all((chosen >= 0).all(axis=0) & np.isfinite(share), axis=1)[:, None]
-        before, free = now[:, scenes], velocity[:, scenes]
-        after, _ = compose(laws[0], group, share, before, free)
-        sure = np.isfinite(after).all(axis=0) | ~involved
-        sure &= ~involved | spoken
-        for rival in laws[1:] if checking else ():
+        share = self.share(contacts, group, motion.columns)
+        before, free = now[:, scenes], motion.velocity[:, scenes]
+        after, impulse = compose(laws[0], group, share, before, free)
+        least = laws[0].chosen[:, group.pairs].min(axis=0)
+        lawful = ((least >= 0) & np.isfinite(share)).all(axis=1, keepdims=True)
+        stated = ~involved | (lawful & np.isfinite(after).all(axis=0))
+        slack = SPREAD * self.tolerance
+        seen = within(laws[0], group, after, impulse, slack).all(axis=1, keepdims=True)
+        sure = stated & (~involved | seen)
+        for rival in laws[1:]:
             other, _ = compose(rival, group, share, before, free)
-            sure &= (np.abs(other - after) <= SPREAD * self.tolerance).all(axis=0) | ~involved
-        velocity[:, scenes] = np.where(involved & sure, after, velocity[:, scenes])
-        known[scenes] &= sure
+            sure &= (np.abs(other - after) <= slack).all(axis=0) | ~involved
+        motion.velocity[:, scenes] = np.where(involved & stated, after, free)
+        motion.stated[scenes] &= stated
+        motion.known[scenes] &= sure
 
     def share(
         self, contacts: Contacts, group: Group, columns: Mapping[int, FloatArray]

@@ -13,7 +13,7 @@ from relgym.laws.records import AxisLaw, PairLaw
 from relgym.laws.touching import Group
 from relgym.scene.geometry.vectors import FloatArray, dot
 
-__all__ = ["SWEEPS", "Engaged", "compose", "respond"]
+__all__ = ["SWEEPS", "Engaged", "compose", "respond", "within"]
 
 SWEEPS = 400
 """Most sweeps over the contacts of a scene."""
@@ -123,3 +123,32 @@ def compose(
         if not len(active) or group.pairs.shape[1] == 1:
             break
     return velocity, impulse
+
+
+def within(
+    engaged: Engaged, group: Group, velocity: FloatArray, impulse: FloatArray, slack: float
+) -> NDArray[np.bool_]:
+    """Contacts that make bodies move as contacts were seen to make them, shape ``(m, c)``.
+
+    Parameters
+    ----------
+    engaged, group
+        The laws and the contacts.
+    velocity, impulse
+        What `compose` gave.
+    slack
+        Velocities up to this count as 0.
+    """
+    rows = np.arange(len(group.pairs))[:, None]
+    a, b = engaged.first[group.pairs], engaged.second[group.pairs]
+    after = velocity[:, rows, a] - velocity[:, rows, b]
+    axes = axes_of(engaged.law.frame, group.bearings, after - impulse)
+    seen = np.ones(group.pairs.shape, dtype=bool)
+    for k, axis in enumerate(axes):
+        value, chosen = dot(after, axis), engaged.chosen[k][group.pairs]
+        acts = np.abs(dot(impulse, axis)) > slack  # what is let go may move anyhow
+        for number, law in enumerate(engaged.law.axes[k]):
+            below, above = law.signs
+            strange = ((value < -slack) & (not below)) | ((value > slack) & (not above))
+            seen &= ~(strange & acts & (chosen == number))
+    return seen

@@ -92,9 +92,8 @@ class FreeLearner:
     def fit(self, tolerance: float) -> bool:
         """Learn the law anew from the examples kept; whether it changed."""
         found = self._fitted(tolerance)
-        same = found is not None and self.law is not None and found.components == self.law.components
-        self.law, before = found, self.law
-        return not same and (found is not None or before is not None)
+        before, self.law = self.law, found
+        return _says(before) != _says(found)
 
     def _fitted(self, tolerance: float) -> FreeLaw | None:
         rows = self.store.rows
@@ -161,6 +160,11 @@ class FreeLearner:
         self.store.restore(data[2], arrays)
 
 
+def _says(law: FreeLaw | None) -> tuple[str, ...] | None:
+    """What a law states, up to rounding."""
+    return None if law is None else tuple(piece.formula(9) for piece in law.components)
+
+
 def _simplest(
     fit: LinearFit, names: list[str], x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float
 ) -> Piece:
@@ -173,7 +177,7 @@ def _simplest(
     was, now = (np.abs(y - v) <= tolerance for v in (fit.predict(x), total + constant))
     if now.sum() < was.sum():
         weights, constant = list(fit.weights), fit.intercept
-    elif constant != 0.0:
+    elif constant != 0.0 and now.any():
         constant = float((y - total)[now].mean())
     terms = [(names[c], w) for c, w in zip(fit.columns, weights, strict=True)]
     return Piece((*terms, *([(ONE, constant)] if constant != 0.0 else [])))

@@ -23,8 +23,7 @@ from relgym.laws.free import FreeLearner
 from relgym.laws.pair import fit_pair
 from relgym.laws.records import FreeLaw, PairLaw, Share
 from relgym.laws.touching import Cast, Contacts
-from relgym.scene.objects import SceneLayout, SceneSchema, Target
-from relgym.scene.relations import Relations
+from relgym.scene.objects import SceneSchema, Target
 
 __all__ = ["LawLearner"]
 
@@ -136,35 +135,36 @@ class LawLearner:
     # ------------------------------------------------------------------ learning
     def learn_one(
         self,
-        layout: SceneLayout,
-        relations: Relations,
+        contacts: Contacts,
         vector: NDArray[np.float64],
         following: NDArray[np.float64],
         stays: Mapping[int, bool],
+        motion: Motion | None = None,
     ) -> bool:
         """Take up one transition; whether the laws changed.
 
         Parameters
         ----------
-        layout, relations, vector
-            The scene, its relations (of this one scene), and its state vector.
+        contacts, vector
+            Who touches whom in the scene, and its state vector.
         following
             The next state vector in the same layout.
         stays
             Whether each object (by index) is there in the next scene as well.
+        motion
+            What the laws say of the scene, if that is known already.
         """
-        cast = self.book.cast(layout)
+        cast = contacts.cast
         if not cast.movers:
             return False
         self._rescale(cast, vector)
-        contacts = Contacts.of(cast, relations, vector[None])
-        motion = self.book.motion(contacts, vector[None], checking=False)
+        motion = motion or self.book.motion(contacts, vector[None])
         after = cast.padded(following[None])[cast.velocities][..., 0]
         touching = np.flatnonzero(contacts.hits[0])
         changed = False
         right = {}
         for body in cast.movers:
-            if stays[layout.bodies[body]]:
+            if stays[cast.layout.bodies[body]]:
                 right[body] = self._judge(motion, body, after)
                 self._count(cast, body, right[body])
                 if not (cast.first[touching] == body).any() and not (cast.second[touching] == body).any():
@@ -180,7 +180,7 @@ class LawLearner:
 
     def _judge(self, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
         value = motion.velocity[:, 0, body]
-        return bool(motion.known[0, body] and (np.abs(value - after[:, body]) <= self.book.tolerance).all())
+        return bool(motion.stated[0, body] and (np.abs(value - after[:, body]) <= self.book.tolerance).all())
 
     def _count(self, cast: Cast, body: int, right: bool) -> None:
         tally = self._tallies[cast.sources[body][0].type.name]
@@ -196,6 +196,8 @@ class LawLearner:
         changed = learner.learn_one(motion.columns[body][:, 0], after, right, self.book.tolerance)
         if learner.seen in ESTIMATE_AT and self._noise is None:
             changed |= self._estimate(learner)
+        if learner.law is not None:  # more examples may have changed its last digits
+            self.book.free[name] = learner.law
         return changed
 
     def _single(self, cast: Cast, touching: NDArray[np.intp], stays: Mapping[int, bool]) -> list[int]:

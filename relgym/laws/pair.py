@@ -97,7 +97,8 @@ def _fit_frame(
     # Each axis that the frame lacks, and each that its law misses, has to be stated number by number.
     bits = EXCEPTION_BITS * max(1, len(encounters.now) - len(axes)) * float((~explained).sum())
     for k in range(len(axes)):
-        found, fits = _fit_kinds(_axis_examples(k, letters, axes, encounters), encounters, rng=rng)
+        examples = _axis_examples(k, letters, axes, encounters)
+        found, fits = _fit_kinds(examples, encounters, limit - bits, rng=rng)
         laws.append(found)
         explained &= fits
         bits += sum(law.bits for law in found)
@@ -125,23 +126,26 @@ def _axis_examples(
 
 
 def _fit_kinds(
-    examples: AxisExamples, encounters: Encounters, *, rng: np.random.Generator
+    examples: AxisExamples, encounters: Encounters, limit: float, *, rng: np.random.Generator
 ) -> tuple[tuple[AxisLaw, ...], NDArray[np.bool_]]:
-    """One law for all kinds of contacts, or several where that is shorter: materials differ."""
+    """One law for all kinds of contacts, or several where that is shorter: materials differ.
+
+    Several are given up as soon as they need as many bits as `limit`.
+    """
     present = np.unique(encounters.kinds)
     whole = fit_axis(examples, rng=rng)
     everyone = tuple(encounters.names[k] for k in present)
-    pooled = _law(whole, everyone, len(examples))
+    pooled = _law(whole, everyone, examples)
     if whole.explained.all() or len(present) == 1:
         return (pooled,), whole.explained
-    groups = _alike(examples, _groups(examples, encounters.kinds, present, rng=rng))
-    if len(groups) == 1:
+    groups = _alike(examples, _groups(examples, encounters.kinds, present, limit, rng=rng))
+    if len(groups) < 2:
         return (pooled,), whole.explained
     explained = np.zeros(len(examples), dtype=bool)
     laws = []
     for fit, members, rows in groups:
         explained[rows] = fit.explained
-        laws.append(_law(fit, tuple(encounters.names[k] for k in members), len(rows)))
+        laws.append(_law(fit, tuple(encounters.names[k] for k in members), examples.rows(rows)))
     naming = float(len(present) * np.log2(len(groups)))
     if sum(law.bits for law in laws) + naming >= pooled.bits:
         return (pooled,), whole.explained
@@ -152,10 +156,14 @@ def _groups(
     examples: AxisExamples,
     kinds: NDArray[np.intp],
     present: NDArray[np.intp],
+    limit: float,
     *,
     rng: np.random.Generator,
 ) -> list[tuple[AxisFit, list[int], NDArray[np.intp]]]:
-    """Kinds that share a law: the fit, the kinds and their rows, the most frequent kinds first."""
+    """Kinds that share a law: the fit, the kinds and their rows, the most frequent kinds first.
+
+    None at all as soon as they need as many bits as `limit`.
+    """
     groups: list[tuple[AxisFit, list[int], NDArray[np.intp]]] = []
     for kind in sorted(present.tolist(), key=lambda k: (-int((kinds == k).sum()), k)):
         rows = np.flatnonzero(kinds == kind)
@@ -168,6 +176,8 @@ def _groups(
                 break
         else:
             groups.append((fit_axis(examples.rows(rows), rng=rng), [kind], rows))
+            if sum(fit.bits for fit, _, _ in groups) >= limit:
+                return []
     return groups
 
 
@@ -191,7 +201,8 @@ def _form(operator: Operator, pieces: tuple[Piece, ...]) -> tuple[Operator, tupl
     return operator, tuple(sorted(tuple(name for name, _ in piece.terms) for piece in pieces))
 
 
-def _law(fit: AxisFit, kinds: tuple[Kind, ...], examples: int) -> AxisLaw:
-    return AxisLaw(
-        fit.pieces, fit.operator, kinds, fit.rivals, examples, int((~fit.explained).sum()), fit.bits
-    )
+def _law(fit: AxisFit, kinds: tuple[Kind, ...], examples: AxisExamples) -> AxisLaw:
+    # Sides of 0 on which no velocity was ever seen: what ends there would be outside experience.
+    signs = (bool((examples.y < -examples.tolerance).any()), bool((examples.y > examples.tolerance).any()))
+    unexplained = int((~fit.explained).sum())
+    return AxisLaw(fit.pieces, fit.operator, kinds, fit.rivals, signs, len(examples), unexplained, fit.bits)

@@ -71,6 +71,9 @@ class AxisLaw:
     rivals
         Other choices of (operator, pieces) that explain every example just as well and as briefly. Where they
         differ, the law claims nothing.
+    signs
+        Whether velocities below and above 0 were seen after a contact. A law that never saw a body move back
+        has not seen what keeps it from doing so, and claims nothing where its impulse would make it.
     examples, unexplained
         Of these kinds, among the stored contacts.
     bits
@@ -81,6 +84,7 @@ class AxisLaw:
     operator: Operator
     kinds: tuple[Kind, ...]
     rivals: tuple[tuple[Operator, tuple[Piece, ...]], ...] = ()
+    signs: tuple[bool, bool] = (True, True)
     examples: int = 0
     unexplained: int = 0
     bits: float = 0.0
@@ -94,6 +98,12 @@ class AxisLaw:
         texts = [piece.formula(digits) for piece in self.pieces]
         return texts[0] if len(texts) == 1 else f"{self.operator}({', '.join(texts)})"
 
+    def says(self) -> tuple[Any, ...]:
+        """Operator and pieces of the law and of its rivals, weights to nine digits, and what it has seen."""
+        forms = ((self.operator, self.pieces), *self.rivals)
+        stated = tuple((o, tuple(piece.formula(9) for piece in pieces)) for o, pieces in forms)
+        return stated, self.signs, self.trusted()
+
     def trusted(self) -> bool:
         """Whether it explains nearly all of its own examples: what it doesn't, it must not claim."""
         return self.unexplained <= 0.02 * self.examples
@@ -105,6 +115,7 @@ class AxisLaw:
             "operator": self.operator,
             "kinds": [list(kind) for kind in self.kinds],
             "rivals": [[operator, _pieces_to_json(pieces)] for operator, pieces in self.rivals],
+            "signs": list(self.signs),
             "examples": self.examples,
             "unexplained": self.unexplained,
             "bits": self.bits,
@@ -118,6 +129,7 @@ class AxisLaw:
             data["operator"],
             tuple((str(a), str(b)) for a, b in data["kinds"]),
             tuple((operator, _pieces_from_json(pieces)) for operator, pieces in data["rivals"]),
+            (bool(data["signs"][0]), bool(data["signs"][1])),
             int(data["examples"]),
             int(data["unexplained"]),
             float(data["bits"]),
@@ -157,11 +169,10 @@ class PairLaw:
         return laws[0] if known is None and len(laws) == 1 else known
 
     def says(self) -> tuple[Any, ...]:
-        """What the law states: equal for laws that differ in their numbers of examples only."""
-        laws = [
-            [(law.pieces, law.operator, law.kinds, law.rivals, law.trusted()) for law in a] for a in self.axes
-        ]
-        return self.frame, laws
+        """What the law states: equal for laws that differ in examples and in rounding only."""
+        return self.frame, *(
+            tuple((law.says(), law.kinds if len(laws) > 1 else ()) for law in laws) for laws in self.axes
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""

@@ -104,7 +104,8 @@ def _refit(examples: AxisExamples, operator: Operator, pieces: tuple[Piece, ...]
         decides = explained & (np.abs(values[k] - after) <= examples.tolerance)
         alone = np.abs(np.delete(values, k, axis=0) - after).min(axis=0, initial=np.inf) > examples.tolerance
         rows = np.flatnonzero(decides & alone)
-        better.append(fitted(piece, examples.rows(rows)) if len(rows) > len(piece.terms) + 1 else piece)
+        told = piece.free_parameters() and len(rows) > len(piece.terms) + 1
+        better.append(fitted(piece, examples.rows(rows)) if told else piece)
     again = combined(operator, [examples.values(piece) for piece in better])
     now = np.abs(examples.y - again) <= examples.tolerance
     if now.sum() >= explained.sum():

@@ -61,6 +61,10 @@ class Laws:
         }
         self._columns = max(2, sum(len(schema.type(t).properties) for _, t in schema.objects))
         self._seen = 0
+        self._last: tuple[Percept, Contacts, Motion] | None = None  # predicted last, and often learned next
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_last": None}
 
     def governs(self, target: Target) -> bool:
         """Whether the laws predict a target."""
@@ -86,9 +90,10 @@ class Laws:
         if not self.learner.sources:
             return
         self._seen += 1
-        changed = self.learner.learn_one(
-            percept.layout, percept.relations, percept.vectors[0], following, stays
-        )
+        motion = self._last[2] if self._last is not None and self._last[0] is percept else None
+        contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
+        changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
+        self._last = None  # what the laws say may have changed
         if changed or self._seen % WEIGH_EVERY == 0:
             self.governed = frozenset(name for name in self.learner.types if self._shorter(name, models))
 
@@ -110,9 +115,15 @@ class Laws:
         """What the laws say of a batch of scenes; None where they govern nothing."""
         if not self.governed:
             return None
+        contacts = self._contacts(percept)
+        motion = self.learner.book.motion(contacts, percept.vectors)
+        if len(percept) == 1:
+            self._last = (percept, contacts, motion)
+        return motion
+
+    def _contacts(self, percept: Percept) -> Contacts:
         cast = self.learner.book.cast(percept.layout)
-        contacts = Contacts.of(cast, percept.relations, percept.vectors)
-        return self.learner.book.motion(contacts, percept.vectors)
+        return Contacts.of(cast, percept.relations, percept.vectors)
 
     def verdict(self, motion: Motion, percept: Percept, index: int, target: Target) -> Verdict:
         """What the laws say of one target of an object in n scenes."""

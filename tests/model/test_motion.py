@@ -1,0 +1,185 @@
+"""World models that predict by laws of motion: where they do, what they say, and what their files keep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relgym.config import ModelConfig
+from relgym.envs.ball_box_ramp import BallBoxRampEnv
+from relgym.envs.learned_model import LearnedModelEnv
+from relgym.errors import ConfigError
+from relgym.experiments.blocks import Block
+from relgym.experiments.data import ball_blocks, truck_blocks
+from relgym.experiments.rollouts import largest_errors
+from relgym.model.motion import FREE, TOUCHING
+from relgym.model.prediction import Outcome
+from relgym.model.report import report
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Target
+
+VX, VY = Target("ball", "vx"), Target("ball", "vy")
+
+
+def train(blocks: list[Block], config: ModelConfig | None = None) -> WorldModel:
+    model = WorldModel(blocks[0].schema, config)
+    for block in blocks:
+        for each in block.transitions():
+            model.learn_one(each)
+    return model
+
+
+@pytest.fixture(scope="module")
+def model() -> WorldModel:
+    return train(list(ball_blocks(2, seed=0, blocks=10)))
+
+
+@pytest.fixture(scope="module")
+def unseen() -> list[Block]:
+    return list(ball_blocks(2, seed=1, blocks=6, test=True))
+
+
+def test_laws_are_the_shorter_description_of_a_bouncing_ball(model: WorldModel) -> None:
+    assert model.governed == {"ball"}
+    assert model.governs(VX)
+    assert model.governs(VY)
+    assert model.laws is not None
+
+
+def test_every_step_is_right_corners_included(model: WorldModel, unseen: list[Block]) -> None:
+    for block in unseen:
+        found = model.predict_batch(block.layout, block.vectors[:-1])
+        assert found.ok.all()
+        assert found.frames == ("contact", "contact")
+        assert np.abs(found.vectors - block.vectors[1:]).max() < 1e-12
+    assert largest_errors(model, unseen).max() < 1e-9
+
+
+def test_one_by_one_as_in_a_batch(model: WorldModel, unseen: list[Block]) -> None:
+    block = unseen[0]
+    batch = model.predict_batch(block.layout, block.vectors[:-1])
+    for k in range(len(block)):
+        single = model.predict_one(block.scene(k))
+        assert single.scene.vector.tobytes() == batch.vectors[k].tobytes()
+        assert [p.mode for p in single.parts] == batch.modes[k].tolist()
+
+
+def test_predictions_name_the_frame_and_what_is_touched(model: WorldModel, unseen: list[Block]) -> None:
+    parts = [model.predict_one(unseen[0].scene(k))["ball", "vx"] for k in range(200)]
+    free = next(p for p in parts if p.mode == FREE)
+    touching = next(p for p in parts if p.mode == TOUCHING)
+    assert (free.frame, free.roles) == ("world", ("ball",))
+    assert (touching.frame, touching.roles[0]) == ("contact", "ball")
+    assert len(touching.roles) > 1
+
+
+def test_modes_alone_when_asked_for() -> None:
+    blocks = list(ball_blocks(1, seed=0, blocks=2))
+    model = train(blocks, ModelConfig(frames="world"))
+    assert (model.laws, model.governed) == (None, frozenset())
+    assert ModelConfig.thesis().frames == ModelConfig.original().frames == "world"
+    with pytest.raises(ConfigError, match="frames must be one of"):
+        ModelConfig(frames="contact")  # type: ignore[arg-type]
+
+
+def test_without_contacts_nothing_changes() -> None:
+    blocks = list(truck_blocks("step", seed=0, repeats=1))[:8]
+    by_default, along_axes = (train(blocks, ModelConfig(frames=f)) for f in ("auto", "world"))  # type: ignore[arg-type]
+    assert by_default.governed == frozenset()
+    assert by_default.to_json()["targets"] == along_axes.to_json()["targets"]
+
+
+def test_modes_rest_while_laws_suffice(model: WorldModel) -> None:
+    block = next(iter(ball_blocks(2, seed=9, blocks=1)))
+    before = model.property_model("ball", "vx").clusterer.y.size
+    reports = [model.learn_one(each) for each in list(block.transitions())[:5]]
+    assert [r.parts for r in reports] == [{}] * 5
+    assert model.property_model("ball", "vx").clusterer.y.size == before
+
+
+def test_laws_that_fail_wake_the_modes() -> None:
+    model = train(list(ball_blocks(1, seed=0, blocks=6)))
+    assert not model.learn_one(next(next(ball_blocks(1, seed=3, blocks=1)).transitions())).parts
+    strange = next(iter(ball_blocks(1, seed=4, blocks=1)))
+    vectors = strange.vectors.copy()
+    column = strange.layout.column(strange.layout.index("ball"), "vx")
+    vectors[1:, column] += 0.01 * np.arange(1, len(vectors))  # a wind that never blew before
+    odd = Block(strange.schema, strange.layout, vectors, strange.truth, strange.configuration)
+    reports = [model.learn_one(each) for each in list(odd.transitions())[:30]]
+    assert any(("ball", "vx") in r.parts for r in reports[1:])
+
+
+def test_a_world_the_laws_never_met_is_not_guessed(unseen: list[Block]) -> None:
+    model = train(list(ball_blocks(1, seed=0, blocks=4)))
+    assert model.laws is not None
+    assert model.laws.pair is not None
+    env = BallBoxRampEnv(balls=2)
+    scene = env.reset(seed=0)[1]["scene"]
+    vector = scene.vector.copy()
+    one, two = (scene.layout.slice(scene.layout.index(name)) for name in ("ball", "ball2"))
+    vector[two][:2] = vector[one][:2] + np.array([0.5 * vector[one][6], 0.0])
+    part = model.predict_one(type(scene)(env.schema, scene.layout, vector))["ball", "vx"]
+    assert part.outcome is Outcome.OUTSIDE  # how two balls share an impulse was never seen
+
+
+@pytest.mark.parametrize("history", [False, True])
+def test_files_keep_the_laws(model: WorldModel, unseen: list[Block], history: bool, tmp_path: Path) -> None:
+    model.save(tmp_path / "one", history=history)
+    again = WorldModel.load(tmp_path / "one")
+    block = unseen[0]
+    ours, theirs = (m.predict_batch(block.layout, block.vectors[:-1]) for m in (model, again))
+    assert ours.vectors.tobytes() == theirs.vectors.tobytes()
+    again.save(tmp_path / "two", history=history)
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+
+
+def test_learning_goes_on_as_if_never_saved(tmp_path: Path) -> None:
+    blocks = list(ball_blocks(2, seed=2, blocks=3))
+    whole = train(blocks)
+    train(blocks[:1]).save(tmp_path / "part", history=True)
+    again = WorldModel.load(tmp_path / "part")
+    for block in blocks[1:]:
+        for each in block.transitions():
+            again.learn_one(each)
+    again.save(tmp_path / "again", history=True)
+    whole.save(tmp_path / "whole", history=True)
+    assert (tmp_path / "again").read_bytes() == (tmp_path / "whole").read_bytes()
+
+
+def test_description(model: WorldModel) -> None:
+    assert [str(row) for row in report(model).laws] == [
+        "ball touching nothing: vx' = vx, vy' = vy - 0.00098",
+        "touching, along the normal n: v'_n = max(u_n, -0.95 v_n)",
+        "touching, along the slip direction t: v'_t = max(0, u_t - 0.2 J_n)",
+    ]
+    assert report(model).targets == ()
+    text = model.describe(frame="world", incline=45.0)
+    assert "max(u_n, -0.95 v_n)" in text
+    assert "vx' = -0.17 vx - 1.17 vy + 0.000588" in text
+    with pytest.raises(ConfigError, match="frame='own'"):
+        model.describe(frame="own")
+
+
+def test_explanations(model: WorldModel, unseen: list[Block]) -> None:
+    block = unseen[0]
+    modes = model.predict_batch(block.layout, block.vectors[:-1]).modes[:, 0]
+    free, touching = (int(np.flatnonzero(modes == m)[0]) for m in (FREE, TOUCHING))
+    assert "since it touches nothing" in model.explain(block.scene(free))
+    text = model.explain(block.scene(touching))
+    assert "ball touches" in text
+    assert "v'_n = max(u_n, -0.95 v_n)" in text
+
+
+def test_a_dream_by_laws_is_the_real_thing(model: WorldModel) -> None:
+    env = BallBoxRampEnv(incline=45.0, elasticity=0.95, friction=0.2)
+    dream = LearnedModelEnv(model, like=env)
+    env.reset(seed=5)
+    scene = env.scene
+    dream.reset(options={"scene": scene})
+    for _ in range(150):
+        real, *_ = env.step(0)
+        seen, _, _, truncated, info = dream.step(0)
+        assert not truncated, info
+        assert np.abs(real["ball"] - seen["ball"]).max() < 1e-9
