@@ -243,6 +243,13 @@ class ModelConfig:
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
         do. ``"world"``: modes along the world's axes for everything, as in the thesis.
+    features
+        Non-linear features offered beside the properties (§5.1): ``"trig"`` (sines and cosines at frequencies 1 to 3
+        of the type's angles, or else of all the target's own properties; ``"trig(th)"``: of that one), ``"squares"``,
+        ``"products"``, ``"degree3"``, ``"degree4"`` (of properties, and of sines and cosines if there are any), and
+        names of functions registered with `relgym.clustering.features.register_function`. ``"cart:trig"`` offers them
+        to one type only. Default none; where linear laws don't explain a property, the report says what would.
+        A linear law wins where it is enough; every kind offered makes searches slower.
     """
 
     clustering: ClusteringConfig = field(default_factory=ClusteringConfig)
@@ -252,6 +259,7 @@ class ModelConfig:
     abstain: bool = True
     work_per_step: int = 400_000
     frames: Literal["auto", "world"] = "auto"
+    features: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
@@ -305,6 +313,7 @@ class ModelConfig:
                 **data,
                 "clustering": ClusteringConfig(**data["clustering"]),
                 "classification": ClassificationConfig(**data["classification"]),
+                "features": tuple(data.get("features", ())),
             }
         )
 

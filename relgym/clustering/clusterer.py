@@ -223,7 +223,9 @@ class ModeClusterer:
         """Noise among examples of the newest example's signature."""
         ids = table.signature_ids[self.rows]
         part = np.flatnonzero(ids == ids[-1])
-        order, _ = table.signatures[ids[-1]].preference(self.target)
+        slots = table.signatures[ids[-1]]
+        order, _ = slots.preference(self.target)
+        order = order[order < len(slots.columns)]
         rows = self.rows[part]
         return estimate_noise(table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor)
 
@@ -232,6 +234,11 @@ class ModeClusterer:
         self.clusters.clear()
         self._searches.clear()
         self.labels[:] = NOISE
+
+    def retarget(self, target: Target) -> None:
+        """Be given other next values: the examples stay, modes are searched again."""
+        self.target = target
+        self._start_over()
 
     # ------------------------------------------------------------------ discovery (§3.2.2)
     def _discover(self, table: ExampleTable, example: int) -> None:
@@ -269,7 +276,7 @@ class ModeClusterer:
         order, stages = slots.preference(self.target)
         rows = self.rows[pool]
         found = find_mode(
-            table.x[rows][:, order],
+            slots.matrix(table.x[rows], order),
             y,
             table.strata[rows],
             stages=stages,

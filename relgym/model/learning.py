@@ -11,7 +11,7 @@ from relgym.clustering.clusterer import ClusterReport
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.property_model import bodies_of
-from relgym.model.scenes import next_values
+from relgym.model.scenes import next_values, unwrapped
 from relgym.scene.objects import Transition
 
 __all__ = ["LearnReport", "finish", "learn"]
@@ -43,7 +43,7 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
     before, after = transition.before, transition.after
     if parts.open:
         parts.discover_targets(before, after)
-    following = next_values(before, after)
+    following = unwrapped(before.layout, before.vector, next_values(before, after))
     reports: dict[tuple[str, str], ClusterReport] = {}
     for type_name in dict.fromkeys(t.type for t in parts.targets):
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):

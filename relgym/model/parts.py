@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
-from relgym.model.motion import Laws
+from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch
@@ -54,7 +55,8 @@ class Parts:
         self.open = targets is None
         self.targets: tuple[Target, ...] = ()
         given = tuple(dict.fromkeys(pair for t in targets or () for pair in t.given))
-        self.perception = Perception(schema, given, config.geometry)
+        chained = tuple((t.type, t.property) for t in possible_targets(schema)) if self.open else ()
+        self.perception = Perception(schema, given, config.geometry, chained=chained, features=config.features)
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}
         self.laws: Laws | None = None
@@ -109,7 +111,7 @@ class Parts:
                 f"target {target} can't be learned: it comes from outside the world; leave it out"
             )
         self.targets = (*self.targets, target)
-        self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config)
+        self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config, self.schema)
         self.tables.setdefault(target.type, ExampleTable())
 
     def discover_targets(self, before: Scene, after: Scene) -> None:
@@ -124,6 +126,10 @@ class Parts:
                 known = any(x.type == t.name and x.property == prop for x in self.targets)
                 if not known and (t.name, prop) not in derived and prop not in t.exogenous:
                     self.add_target(Target(t.name, prop))
+
+    def signature_of(self, names: tuple[str, ...]) -> SlotSignature:
+        """The slot signature of types of these names."""
+        return self.perception.signature_of(tuple(self.schema.type(name) for name in names))
 
     def property_model(self, type_name: str, prop: str) -> PropertyModel:
         """The model of one target; `QueryError` when there is none."""

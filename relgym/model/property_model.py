@@ -18,9 +18,10 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
+from relgym.model.conditions import Conditions
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
-from relgym.scene.objects import SceneLayout, Target
+from relgym.scene.objects import SceneLayout, SceneSchema, Target
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
@@ -47,9 +48,11 @@ class PropertyModel:
     target
         What it predicts.
     vocabulary
-        Names of what its classifiers are shown.
+        Names of what its classifiers are shown, next values left aside.
     config
         Free parameters.
+    schema
+        The scenes' schema.
 
     Attributes
     ----------
@@ -57,11 +60,16 @@ class PropertyModel:
         The learners of modes, of their preconditions and of who plays their roles.
     """
 
-    def __init__(self, target: Target, vocabulary: Vocabulary, config: ModelConfig) -> None:
+    def __init__(
+        self, target: Target, vocabulary: Vocabulary, config: ModelConfig, schema: SceneSchema
+    ) -> None:
         self.target = target
         self.config = config
+        self.schema = schema
+        self.conditions = Conditions(schema, target)
+        self._base = vocabulary
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
-        self.classifier = ModeClassifier(vocabulary, config.classification)
+        self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classification)
         self.casting = Casting(vocabulary, config.classification)
         self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
 
@@ -101,9 +109,11 @@ class PropertyModel:
         if report.changed:
             self._follow(table)
         number = len(self.clusterer.y) - 1
-        seen = replace(example, row=number)
+        x = table.x[row : row + 1]
+        own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
+        seen = replace(example, row=number, own=own)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
-        values = np.array(self._values_one(situation.signature, table.x[row].tolist()))
+        values = np.array(self._values_one(situation.signature, x[0].tolist()))
         assigned = UNKNOWN if report.mode == NOISE else report.mode
         played = self._played(table, np.array([number]), report.mode)[0].tolist()
         self.classifier.observe(seen, assigned, fits, values, roles=played)
@@ -116,6 +126,31 @@ class PropertyModel:
         left = float("inf") if budget is None else budget
         spent = self.classifier.refresh(left)
         return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
+
+    def retarget(self, target: Target, table: ExampleTable) -> None:
+        """Be given other next values: modes and classifiers are learned again, from what is remembered."""
+        self.target = target
+        self.conditions = Conditions(self.schema, target)
+        self.clusterer.retarget(target)
+        self.casting = Casting(self._base, self.config.classification)
+        self._follow(table)
+        self._widen(table, self.classifier.vocabulary.follows)
+
+    def lead(self, prop: str, step: float, table: ExampleTable) -> None:
+        """Take note that ``prop' = prop + step * target'``: clauses may test where that leads to."""
+        others = tuple(pair for pair in self.classifier.vocabulary.follows if pair[0] != prop)
+        self._widen(table, (*others, (prop, step)))
+
+    def _widen(self, table: ExampleTable, follows: tuple[tuple[str, float], ...]) -> None:
+        exemplars = self.classifier.exemplars
+        rows = self.clusterer.rows[exemplars.rows.astype(np.intp)]
+        ahead = np.full((len(rows), len(self.conditions.pairs)), np.nan)
+        for number in np.unique(table.signature_ids[rows]):
+            part = np.flatnonzero(table.signature_ids[rows] == number)
+            ahead[part] = self.conditions.values(table.signatures[int(number)], table.x[rows[part]])
+        own = exemplars.columns["own"][:, : len(self._base.own)]
+        vocabulary = self.conditions.vocabulary(self._base, follows)
+        self.classifier.widen(vocabulary, np.concatenate([own, ahead], axis=1))
 
     def _follow(self, table: ExampleTable) -> None:
         """The set of modes changed: what the classifiers remember is labelled anew."""
@@ -229,6 +264,16 @@ class PropertyModel:
         x = percept.rows(index, following[None])[0].tolist()
         return self._values_one(percept.situation(index).signature, x)
 
+    def example(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Example:
+        """What the classifiers are shown of a single scene; arguments as of `predict_one`."""
+        situation = percept.situation(index)
+        first = situation.examples[0]
+        own = first.own
+        if self.conditions.pairs:
+            x = percept.rows(index, following[None])
+            own = np.concatenate([own, self.conditions.values(situation.signature, x)[0]])
+        return replace(first, key=situation.keys[0], own=own)
+
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
 
@@ -246,7 +291,7 @@ class PropertyModel:
         if not self.classifier.modes:
             return nothing
         x = percept.rows(index, following[None])[0].tolist()
-        example = replace(situation.examples[0], key=situation.keys[0])
+        example = self.example(percept, index, following)
         ranking = self.classifier.rank(example, self._values_one(situation.signature, x))
         if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
             return replace(nothing, outcome=Outcome.OUTSIDE)
@@ -288,7 +333,11 @@ class PropertyModel:
             return verdict
         situation = percept.situation(index)
         x = percept.rows(index, following)
-        ranking = self.classifier.rank_batch(situation.examples, self._values(situation.signature, x, modes))
+        examples = situation.examples
+        if self.conditions.pairs:
+            ahead = self.conditions.values(situation.signature, x)
+            examples = replace(examples, own=np.concatenate([examples.own, ahead], axis=1))
+        ranking = self.classifier.rank_batch(examples, self._values(situation.signature, x, modes))
         verdict.outcomes[:] = _NO_ROLES
         waiting = np.ones(n, dtype=bool)
         if self.config.abstain and len(modes) > 1:
