@@ -13,7 +13,17 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError, ObservationError
 
-__all__ = ["NOISE", "Bools", "Example", "ExampleBatch", "Floats", "Vocabulary", "consequence", "difference", "mode_value"]
+__all__ = [
+    "NOISE",
+    "Bools",
+    "Example",
+    "ExampleBatch",
+    "Floats",
+    "Vocabulary",
+    "consequence",
+    "difference",
+    "mode_value",
+]
 
 Bools: TypeAlias = NDArray[np.bool_]
 Floats: TypeAlias = NDArray[np.float64]

@@ -74,6 +74,15 @@ class ModeClusterer:
     seed
         Seed of the random draws; the same examples and seed give the same modes.
 
+    Attributes
+    ----------
+    clusters
+        The modes at work, by id.
+    scale
+        Noise as assumed at present, and the tolerances that follow from it.
+    floor
+        Rounding noise, the least that is possible, in units of the target.
+
     Notes
     -----
     Cost per example: one evaluation of every mode, O(modes * terms * assignments). A search runs only when an
@@ -86,11 +95,14 @@ class ModeClusterer:
         self.config = config
         self.clusters: dict[int, Cluster] = {}
         self.scale = Scale(1e-12, config.inlier_stds, config.tail_stds)
+        self.floor = 1e-12
         self._rng = np.random.default_rng(seed)
         self._log = AssignmentLog()
         self._next_id = 1
         self._searches: dict[int, _Search] = {}
-        self._largest = 0.0
+        self._largest = 0.0  # number among the columns and the target's values
+        self._reach = 0.0  # value of the target
+        self._spread = 0.0  # noise found in the data, rounding apart
         self._known_noise = 0  # of a model that was loaded without its examples
 
     # ------------------------------------------------------------------ what is known
@@ -167,8 +179,8 @@ class ModeClusterer:
         example = self._log.append(row, y)
         core = table.signatures[table.signature_ids[row]].core
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
-        if largest > self._largest or len(self._log) in ESTIMATE_AT:
-            self._largest = max(largest, self._largest)
+        if largest > self._largest or abs(y) > self._reach or len(self._log) in ESTIMATE_AT:
+            self._largest, self._reach = max(largest, self._largest), max(abs(y), self._reach)
             self._rescale(table)
         return example
 
@@ -210,14 +222,17 @@ class ModeClusterer:
         if self.config.noise_std != "auto":
             self.scale = replace(self.scale, sigma=float(self.config.noise_std))
             return
-        floor = rounding_noise(np.array([[self._largest]]), self.y[:256])
+        recent = self.rows[-256:]
+        own = table.x[recent][:, : table.signatures[table.signature_ids[recent[-1]]].core]
+        floor = rounding_noise(np.array([[self._largest]]), np.append(self.y[-256:], self._reach), own)
+        self.floor = floor
         if len(self._log) in ESTIMATE_AT and 2 * self.noise_examples > len(self._log):
             estimate = self._estimate(table, floor)
             explained = 1.0 - self.noise_examples / len(self._log)
             if refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
-                self.scale = replace(self.scale, sigma=estimate)
+                self._spread = estimate
                 self._start_over()
-        self.scale = replace(self.scale, sigma=max(floor, self.scale.sigma))
+        self.scale = replace(self.scale, sigma=max(floor, self._spread))
 
     def _estimate(self, table: ExampleTable, floor: float) -> float:
         """Noise among examples of the newest example's signature."""
@@ -238,6 +253,8 @@ class ModeClusterer:
     def retarget(self, target: Target) -> None:
         """Be given other next values: the examples stay, modes are searched again."""
         self.target = target
+        self._spread = 0.0
+        self.scale = replace(self.scale, sigma=self.floor)
         self._start_over()
 
     # ------------------------------------------------------------------ discovery (§3.2.2)
@@ -356,6 +373,9 @@ class ModeClusterer:
             "sigma": self.scale.sigma,
             "next_id": self._next_id,
             "largest": self._largest,
+            "reach": self._reach,
+            "spread": self._spread,
+            "floor": self.floor,
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
@@ -371,7 +391,8 @@ class ModeClusterer:
         """Take over what `to_json` and `to_arrays` wrote; without arrays there are no examples."""
         self.scale = replace(self.scale, sigma=float(data["sigma"]))
         self._next_id = int(data["next_id"])
-        self._largest = float(data["largest"])
+        self._largest, self._reach = float(data["largest"]), float(data["reach"])
+        self._spread, self.floor = float(data["spread"]), float(data["floor"])
         self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}
         self.clusters = {int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]}

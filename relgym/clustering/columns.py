@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.features import Feature, Library
+from relgym.clustering.features import NO_FEATURES, Feature, Library
 from relgym.scene.objects import TASK, ObjectType, SceneLayout, Target
 
 __all__ = ["Column", "SlotSignature", "slot_order"]
@@ -60,7 +60,7 @@ class SlotSignature:
     types: tuple[ObjectType, ...]
     given: tuple[tuple[str, str], ...] = ()
     chained: tuple[tuple[str, str], ...] = ()
-    library: Library = Library()
+    library: Library = NO_FEATURES
 
     @cached_property
     def _hash(self) -> int:
@@ -155,7 +155,9 @@ class SlotSignature:
         width = len(self.columns)
         return x[:, index] if index < width else self.features[index - width].values(x)
 
-    def matrix(self, x: NDArray[np.float64], indices: Sequence[int] | NDArray[np.intp]) -> NDArray[np.float64]:
+    def matrix(
+        self, x: NDArray[np.float64], indices: Sequence[int] | NDArray[np.intp]
+    ) -> NDArray[np.float64]:
         """Some columns, features included, on rows ``(n, d)``; shape ``(n, len(indices))``."""
         indices = np.asarray(indices, dtype=np.intp)
         plain = indices < len(self.columns)

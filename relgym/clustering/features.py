@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 
-__all__ = ["Atom", "Feature", "Library", "library_of", "register_function"]
+__all__ = ["NO_FEATURES", "Atom", "Feature", "Library", "library_of", "register_function"]
 
 FREQUENCIES = (1, 2, 3)
 """Sines and cosines are offered at these multiples; only the first one enters products."""
@@ -153,13 +153,19 @@ class Library:
         return max((_DEGREES.get(kind, 1) for kind in self.kinds), default=1)
 
     def _turns(self, name: str) -> bool:
-        return "trig" in self.kinds and (not self.angles or name.rstrip("'").rpartition(".")[2] in self.angles)
+        return "trig" in self.kinds and (
+            not self.angles or name.rstrip("'").rpartition(".")[2] in self.angles
+        )
 
     def _offered(self, product: Sequence[Atom], names: Sequence[str]) -> bool:
         if "squares" in self.kinds and self._degree == 2 and "products" not in self.kinds:
             return len(set(product)) == 1
         # Next values enter products of two only: a library of higher degree would explode.
         return len(product) == 2 or not any(names[a.column].endswith("'") for a in product)
+
+
+NO_FEATURES = Library()
+"""The library of those who don't ask for one: linear functions."""
 
 
 def library_of(entries: Iterable[str], type_name: str, angles: tuple[str, ...]) -> Library:

@@ -51,7 +51,7 @@ class Conditions:
         return replace(base, own=(*base.own, *self.names), follows=known)
 
     def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The next values on regression rows ``(n, d)``, shape ``(n, len(pairs))``; NaN where there is no such object."""
+        """The next values on regression rows ``(n, d)``, shape ``(n, len(pairs))``; NaN where an object is missing."""
         columns = self._columns.get(id(signature))
         if columns is None:
             places = [self._place(signature, name, prop) for name, prop in self.pairs]

@@ -52,7 +52,9 @@ def angle_columns(layout: SceneLayout) -> NDArray[np.intp]:
     return found
 
 
-def unwrapped(layout: SceneLayout, now: NDArray[np.float64], following: NDArray[np.float64]) -> NDArray[np.float64]:
+def unwrapped(
+    layout: SceneLayout, now: NDArray[np.float64], following: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """The next values with every angle turned to within half a turn of the present one.
 
     So that an angle that goes round at π obeys the same law there as everywhere.
