@@ -187,6 +187,9 @@ class ClusteringConfig:
         determine isn't learned. Default 3.
     refit_growth
         A mode is refitted when its examples have grown by this factor. Default 2.
+    approximate
+        Whether, where no exact law explains most examples, the best sparse function is taken that leaves at most a
+        tenth of the change, with its residuals as noise. Default true; the thesis had no such thing.
     stickiness
         Whether, of the modes that explain an example equally well, those with fewest parameters win
         ("simple", default) or, as in the original program, whichever is nearest ("nearest").
@@ -202,6 +205,7 @@ class ClusteringConfig:
     unify_ratio: float = 0.9
     support: int = 3
     refit_growth: float = 2.0
+    approximate: bool = True
     stickiness: Literal["simple", "nearest"] = "simple"
 
     def __post_init__(self) -> None:
@@ -274,7 +278,9 @@ class ModelConfig:
         return to the noise; FOIL stops at clauses that describe more than they explain, and a rejected clause doesn't
         end learning; errors are counted on all examples; residuals within the noise are ties.
         """
-        clustering = ClusteringConfig(min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9)
+        clustering = ClusteringConfig(
+            min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9, approximate=False
+        )
         return cls._world(clustering, ClassificationConfig.thesis(), **changes)
 
     @classmethod
@@ -290,6 +296,7 @@ class ModelConfig:
             draws=1000,
             inlier_stds=3.0,
             unify_ratio=0.9,
+            approximate=False,
             stickiness="nearest",
         )
         return cls._world(clustering, ClassificationConfig.original(), **changes)

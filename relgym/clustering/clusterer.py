@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.approximation import LEFT, LEFT_LINEAR, approximate
 from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import Scale, find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
@@ -24,6 +25,12 @@ __all__ = ["ClusterReport", "ModeClusterer"]
 
 ESTIMATE_AT = (64, 512, 4096)
 """Numbers of examples after which the noise is estimated anew."""
+
+APPROXIMATE_AT = (256, 1024, 4096, 16384)
+"""Numbers of examples after which an approximation is sought, if most of them are unexplained."""
+
+MOST_ROWS, MANY_FEATURES = 1500, 200
+"""At most so many rows determine an approximation; it may have twice as many terms if there are so many columns."""
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
@@ -80,6 +87,8 @@ class ModeClusterer:
         The modes at work, by id.
     scale
         Noise as assumed at present, and the tolerances that follow from it.
+    approximate
+        Whether the noise assumed is what an approximation leaves, for want of an exact law.
     floor
         Rounding noise, the least that is possible, in units of the target.
 
@@ -96,6 +105,7 @@ class ModeClusterer:
         self.clusters: dict[int, Cluster] = {}
         self.scale = Scale(1e-12, config.inlier_stds, config.tail_stds)
         self.floor = 1e-12
+        self.approximate = False
         self._rng = np.random.default_rng(seed)
         self._log = AssignmentLog()
         self._next_id = 1
@@ -168,6 +178,8 @@ class ModeClusterer:
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
             self._discover(table, example)
+        if self._hopeless():
+            self._approximate(table)
         after = set(self.clusters)
         if after != set(errors):
             ids, fits = self.fits(table, np.array([example]))
@@ -230,7 +242,7 @@ class ModeClusterer:
             estimate = self._estimate(table, floor)
             explained = 1.0 - self.noise_examples / len(self._log)
             if refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
-                self._spread = estimate
+                self._spread, self.approximate = estimate, False
                 self._start_over()
         self.scale = replace(self.scale, sigma=max(floor, self._spread))
 
@@ -253,7 +265,7 @@ class ModeClusterer:
     def retarget(self, target: Target) -> None:
         """Be given other next values: the examples stay, modes are searched again."""
         self.target = target
-        self._spread = 0.0
+        self._spread, self.approximate = 0.0, False
         self.scale = replace(self.scale, sigma=self.floor)
         self._start_over()
 
@@ -273,6 +285,35 @@ class ModeClusterer:
                 break
             search.failures = 0
         search.waiting = 0
+
+    def _hopeless(self) -> bool:
+        """Whether it is time to look for an approximation, since exact laws explain too little."""
+        if (
+            not self.config.approximate
+            or self.config.noise_std != "auto"
+            or len(self._log) not in APPROXIMATE_AT
+        ):
+            return False
+        return 2 * self.noise_examples > len(self._log)
+
+    def _approximate(self, table: ExampleTable) -> None:
+        recent = np.arange(max(0, len(self._log) - MOST_ROWS), len(self._log))
+        signature = int(table.signature_ids[self.rows[-1]])
+        recent = recent[table.signature_ids[self.rows[recent]] == signature]
+        slots = table.signatures[signature]
+        order, stages = slots.preference(self.target)
+        order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
+        terms = self.config.max_terms * (2 if len(order) > MANY_FEATURES else 1)
+        x, y = slots.matrix(table.x[self.rows[recent]], order), self.y[recent]
+        left = LEFT if slots.features else LEFT_LINEAR
+        stds = self.scale.inlier_stds
+        found = approximate(x, y, floor=self.floor, terms=terms, stds=stds, left=left)
+        if found is None:
+            return
+        self._spread, self.approximate = found.sigma, True
+        self.scale = replace(self.scale, sigma=max(self.floor, found.sigma))
+        self._start_over()
+        self._adopt(table, signature, reordered(found.fit, order), recent[found.inliers])
 
     def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
         """Noise examples of one signature that aren't some mode's tail, oldest first."""
@@ -376,6 +417,7 @@ class ModeClusterer:
             "reach": self._reach,
             "spread": self._spread,
             "floor": self.floor,
+            "approximate": self.approximate,
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
@@ -392,6 +434,7 @@ class ModeClusterer:
         self.scale = replace(self.scale, sigma=float(data["sigma"]))
         self._next_id = int(data["next_id"])
         self._largest, self._reach = float(data["largest"]), float(data["reach"])
+        self.approximate = bool(data["approximate"])
         self._spread, self.floor = float(data["spread"]), float(data["floor"])
         self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}

@@ -93,11 +93,12 @@ class SlotSignature:
             if (self.types[self.columns[k].slot].name != TASK) and (self.columns[k].slot or not task)
         ]
         own = [self.columns[k].slot == 0 or task for k in offered]
-        found = self.library.features([self._named(k) for k in offered], own)
+        found = self.library.features([self.named(k) for k in offered], own)
         return tuple(feature.moved(offered) for feature in found)
 
-    def _named(self, k: int) -> str:
-        column = self.columns[k]
+    def named(self, index: int) -> str:
+        """A column's name, that of another object's property with its type in front."""
+        column = self.at(index)
         return column.property if column.slot == 0 else f"{self.types[column.slot].name}.{column.property}"
 
     def _rank(self, slot: int, posed: bool) -> int:

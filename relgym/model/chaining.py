@@ -9,11 +9,12 @@ a law without it is taken only where none of the former kind contradicts it. Wha
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.discovery import identified, is_law
@@ -121,17 +122,15 @@ def _free(parts: Parts, target: Target) -> tuple[_Pair, ...]:
     return tuple(pair for pair in every if pair not in after)
 
 
-def _columns(slots: SlotSignature, target: Target) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+def _columns(slots: SlotSignature, target: Target) -> NDArray[np.intp]:
     """The target's own columns and bodiless objects', features aside, next values behind; the pose too."""
     order, _ = slots.preference(target)
     width = slots.core
-    plain: np.ndarray[tuple[int], np.dtype[np.intp]] = order[order < width]
+    plain: NDArray[np.intp] = order[order < width]
     return plain
 
 
-def _read(
-    slots: SlotSignature, order: Sequence[int] | np.ndarray[tuple[int], np.dtype[np.intp]], fit: LinearFit
-) -> _Found | None:
+def _read(slots: SlotSignature, order: NDArray[np.intp], fit: LinearFit) -> _Found | None:
     columns = [slots.at(int(order[c])) for c in fit.columns]
     primes = [c for c in columns if c.property.endswith(PRIME)]
     if not primes:

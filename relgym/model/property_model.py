@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.mode_classifier import ModeClassifier
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
-from relgym.clustering.columns import SlotSignature
+from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding, bind
@@ -25,9 +26,13 @@ from relgym.scene.objects import SceneLayout, SceneSchema, Target
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
-_PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE = (
-    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE)
+_PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
+    OUTCOMES.index(o)
+    for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
 )
+
+HOPELESS, DOUBTFUL = 200, 500
+"""Without a mode after so many examples there is no law; with most of so many recent ones unexplained, hardly one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +76,38 @@ class PropertyModel:
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
         self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classification)
         self.casting = Casting(vocabulary, config.classification)
+        self._unexplained = False
         self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_bindings": {}}  # keyed by identity, which a copy doesn't share
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether it is known by now that modes don't describe the target, or just some of its examples."""
+        return self._unexplained
+
+    def _judge(self) -> bool:
+        seen = len(self.clusterer.y)
+        if not self.clusterer.clusters:
+            return seen >= HOPELESS
+        return seen >= DOUBTFUL and bool((self.clusterer.labels[-DOUBTFUL:] == NOISE).mean() > 0.5)
+
+    @property
+    def needs(self) -> frozenset[tuple[str, str]]:
+        """(type, property) pairs whose next values a mode's function reads or a clause tests."""
+        if not self.target.given:
+            return frozenset()
+        names = {
+            name for c in self.clusterer.clusters.values() for role in c.mode.roles for name, _ in role.terms
+        }
+        for c in self.classifier.classifiers:
+            names |= {literal.relation for clause in c.definition.clauses for literal in clause}
+            trees = [tree for tree in (*c.clause_trees, c.fall_through_tree) if tree is not None]
+            names |= {tree.columns[k] for tree in trees for k in tree.column if k >= 0}
+        words = {word for name in names for word in re.findall(r"[\w.]+'", name)}
+        bare = {word.rpartition(".")[2] for word in words}
+        return frozenset(pair for pair in self.target.given if pair[1] + PRIME in bare)
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -106,6 +139,7 @@ class PropertyModel:
             How the target object is situated, in a single scene.
         """
         report = self.clusterer.learn_one(table, row, y)
+        self._unexplained = self._judge()
         if report.changed:
             self._follow(table)
         number = len(self.clusterer.y) - 1
@@ -287,8 +321,9 @@ class PropertyModel:
             Next values predicted so far, shape ``(width,)``.
         """
         situation = percept.situation(index)
-        nothing = Prediction("", "", float("nan"), Outcome.NO_MODE)
-        if not self.classifier.modes:
+        outcome = Outcome.UNEXPLAINED if self._unexplained else Outcome.NO_MODE
+        nothing = Prediction("", "", float("nan"), outcome)
+        if self._unexplained or not self.classifier.modes:
             return nothing
         x = percept.rows(index, following[None])[0].tolist()
         example = self.example(percept, index, following)
@@ -329,7 +364,9 @@ class PropertyModel:
             np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.full(n, _NO_MODE, dtype=np.int8), np.zeros(n)
         )
         modes = self.classifier.modes
-        if not modes:
+        if self._unexplained:
+            verdict.outcomes[:] = _UNEXPLAINED
+        if self._unexplained or not modes:
             return verdict
         situation = percept.situation(index)
         x = percept.rows(index, following)
@@ -383,6 +420,7 @@ class PropertyModel:
         """Plain data: modes, classifiers and roles; exemplars only with history."""
         return {
             "clusterer": self.clusterer.to_json(),
+            "unexplained": self._unexplained,
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
         }
@@ -394,6 +432,7 @@ class PropertyModel:
     def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         """Take over what `to_json` and `to_arrays` wrote."""
         self.clusterer.restore(data["clusterer"], arrays)
+        self._unexplained = bool(data["unexplained"])
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
         self.casting.restore(data["casting"])
         self._bindings.clear()

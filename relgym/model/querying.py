@@ -34,7 +34,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 one = parts.laws.prediction(motion, percept, index, target)
             else:
                 one = parts.models[target].predict_one(percept, index, following)
-            if not lost.isdisjoint(target.given):
+            if not lost.isdisjoint(target.given) and not lost.isdisjoint(parts.models[target].needs):
                 one = Prediction("", "", np.nan, Outcome.DEPENDS)
             column = layout.column(index, target.property)
             if not np.isfinite(one.value):
@@ -66,7 +66,7 @@ def predict_many(
                 verdict = parts.laws.verdict(motion, percept, index, target)
             else:
                 verdict = parts.models[target].predict_batch(percept, index, following)
-            for pair in target.given:
+            for pair in parts.models[target].needs if lost else ():
                 verdict.values[lost.get(pair, nowhere)] = np.nan
                 verdict.outcomes[lost.get(pair, nowhere)] = _DEPENDS
             known = np.isfinite(verdict.values)
