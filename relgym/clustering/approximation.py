@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.numeric.stepwise import LinearFit, forward_stepwise
+from relgym.numeric.stepwise import LinearFit, eliminate_backward, forward_stepwise
 
 __all__ = ["LEFT", "LEFT_LINEAR", "Approximation", "approximate"]
 
@@ -69,4 +69,6 @@ def approximate(
     if kept.mean() < NEARLY_ALL:
         return None
     sigma = max(float(np.sqrt(np.square(error[kept]).mean())), floor)
-    return Approximation(fit, kept, sigma) if sigma <= left * float(change[kept].std()) else None
+    if sigma > left * float(change[kept].std()):
+        return None
+    return Approximation(eliminate_backward(x[kept], y[kept], fit, sigma=sigma), kept, sigma)
