@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from relgym.envs.draws import Draws, Range
+from relgym.envs.flat import FlatSpec
 from relgym.envs.tasks import Judgement, Region, Task, column_of
 from relgym.scene.objects import Float2D, ObjectType, Scene, SceneLayout, Target
 
@@ -36,6 +37,20 @@ Without a body: it is a mark on the ground and takes part in no relation."""
 
 GOAL_TARGET: Final = Target("goal", "distance", given=(("truck", "vx"),))
 """What is to be learned of the goal: that it comes nearer by what the truck moves."""
+
+FLAT: Final = FlatSpec(
+    actor="truck",
+    anchor=(0.5, -0.5, 0.0),  # its nose, at the ground
+    scales={
+        "px": (10.0,),
+        "py": (5.0,),
+        "pz": (10.0,),
+        "vx": (5.0,),
+        "friction": (0.25,),
+        "distance": (20.0, 2.0),
+    },
+)
+"""What a policy needs to see: what is under what and how it rubs, how fast it goes, and how far it is."""
 
 _DISTANCE = Range(20.0, 40.0, -1e4, 1e4)
 _BANDS = ((0.05, 0.12), (0.2, 0.3), (0.4, 0.5))  # slippery, middling, rough
