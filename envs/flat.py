@@ -111,7 +111,8 @@ class Flattener:
         # What is absent, and every mask, stands in no relation to the actor.
         origin[:, columns >= layout.width] = 0.0
         scaled = (padded[:, columns] - origin) * self._inverse
-        return np.clip(scaled, -LIMIT, LIMIT).astype(np.float32)
+        flat: NDArray[np.float32] = np.clip(scaled, -LIMIT, LIMIT).astype(np.float32)
+        return flat
 
     def _origin(self, layout: SceneLayout, vectors: Float2D) -> Float2D:
         """The point that positions are relative to, and a 0 for what is no position; shape ``(n, 4)``."""

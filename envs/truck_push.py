@@ -48,7 +48,7 @@ _OWN = len(POSE)  # a truck's velocity and a box's friction follow the pose
 _BOUNDS = {
     "vx": (0.0, 1e5),
     "friction": (0.0, 1e3),
-    "distance": (-1e5, 1e5),
+    "ahead": (-1e5, 1e5),
     **dict.fromkeys(POSE[:3], (-1e6, 1e6)),
 }
 
@@ -90,8 +90,8 @@ class TruckPushEnv(SceneEnv):
     sx, sy, sz            full extents                              unit     0         1e3
     vx (truck)            last displacement, px_t - px_{t-1}        unit     0         1e5
     friction (boxes)      friction constant                         1        0         1e3
-    distance (goal)       from the truck's nose to the pad's        unit     -1e5      1e5
-                          middle
+    ahead (goal)          how far the pad's middle lies before      unit     -1e5      1e5
+                          the truck's nose
     ====================  ========================================  =======  ========  =======
 
     Objects: ``truck``, ``box1`` … ``boxN``, and ``bystander1`` … on request, which are boxes too. With the task
@@ -99,7 +99,7 @@ class TruckPushEnv(SceneEnv):
 
     Rewards
     -------
-    0 without a task. With ``push``, d the goal's distance and a prime for the next scene,
+    0 without a task. With ``push``, d for ``goal.ahead`` and a prime for the next scene,
     ``0.1 (|d| - |d'|) - 0.02``, and 2 more when the truck stands (v' = 0) with ``|d'| <= 1``: `PushTask`.
 
     Starting State

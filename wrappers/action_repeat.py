@@ -7,8 +7,7 @@ from typing import Any, SupportsFloat
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
-from relgym.envs.arguments import checked_count
-from relgym.errors import ConfigError
+from relgym.envs.arguments import checked_count, refuse_vector_env
 
 __all__ = ["ActionRepeat"]
 
@@ -33,8 +32,7 @@ class ActionRepeat(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """
 
     def __init__(self, env: gym.Env[Any, Any], repeat: int) -> None:
-        if isinstance(env, gym.vector.VectorEnv):
-            raise ConfigError("ActionRepeat wraps single envs: make_vec takes it among its wrappers")
+        refuse_vector_env(env)
         self.repeat = checked_count("repeat", repeat, 1, 10**6)
         RecordConstructorArgs.__init__(self, repeat=self.repeat)
         gym.Wrapper.__init__(self, env)

@@ -10,8 +10,8 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from relgym.envs.arguments import refuse_vector_env
 from relgym.envs.flat import FlatSpec, Flattener
-from relgym.errors import ConfigError
 from relgym.wrappers.views import view_of
 
 __all__ = ["FlatView"]
@@ -52,8 +52,7 @@ class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordCons
     """
 
     def __init__(self, env: gym.Env[Any, Any], spec: FlatSpec | None = None) -> None:
-        if isinstance(env, gym.vector.VectorEnv):
-            raise ConfigError("FlatView wraps single envs: make_vec takes it as wrappers=[FlatView]")
+        refuse_vector_env(env)
         RecordConstructorArgs.__init__(self, spec=spec)
         gym.ObservationWrapper.__init__(self, env)
         if spec is None and env.has_wrapper_attr("flat_spec"):

@@ -88,7 +88,7 @@ def test_many_scenes_are_flattened_as_one() -> None:
     wide = np.concatenate([vectors, np.ones((20, 1))], axis=1)
     np.testing.assert_array_equal(flat(with_action, wide), together)
     # Nothing is cut off in what an agent meets but the distance at its finest scale.
-    assert flat.names[-1] == "goal.distance/2"
+    assert flat.names[-1] == "goal.ahead/2"
     assert np.abs(together[:, :-1]).max() < LIMIT
 
 

@@ -29,8 +29,8 @@ def test_the_goal_is_seen_from_afar_and_closely() -> None:
     env = FlatView(pushing())
     flat, _ = env.reset(seed=0, options={"goal_distance": 30.0})
     shown = dict(zip(env.flattener.names, flat.tolist(), strict=True))
-    assert shown["goal.distance/20"] == 1.5
-    assert shown["goal.distance/2"] == 5.0
+    assert shown["goal.ahead/20"] == 1.5
+    assert shown["goal.ahead/2"] == 5.0
     assert shown["truck.vx/5"] == 0.0
 
 
