@@ -130,7 +130,7 @@ class BallEnv(SceneEnv):
         obstacles = [
             Obstacle(o.name, _vertices(o.type, o.values), self._elasticity[o.name], self._friction[o.name])
             for o in scene
-            if o.name not in self._balls
+            if o.type.has_body and o.name not in self._balls
         ]
         radii = {ball: scene[ball]["sx"] / 2 for ball in self._balls}
         first = self._balls[0]
