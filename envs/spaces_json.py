@@ -31,7 +31,7 @@ def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
     if isinstance(space, spaces.MultiDiscrete):
         return {"kind": "multi-discrete", "nvec": space.nvec.tolist(), "start": space.start.tolist()}
     if isinstance(space, spaces.MultiBinary):
-        return {"kind": "multi-binary", "shape": list(space.shape)}
+        return {"kind": "multi-binary", "n": space.n if isinstance(space.n, int) else list(space.n)}
     if isinstance(space, spaces.Discrete):
         return {"kind": "discrete", "n": int(space.n), "start": int(space.start)}
     if isinstance(space, spaces.Box):
@@ -71,7 +71,7 @@ def _multi_discrete(data: dict[str, Any]) -> spaces.Space[Any]:
 
 
 def _multi_binary(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.MultiBinary(data["shape"])
+    return spaces.MultiBinary(data["n"])
 
 
 def _box(data: dict[str, Any]) -> spaces.Space[Any]:
