@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import gymnasium as gym
@@ -11,17 +11,26 @@ from gymnasium import spaces
 from relgym.envs.views import FlatView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ConfigError
 
-__all__ = ["SceneView", "View", "ViewLike", "chosen_view", "view_of"]
+__all__ = ["SceneView", "View", "ViewLike", "chosen_view", "is_open", "settled", "view_of"]
 
 ViewLike: TypeAlias = View | Mapping[str, Any] | Callable[[spaces.Space[Any], spaces.Space[Any]], View] | None
 """A view, its JSON form, or a function of (observation space, action space) that makes one; ``None``: chosen."""
 
 
-def view_of(env: gym.Env[Any, Any]) -> View:
-    """The view that fits an env.
+def view_of(
+    env: gym.Env[Any, Any], given: ViewLike = None, *, reward: bool = False, terminated: bool = False
+) -> View:
+    """The view of an env.
 
     An env with a ``schema`` (`relgym.envs.SceneEnv`) shows scenes already. Any other is seen as numbers: one
     object, or one per key of a Dict (`FlatView`).
+
+    Parameters
+    ----------
+    env
+        A single env.
+    given, reward, terminated
+        As of `chosen_view`.
 
     Raises
     ------
@@ -29,7 +38,9 @@ def view_of(env: gym.Env[Any, Any]) -> View:
         Images, tables and nested spaces, with what to do instead; or wrappers changed the spaces of a SceneEnv.
     """
     schema = env.get_wrapper_attr("schema") if env.has_wrapper_attr("schema") else None
-    return chosen_view(None, env.observation_space, env.action_space, schema=schema)
+    return chosen_view(
+        given, env.observation_space, env.action_space, schema=schema, reward=reward, terminated=terminated
+    )
 
 
 def chosen_view(
@@ -75,3 +86,13 @@ def chosen_view(
             f"(observation_space, action_space) that makes one, got {type(view).__name__}"
         )
     return TaskView(view, reward=reward, terminated=terminated) if reward or terminated else view
+
+
+def is_open(view: View) -> bool:
+    """Whether a view wants to see first observations before its schema is final (`FlatView.settled`)."""
+    return isinstance(view, (FlatView, TaskView)) and view.open
+
+
+def settled(view: View, observations: Sequence[Any]) -> View:
+    """The view, final, after some first observations."""
+    return view.settled(observations) if isinstance(view, (FlatView, TaskView)) else view

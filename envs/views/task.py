@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from relgym.envs.views.base import View
+from relgym.envs.views.flat import FlatView
 from relgym.errors import ConfigError
 from relgym.scene.objects import TASK, ObjectType, Scene
 
@@ -53,6 +54,18 @@ class TaskView:
             types=(*schema.types, ObjectType(TASK, self._names)),
             objects=(*schema.objects, (TASK, TASK)),
         )
+
+    @property
+    def open(self) -> bool:
+        """Whether the view of the state has pairs of numbers that may yet turn out to be angles."""
+        return bool(getattr(self.view, "open", False))
+
+    def settled(self, observations: Sequence[Any]) -> TaskView:
+        """The view with angles decided from some first observations: see `FlatView.settled`."""
+        if not isinstance(self.view, FlatView):
+            return self
+        wanted = {"reward": REWARD in self._names, "terminated": TERMINATED in self._names}
+        return TaskView(self.view.settled(observations), **wanted)
 
     def scene(
         self,
