@@ -13,8 +13,11 @@ _HOMES = {
     "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
     "EnvState": "relgym.envs.base",
     "LearnedModelEnv": "relgym.envs.learned_model",
+    "LearnedModelVectorEnv": "relgym.envs.learned_model_vector",
     "SceneEnv": "relgym.envs.base",
     "TruckPushEnv": "relgym.envs.truck_push",
+    "drawn_from": "relgym.envs.learned_model_judges",
+    "in_batches": "relgym.envs.learned_model_judges",
     "render_scene": "relgym.envs.rendering",
 }
 """Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""
@@ -23,8 +26,11 @@ __all__ = [
     "BallBoxRampEnv",
     "EnvState",
     "LearnedModelEnv",
+    "LearnedModelVectorEnv",
     "SceneEnv",
     "TruckPushEnv",
+    "drawn_from",
+    "in_batches",
     "render_scene",
 ]
 
