@@ -128,7 +128,10 @@ def compose(
 def within(
     engaged: Engaged, group: Group, velocity: FloatArray, impulse: FloatArray, slack: float
 ) -> NDArray[np.bool_]:
-    """Contacts that make bodies move as contacts were seen to make them, shape ``(m, c)``.
+    """Contacts that don't turn bodies back in a sense in which none was seen to, shape ``(m, c)``.
+
+    A contact turns a body back where the body moves, along an axis, in a sense in which it wouldn't without
+    the contact. What a contact slows down, or lets go, needs no precedent.
 
     Parameters
     ----------
@@ -142,13 +145,13 @@ def within(
     rows = np.arange(len(group.pairs))[:, None]
     a, b = engaged.first[group.pairs], engaged.second[group.pairs]
     after = velocity[:, rows, a] - velocity[:, rows, b]
-    axes = axes_of(engaged.law.frame, group.bearings, after - impulse)
+    free = after - impulse
     seen = np.ones(group.pairs.shape, dtype=bool)
-    for k, axis in enumerate(axes):
-        value, chosen = dot(after, axis), engaged.chosen[k][group.pairs]
-        acts = np.abs(dot(impulse, axis)) > slack  # what is let go may move anyhow
+    for k, axis in enumerate(axes_of(engaged.law.frame, group.bearings, free)):
+        value, without, chosen = dot(after, axis), dot(free, axis), engaged.chosen[k][group.pairs]
+        back, forth = (value < -slack) & (without >= -slack), (value > slack) & (without <= slack)
         for number, law in enumerate(engaged.law.axes[k]):
             below, above = law.signs
-            strange = ((value < -slack) & (not below)) | ((value > slack) & (not above))
-            seen &= ~(strange & acts & (chosen == number))
+            strange = (back & (not below)) | (forth & (not above))
+            seen &= ~(strange & (chosen == number))
     return seen
