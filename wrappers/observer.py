@@ -155,7 +155,14 @@ class Observer:
     def _open(self) -> None:
         model = model_of(self.view.schema, config=self._config, targets=self._targets, path=self._file)
         learn, predict, window, background = self._manner
-        self._study = Study(model, learn=learn, predict=predict, window=window, background=background)
+        self._study = Study(
+            model,
+            learn=learn,
+            predict=predict,
+            window=window,
+            precision=self.view.precision,
+            background=background,
+        )
 
     # ------------------------------------------------------------------ files
     @property

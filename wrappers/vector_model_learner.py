@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_action
 from relgym.envs.views import View
-from relgym.errors import ConfigError
+from relgym.errors import ConfigError, ObservationError
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.observer import Observer
@@ -125,10 +125,16 @@ class VectorModelLearner(gym.vector.VectorWrapper[Any, Any, Any, Any, Any]):
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         seen = self._single(observations)
         reports: NDArray[Any] = np.full(self.num_envs, None, dtype=object)
-        for k in range(self.num_envs):
-            ended = bool(terminated[k] or truncated[k])
-            outcome = (rewards[k], bool(terminated[k]), ended)
-            reports[k] = self._take_up(k, checked[k], seen[k], outcome, infos)
+        try:
+            for k in range(self.num_envs):
+                ended = bool(terminated[k] or truncated[k])
+                outcome = (rewards[k], bool(terminated[k]), ended)
+                reports[k] = self._take_up(k, checked[k], seen[k], outcome, infos)
+        except ObservationError:
+            # All envs have stepped, not all were followed: none may go on from what it saw last.
+            for follower in self._observer.followers:
+                follower.forget()
+            raise
         return observations, rewards, terminated, truncated, {**infos, "relgym": reports}
 
     def _take_up(

@@ -13,6 +13,7 @@ from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
 from relgym.envs.views.angles import candidates, circular, decoded, disjoint, tolerance
 from relgym.envs.views.arrangement import arranged, default_parts, numbered
+from relgym.envs.views.base import precision_of
 from relgym.envs.views.leaves import Numbers
 from relgym.envs.views.records import Angle, Part, Static, identifiers
 from relgym.errors import ConfigError, ObservationError
@@ -123,6 +124,11 @@ class FlatView:
         return tuple(p for p in pairs if self._owner[self.names[p[0]]] == self._owner[self.names[p[1]]])
 
     # ------------------------------------------------------------------ scenes
+    @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return precision_of(*self._numbers.single)
+
     def scene(
         self,
         observation: Any,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
+from relgym.envs.views.base import precision_of
 from relgym.envs.views.matching import matched
 from relgym.envs.views.records import Rows, Static, identifiers, merged
 from relgym.errors import ConfigError, ObservationError
@@ -123,6 +124,11 @@ class TableView:
         )
 
     # ------------------------------------------------------------------ scenes
+    @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return precision_of(self._space.dtype in (np.float16, np.float32))
+
     def scene(
         self,
         observation: Any,

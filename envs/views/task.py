@@ -56,6 +56,11 @@ class TaskView:
         )
 
     @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return self.view.precision
+
+    @property
     def open(self) -> bool:
         """Whether the view of the state has pairs of numbers that may yet turn out to be angles."""
         return bool(getattr(self.view, "open", False))
