@@ -138,7 +138,7 @@ class Observer:
         if self._study is None:
             raise ResetNeeded(
                 "whether pairs of numbers are cosine and sine of an angle is decided from the first observation: "
-                "call reset() first, or pass view=FlatView(..., angles=...)"
+                "call reset() first, or pass view=NumbersView(..., angles=...)"
             )
         return self._study
 

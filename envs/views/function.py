@@ -37,7 +37,7 @@ class FunctionView:
         Function of a scene that returns the observation that shows it; needed only by dreams of such
         observations.
     actions
-        As of `FlatView`.
+        As of `NumbersView`.
     precision
         Relative precision of the numbers, ``5e-7`` for float32: smaller errors aren't counted as wrong.
 

@@ -43,7 +43,7 @@ class TableView:
         so that the sum of squared distances is smallest; a row farther than 1 from all is a new object. Default:
         the k-th row is always the same object.
     actions, static, up, planar
-        As of `FlatView`.
+        As of `NumbersView`.
 
     Raises
     ------

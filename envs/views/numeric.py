@@ -19,10 +19,10 @@ from relgym.envs.views.records import Angle, Part, Static, identifiers
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import Float1D, Scene
 
-__all__ = ["FlatView"]
+__all__ = ["NumbersView"]
 
 
-class FlatView:
+class NumbersView:
     """Numbers as properties of objects without bodies, or with them where the user says so.
 
     A flat Box, Discrete, MultiDiscrete, MultiBinary or Tuple is one object, `self`; a Dict is one object per
@@ -59,7 +59,7 @@ class FlatView:
     Examples
     --------
     >>> box, push = spaces.Box(-9, 9, (2,), np.float64), spaces.Discrete(2)
-    >>> view = FlatView(box, push, names=("x", "v"))
+    >>> view = NumbersView(box, push, names=("x", "v"))
     >>> scene = view.with_action(view.scene(np.array([1.0, 2.0])), 1)
     >>> scene["self"]["v"], scene["action"]["a"]
     (2.0, 1.0)
@@ -99,7 +99,7 @@ class FlatView:
         """Whether some pairs of numbers may yet turn out to be angles: see `settled`."""
         return bool(self._candidates())
 
-    def settled(self, observations: Sequence[Any]) -> FlatView:
+    def settled(self, observations: Sequence[Any]) -> NumbersView:
         """The view with angles decided from some first observations; itself where nothing is open.
 
         Raises
@@ -115,7 +115,7 @@ class FlatView:
         bounded, single = np.isfinite(low) & np.isfinite(high), self._numbers.single
         found = [p for p in pairs if circular(seen, p, bounded=bool(bounded[p[0]]), single=single[p[0]])]
         angles = [Angle(self.names[i], self.names[j]) for i, j in disjoint(found)]
-        return FlatView.from_json(self.to_json() | {"angles": [[a.cos, a.sin, a.name] for a in angles]})
+        return NumbersView.from_json(self.to_json() | {"angles": [[a.cos, a.sin, a.name] for a in angles]})
 
     def _candidates(self) -> tuple[tuple[int, int], ...]:
         if not self._auto:
@@ -179,7 +179,7 @@ class FlatView:
             raise ObservationError(
                 f"{self.names[i]!r} and {self.names[j]!r} were taken for cosine and sine of an angle, but now they are "
                 f"{numbers[i]:g} and {numbers[j]:g}; say which pairs are angles, "
-                "view=FlatView(..., angles=()) if none is"
+                "view=NumbersView(..., angles=()) if none is"
             )
         last = None if before is None else float(before[self._numbers.width + k])
         return decoded(float(numbers[i]), float(numbers[j]), last=last, single=single)
@@ -209,7 +209,7 @@ class FlatView:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> FlatView:
+    def from_json(cls, data: Mapping[str, Any]) -> NumbersView:
         """Read what `to_json` wrote."""
         space = space_from_json(data["observation"])
         return cls(
