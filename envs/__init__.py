@@ -12,9 +12,15 @@ if __name__ != "relgym.envs":
 _HOMES = {
     "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
     "EnvState": "relgym.envs.base",
+    "FlatSpec": "relgym.envs.flat",
+    "Flattener": "relgym.envs.flat",
     "LearnedModelEnv": "relgym.envs.learned_model",
+    "LearnedModelVectorEnv": "relgym.envs.learned_model_vector",
     "SceneEnv": "relgym.envs.base",
+    "Task": "relgym.envs.tasks",
     "TruckPushEnv": "relgym.envs.truck_push",
+    "drawn_from": "relgym.envs.learned_model_judges",
+    "in_batches": "relgym.envs.learned_model_judges",
     "render_scene": "relgym.envs.rendering",
 }
 """Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""
@@ -22,9 +28,15 @@ _HOMES = {
 __all__ = [
     "BallBoxRampEnv",
     "EnvState",
+    "FlatSpec",
+    "Flattener",
     "LearnedModelEnv",
+    "LearnedModelVectorEnv",
     "SceneEnv",
+    "Task",
     "TruckPushEnv",
+    "drawn_from",
+    "in_batches",
     "render_scene",
 ]
 
