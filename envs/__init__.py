@@ -12,8 +12,11 @@ if __name__ != "relgym.envs":
 _HOMES = {
     "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
     "EnvState": "relgym.envs.base",
+    "FlatSpec": "relgym.envs.flat",
+    "Flattener": "relgym.envs.flat",
     "LearnedModelEnv": "relgym.envs.learned_model",
     "SceneEnv": "relgym.envs.base",
+    "Task": "relgym.envs.tasks",
     "TruckPushEnv": "relgym.envs.truck_push",
     "render_scene": "relgym.envs.rendering",
 }
@@ -22,8 +25,11 @@ _HOMES = {
 __all__ = [
     "BallBoxRampEnv",
     "EnvState",
+    "FlatSpec",
+    "Flattener",
     "LearnedModelEnv",
     "SceneEnv",
+    "Task",
     "TruckPushEnv",
     "render_scene",
 ]

@@ -13,6 +13,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from relgym.envs.arguments import checked_action
+from relgym.envs.flat import FlatSpec
 from relgym.envs.tasks import Judgement, Task
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import ACTION, POSE, Float1D, Scene, SceneLayout, SceneSchema
@@ -87,7 +88,11 @@ class SceneEnv(gym.Env[Observation, Any]):
         Constant for the env's life; wrapped envs give it with ``env.get_wrapper_attr("schema")``.
     task : Task or None
         Reward and termination as pure functions, by which dreams can be judged too.
+    flat_spec : FlatSpec
+        What flat views of the env show unless told otherwise.
     """
+
+    flat_spec = FlatSpec()
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
 

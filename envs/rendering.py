@@ -116,18 +116,10 @@ def render_scene(
     return np.ascontiguousarray(np.transpose(pygame.surfarray.array3d(surface), (1, 0, 2)), dtype=np.uint8)
 
 
-def scene_view(
-    scene: Scene,
-    names: Iterable[str] | None = None,
-    margin: float = 0.04,
-    marks: Sequence[Region] = (),
-) -> View:
-    """The view that shows these bodies (default: all) and regions, with a margin relative to their extent."""
+def scene_view(scene: Scene, names: Iterable[str] | None = None, margin: float = 0.04) -> View:
+    """The view that shows these bodies (default: all), with a margin relative to their extent."""
     wanted = None if names is None else set(names)
     extents = [_extent(d) for d in _bodies(scene) if wanted is None or d.body.name in wanted]
-    extents += [
-        (np.array([m.left, m.bottom]), np.array([m.left + m.width, m.bottom + m.height])) for m in marks
-    ]
     if not extents:
         return View(-1.0, -1.0, 2.0, 2.0)
     low, high = np.min([e[0] for e in extents], axis=0), np.max([e[1] for e in extents], axis=0)

@@ -49,7 +49,7 @@ def _push(scene: Scene, constants: float) -> NDArray[np.float32]:
     pushed = sum(map(len, stacks_of(scene)))
     mass = TRUCK_MASS + BOX_MASS * pushed
     rub = BOX_MASS * GRAVITY * constants
-    v, d = scene["truck"]["vx"], scene["goal"]["distance"]
+    v, d = scene["truck"]["vx"], scene["goal"]["ahead"]
     force = rub + mass * (_planned(v, d, slowing=rub / mass, speeding=(high - rub) / mass) - v)
     share = (np.clip(force, low, high) - low) / (high - low)
     return np.array([2.0 * share - 1.0], dtype=np.float32)

@@ -13,6 +13,7 @@ from relgym.envs.arguments import check_options, checked_count, physical_action
 from relgym.envs.base import SceneEnv
 from relgym.envs.draws import Draws, Range
 from relgym.envs.truck_goal import (
+    FLAT,
     FORCES,
     GOAL,
     GOAL_TARGET,
@@ -47,7 +48,7 @@ _OWN = len(POSE)  # a truck's velocity and a box's friction follow the pose
 _BOUNDS = {
     "vx": (0.0, 1e5),
     "friction": (0.0, 1e3),
-    "distance": (-1e5, 1e5),
+    "ahead": (-1e5, 1e5),
     **dict.fromkeys(POSE[:3], (-1e6, 1e6)),
 }
 
@@ -55,6 +56,9 @@ _TASKS = (None, "push")
 """What an agent may be asked to do."""
 
 _WATCHED_FORCES = (0.0, 500.0)
+
+_APPROACH, _BELOW, _PICTURE_WIDTH, _PICTURE_HEIGHT = 48.0, 12.0, 68.0, 32.0
+"""The picture of the goal pad, in units: what it shows on the left of it, below it, and in all."""
 
 
 class TruckPushEnv(SceneEnv):
@@ -86,8 +90,8 @@ class TruckPushEnv(SceneEnv):
     sx, sy, sz            full extents                              unit     0         1e3
     vx (truck)            last displacement, px_t - px_{t-1}        unit     0         1e5
     friction (boxes)      friction constant                         1        0         1e3
-    distance (goal)       from the truck's nose to the pad's        unit     -1e5      1e5
-                          middle
+    ahead (goal)          how far the pad's middle lies before      unit     -1e5      1e5
+                          the truck's nose
     ====================  ========================================  =======  ========  =======
 
     Objects: ``truck``, ``box1`` … ``boxN``, and ``bystander1`` … on request, which are boxes too. With the task
@@ -95,7 +99,7 @@ class TruckPushEnv(SceneEnv):
 
     Rewards
     -------
-    0 without a task. With ``push``, d the goal's distance and a prime for the next scene,
+    0 without a task. With ``push``, d for ``goal.ahead`` and a prime for the next scene,
     ``0.1 (|d| - |d'|) - 0.02``, and 2 more when the truck stands (v' = 0) with ``|d'| <= 1``: `PushTask`.
 
     Starting State
@@ -147,6 +151,8 @@ class TruckPushEnv(SceneEnv):
     ---------------
     * v0: initial version.
     """
+
+    flat_spec = FLAT
 
     def __init__(
         self,
@@ -259,10 +265,12 @@ class TruckPushEnv(SceneEnv):
         return {"configuration": dict(self._configuration)}
 
     def _view(self) -> Any:
-        from relgym.envs.rendering import scene_view
+        from relgym.envs.rendering import View, scene_view
 
-        marks = self.task.regions(self.scene) if self.task else ()
-        return scene_view(self.scene, ("truck", *self._boxes), 0.1 if marks else 0.3, marks)
+        if self.task is None:
+            return scene_view(self.scene, ("truck", *self._boxes), margin=0.3)
+        (pad,) = self.task.regions(self.scene)  # it stands still, and so does the picture
+        return View(pad.left - _APPROACH, pad.bottom - _BELOW, _PICTURE_WIDTH, _PICTURE_HEIGHT)
 
     def _hidden(self) -> Any:
         return self._stacks

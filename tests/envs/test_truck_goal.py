@@ -34,7 +34,7 @@ def force(newton: float) -> np.ndarray:
 def test_hand_worked_rewards() -> None:
     env = pushing(**EVEN, goal_distance=30.0)
     _, reward, terminated, truncated, info = env.step(force(115.0))  # v' = 40 / 40 = 1
-    assert env.scene["goal"]["distance"] == pytest.approx(29.0, abs=1e-12)
+    assert env.scene["goal"]["ahead"] == pytest.approx(29.0, abs=1e-12)
     assert reward == pytest.approx(0.1 * 1.0 - 0.02, abs=1e-12)
     assert (terminated, truncated, info["is_success"]) == (False, False, False)
     _, reward, terminated, *_ = env.step(force(0.0))  # comes to rest too early: the first stop counts
@@ -179,7 +179,7 @@ def test_the_goal_is_no_body_and_the_action_is_not_seen() -> None:
     assert [str(target) for target in env.get_wrapper_attr("schema").targets] == [
         "truck.vx",
         "box.px",
-        "goal.distance",
+        "goal.ahead",
     ]
 
 
