@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from time import perf_counter
 from typing import Any
 
@@ -11,11 +12,11 @@ from relgym.errors import ConfigError
 from relgym.model.scenes import mismatch
 from relgym.scene.objects import TASK, Scene
 from relgym.wrappers.sb3.gate import Key, TrustGate, Verdict
-from relgym.wrappers.sb3.imagination import Judge
+from relgym.wrappers.sb3.judges import Judge
 from relgym.wrappers.sb3.lens import Lens
 from relgym.wrappers.sb3.recorder import Experience
 from relgym.wrappers.sb3.settings import DynaConfig
-from relgym.wrappers.sb3.stock import DreamModel, SceneStock
+from relgym.wrappers.sb3.stock import DreamModel, SceneStock, changing
 
 __all__ = ["Apprentice", "check_model"]
 
@@ -70,29 +71,33 @@ class Apprentice:
         if len(self._waiting) > self._shuffle:
             chosen = int(self._rng.integers(len(self._waiting)))
             self._waiting[chosen], self._waiting[-1] = self._waiting[-1], self._waiting[chosen]
-            self.model.learn_one(self._waiting.pop().transition)
+            self._teach(self._waiting.pop())
+
+    def _teach(self, real: Experience) -> None:
+        if not hasattr(self.model, "learn_step"):
+            self.model.learn_one(real.transition)
+        for part in (self.model, self.judge):  # those that learn the task
+            if hasattr(part, "learn_step"):
+                part.learn_step(real.transition, real.reward, terminated=real.terminated)
 
     def _judged(self, real: Experience) -> Verdict:
         before, after = real.start, real.transition.after
         foretold = self.model.predict_one(real.transition.before)
         changes: dict[Key, float] = {}
         residuals: dict[Key, float] = {}
-        targets = self._moving()
+        moving = changing(self.model)
         for o in before:
             for prop in o.type.properties:
-                if (o.type.name, prop) in targets and o.name in after:
+                if (o.type.name, prop) in moving and o.name in after:
                     key, now = (o.type.name, prop), after[o.name][prop]
                     _widen(changes, key, now - o[prop])
                     _widen(residuals, key, now - foretold.scene[o.name][prop])
         changes[TASK, "reward"] = real.reward
         changes[TASK, "terminated"] = 1.0
-        if not foretold.ok:
-            return Verdict({}, changes)
-        return Verdict(residuals | self._task_residuals(real, foretold.scene), changes)
-
-    def _moving(self) -> set[Key]:
-        derived = {(k.type, k.property) for k in self.model.schema.kinematics}
-        return {(t.type, t.property) for t in self.model.targets} | derived
+        if foretold.ok:
+            residuals |= self._task_residuals(real, foretold.scene)
+        spoke = foretold.ok and all(map(math.isfinite, residuals.values()))
+        return Verdict(residuals if spoke else {}, changes)
 
     def _task_residuals(self, real: Experience, foretold: Scene) -> dict[Key, float]:
         layout = real.start.layout

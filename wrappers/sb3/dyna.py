@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from time import perf_counter
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -14,11 +14,12 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from relgym.errors import ConfigError
 from relgym.wrappers.sb3.apprentice import Apprentice, check_model
-from relgym.wrappers.sb3.imagination import Imagination, Imagined, Judge
+from relgym.wrappers.sb3.imagination import Imagination, Imagined
+from relgym.wrappers.sb3.judges import Judge, LearnedTask, NeuralTask
 from relgym.wrappers.sb3.lens import Lens, Observations
 from relgym.wrappers.sb3.replay import Mixing
 from relgym.wrappers.sb3.settings import DynaConfig
-from relgym.wrappers.sb3.stock import DreamModel, permuted
+from relgym.wrappers.sb3.stock import DreamModel, changing, permuted
 
 __all__ = ["Dyna", "judge_of", "lens_of"]
 
@@ -38,7 +39,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     config
         Free parameters.
     judge
-        Reward and termination of dreams; default: the env's own ``task``.
+        Reward and termination of dreams; default: the env's own ``task``. ``"learned"``: by what the model learns of
+        them, or if it leaves them out, by a `LearnedTask` beside it.
     like
         An env in the same wrappers as those that the agent acts in; needed where these run in other
         processes.
@@ -72,7 +74,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         model: DreamModel,
         config: DynaConfig | None = None,
         *,
-        judge: Judge | None = None,
+        judge: Judge | Literal["learned"] | None = None,
         like: gym.Env[Any, Any] | None = None,
         verbose: int = 0,
     ) -> None:
@@ -102,7 +104,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         lens = lens_of(self.training_env, self._like)
         _check_spaces(self.model, lens)
         check_model(self.world, lens)
-        judge = judge_of(lens, self._judge)
+        judge = judge_of(lens, self._judge, self.world)
         if self._apprentice is None:  # a second learn() goes on with what is known
             self._apprentice = Apprentice(self.world, judge, self.config)
             self.buffer.hold(self.config.capacity)
@@ -207,16 +209,20 @@ def lens_of(training_env: Any, like: gym.Env[Any, Any] | None) -> Lens:
     return Lens(inner.envs[0])
 
 
-def judge_of(lens: Lens, judge: Judge | None) -> Judge:
-    """Reward and termination of dreams: those given, or else the env's own."""
+def judge_of(lens: Lens, judge: Judge | Literal["learned"] | None, model: DreamModel) -> Judge:
+    """Reward and termination of dreams: those given, learned ones, or else the env's own."""
+    if judge == "learned":
+        if hasattr(model, "judge_all"):
+            return NeuralTask(model)
+        return LearnedTask(lens.recorder.view.schema, changing(model))
     if judge is not None:
         return judge
     recorder = lens.recorder
     task = recorder.get_wrapper_attr("task") if recorder.has_wrapper_attr("task") else None
     if task is None:
         raise ConfigError(
-            "nothing says what a dream is worth: pass judge=, an object with judge(layout, before, actions, after), "
-            "or give the env a task"
+            "nothing says what a dream is worth: pass judge='learned', or judge= an object with judge(layout, before, "
+            "actions, after), or give the env a task"
         )
     found: Judge = task
     return found

@@ -4,28 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.envs.tasks import Judgement
 from relgym.errors import ConfigError
-from relgym.scene.objects import ACTION, Float2D, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, Float2D, SceneLayout
+from relgym.wrappers.sb3.acting import acting_all
+from relgym.wrappers.sb3.judges import Judge
 from relgym.wrappers.sb3.lens import Lens, Observations, picked
 from relgym.wrappers.sb3.stock import DreamModel
 
-__all__ = ["Imagination", "Imagined", "Judge", "Policy", "acting_all"]
+__all__ = ["Imagination", "Imagined", "Policy"]
 
 Policy: TypeAlias = Callable[[Observations], tuple[NDArray[Any], NDArray[Any]]]
 """From n observations to n actions, as the env takes them and as a replay buffer keeps them."""
-
-
-class Judge(Protocol):
-    """Reward and termination of n steps; a `relgym.envs.tasks.Task` is one."""
-
-    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
-        """Judge n steps; scenes without actions, actions in the units of the bare env's space."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +160,8 @@ class Imagination:
             before, done = after[going], actions[going]
             following, spoke = self._foretell(layout, before, done)
             judged = self.judge.judge(layout, before, done, following)
+            if getattr(self.judge, "learned", False):
+                spoke &= np.isfinite(judged.rewards)
             _check(judged.rewards[spoke], self.judge)
             after[going] = np.where(spoke[:, None], following, before)
             rewards[going] += np.where(spoke, judged.rewards, 0.0)
@@ -181,22 +177,6 @@ class Imagination:
         if whole is not layout:
             after = np.delete(after, whole.slice(whole.index(ACTION)), axis=1)
         return after, found.ok & self.lens.inside(layout, after)
-
-
-def acting_all(
-    schema: SceneSchema, layout: SceneLayout, vectors: Float2D, actions: NDArray[Any]
-) -> tuple[SceneLayout, NDArray[np.float64]]:
-    """Layout and state vectors with actions in them, in physical units: `relgym.envs.actions.acting` for n."""
-    if ACTION not in schema.order:
-        return layout, vectors
-    whole = schema.layout((*layout.names, ACTION))
-    done = np.asarray(actions, dtype=np.float64).reshape(len(vectors), -1)
-    if schema.action_scale:
-        ranges = {p: (k, low, high) for k, (p, low, high) in enumerate(schema.action_scale)}
-        scaled = [ranges[prop] for prop in schema.type_of(ACTION).properties]
-        done = np.stack([low + (done[:, k] + 1.0) / 2.0 * (high - low) for k, low, high in scaled], axis=1)
-    at = whole.offsets[whole.index(ACTION)]
-    return whole, np.concatenate([vectors[:, :at], done, vectors[:, at:]], axis=1)
 
 
 def _check(rewards: NDArray[np.float64], judge: Judge) -> None:

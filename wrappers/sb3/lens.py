@@ -84,8 +84,8 @@ class Lens:
 
     def observations(self, layout: SceneLayout, vectors: Float2D) -> Observations:
         """What the agent sees of n scenes, with the dtypes of its observation space."""
-        if self._show and hasattr(self._show[0], "observe_batch"):
-            seen = self._show[0].observe_batch(layout, vectors)
+        if self._show and hasattr(self._show[0], "flattener"):
+            seen = self._show[0].flattener(layout, vectors)
             for layer in self._show[1:]:
                 seen = _stacked([layer.observation(picked(seen, k)) for k in range(len(vectors))])
         else:

@@ -21,7 +21,7 @@ from relgym.scene.objects import (
     Transition,
 )
 
-__all__ = ["DreamModel", "SceneStock", "free_properties", "permuted"]
+__all__ = ["DreamModel", "SceneStock", "changing", "free_properties", "permuted"]
 
 
 class DreamModel(Protocol):
@@ -137,6 +137,12 @@ def free_properties(model: DreamModel) -> frozenset[tuple[str, str]]:
     return frozenset((t.name, p) for t in bodiless for p in t.properties) - mentioned
 
 
+def changing(model: DreamModel) -> set[tuple[str, str]]:
+    """(type, property) pairs that the model lets change: its targets, and what follows from them."""
+    derived = {(law.type, law.property) for law in model.schema.kinematics}
+    return {(t.type, t.property) for t in model.targets} | derived
+
+
 def permuted(
     layout: SceneLayout, vectors: Float2D, model: DreamModel, *, rng: np.random.Generator
 ) -> NDArray[np.float64]:
@@ -158,14 +164,13 @@ def permuted(
         Draws the permutations.
     """
     varied = vectors.copy()
-    changing = {(t.type, t.property) for t in model.targets}
-    changing |= {(k.type, k.property) for k in model.schema.kinematics}
+    moving = changing(model)
     for name in dict.fromkeys(t.name for t in layout.types):
         indices = layout.of_type(name)
         if len(indices) < 2 or name in (ACTION, TASK):
             continue
         t = layout.types[indices[0]]
-        for properties in (t.properties, _own_properties(t, changing)):
+        for properties in (t.properties, _own_properties(t, moving)):
             if properties:
                 columns = np.array([[layout.column(i, p) for p in properties] for i in indices])
                 order = rng.permuted(np.tile(np.arange(len(indices)), (len(varied), 1)), axis=1)
@@ -173,6 +178,6 @@ def permuted(
     return varied
 
 
-def _own_properties(t: ObjectType, changing: set[tuple[str, str]]) -> tuple[str, ...]:
+def _own_properties(t: ObjectType, moving: set[tuple[str, str]]) -> tuple[str, ...]:
     placed = {t.properties[k] for k in (*t.pose_columns(), *t.velocity_columns()) if k >= 0}
-    return tuple(p for p in t.properties if p not in placed and (t.name, p) not in changing)
+    return tuple(p for p in t.properties if p not in placed and (t.name, p) not in moving)
