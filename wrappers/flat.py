@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import refuse_vector_env
 from relgym.envs.flat import FlatSpec, Flattener
 from relgym.errors import ConfigError
-from relgym.scene.objects import SceneSchema
 from relgym.wrappers.views import SceneView, view_of
 
 __all__ = ["FlatView"]
@@ -59,7 +58,13 @@ class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordCons
         gym.ObservationWrapper.__init__(self, env)
         if spec is None and env.has_wrapper_attr("flat_spec"):
             spec = env.get_wrapper_attr("flat_spec")
-        self._schema = _schema_of(env)
+        view = view_of(env)
+        if not isinstance(view, SceneView):
+            raise ConfigError(
+                f"{env} has no `schema`: expected an env whose observations are scenes (relgym.envs.SceneEnv); "
+                "observations that are numbers need no flattening, or gymnasium.wrappers.FlattenObservation"
+            )
+        self._schema = view.schema
         self.flattener = Flattener(self._schema, spec or FlatSpec())
         self.observation_space = self.flattener.space
 
@@ -68,13 +73,3 @@ class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordCons
         scene = self._schema.scene(observation)
         flat: NDArray[np.float32] = self.flattener(scene.layout, scene.vector[None])[0]
         return flat
-
-
-def _schema_of(env: gym.Env[Any, Any]) -> SceneSchema:
-    view = view_of(env)
-    if not isinstance(view, SceneView):
-        raise ConfigError(
-            f"expected an env whose observations are scenes, got {env.observation_space} and no schema; numbers "
-            "without objects need no FlatView: pass the env as it is"
-        )
-    return view.schema
