@@ -16,9 +16,12 @@ _HOMES = {
     "FlatSpec": "relgym.envs.flat",
     "Flattener": "relgym.envs.flat",
     "LearnedModelEnv": "relgym.envs.learned_model",
+    "LearnedModelVectorEnv": "relgym.envs.learned_model_vector",
     "SceneEnv": "relgym.envs.base",
     "Task": "relgym.envs.tasks",
     "TruckPushEnv": "relgym.envs.truck_push",
+    "drawn_from": "relgym.envs.learned_model_judges",
+    "in_batches": "relgym.envs.learned_model_judges",
     "render_scene": "relgym.envs.rendering",
 }
 """Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""
@@ -30,9 +33,12 @@ __all__ = [
     "FlatSpec",
     "Flattener",
     "LearnedModelEnv",
+    "LearnedModelVectorEnv",
     "SceneEnv",
     "Task",
     "TruckPushEnv",
+    "drawn_from",
+    "in_batches",
     "render_scene",
 ]
 
