@@ -138,11 +138,15 @@ def test_reset_is_needed_first(make: type[SceneEnv]) -> None:
         make().step(0)
 
 
-@ids
-def test_videos_are_recorded(env_id: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("env_id", "arguments"), [*((name, {}) for name in IDS), ("relgym/TruckPush-v0", {"task": "push"})]
+)
+def test_videos_are_recorded(env_id: str, arguments: dict[str, Any], tmp_path: Path) -> None:
     pytest.importorskip("moviepy", reason="RecordVideo writes through moviepy")
     folder = tmp_path / "videos"
-    env = gym.wrappers.RecordVideo(gym.make(env_id, render_mode="rgb_array"), str(folder), video_length=5)
+    env = gym.wrappers.RecordVideo(
+        gym.make(env_id, render_mode="rgb_array", **arguments), str(folder), video_length=5
+    )
     env.reset(seed=0)
     for _ in range(5):
         env.step(env.action_space.sample())
