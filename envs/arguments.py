@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeAlias
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
@@ -25,6 +26,7 @@ __all__ = [
     "numbered",
     "per_object",
     "physical_action",
+    "refuse_vector_env",
 ]
 
 Coefficient: TypeAlias = float | Mapping[str, float]
@@ -124,6 +126,15 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
             "clip or rescale it"
         )
     return np.clip(array, space.low, space.high)
+
+
+def refuse_vector_env(env: Any) -> None:
+    """Raise `ConfigError` where a wrapper of single envs is put round a vector env."""
+    if isinstance(env, gym.vector.VectorEnv):
+        raise ConfigError(
+            "expected a single env, got a vector env: let make_vec wrap each of its envs, "
+            "gym.make_vec(id, num_envs=n, vectorization_mode='sync', wrappers=[...])"
+        )
 
 
 def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:

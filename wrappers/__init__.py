@@ -10,6 +10,8 @@ if __name__ != "relgym.wrappers":
     )
 
 _HOMES = {
+    "ActionRepeat": "relgym.wrappers.action_repeat",
+    "FlatView": "relgym.wrappers.flat",
     "ModelLearner": "relgym.wrappers.model_learner",
     "Prequential": "relgym.wrappers.prequential",
     "SceneView": "relgym.wrappers.views",
@@ -20,6 +22,8 @@ _HOMES = {
 """Where each public name lives; loaded on first use."""
 
 __all__ = [
+    "ActionRepeat",
+    "FlatView",
     "ModelLearner",
     "Prequential",
     "SceneView",

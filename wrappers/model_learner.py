@@ -4,30 +4,30 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from functools import partial
+from typing import Any
 
 import gymnasium as gym
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 
-from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
+from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_action
 from relgym.envs.model_files import EnvRecord
-from relgym.errors import ConfigError, ObservationError
-from relgym.model.prediction import ScenePrediction
-from relgym.model.storage import target_from_json, target_to_json
+from relgym.errors import ConfigError
+from relgym.model.storage import target_to_json
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Scene, SceneSchema, Target, Transition
-from relgym.wrappers.prequential import Prequential, StepReport, compared
-from relgym.wrappers.views import view_of
+from relgym.scene.objects import Scene
+from relgym.wrappers.follower import BadObservations, Follower
+from relgym.wrappers.prequential import Prequential
+from relgym.wrappers.settings import PlainTarget, config_of, model_of, target_of
+from relgym.wrappers.study import NOTHING, Study
+from relgym.wrappers.views import ViewLike, is_open, settled, view_of
 
 __all__ = ["STARTS", "ModelLearner"]
 
 STARTS = 16
 """How many first scenes of episodes a model file keeps, for dreams to start from."""
-
-PlainTarget: TypeAlias = Target | str | Sequence[Any]
-"""A target, its name (``"ball.vx"``), or ``(type, property)``."""
 
 
 class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -41,8 +41,11 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     Parameters
     ----------
     env
-        An env whose observations are scenes (`relgym.envs.SceneEnv`), possibly in wrappers that leave its
-        observations and actions as they are.
+        Any env with flat spaces, or whose observations are scenes (`relgym.envs.SceneEnv`), possibly in wrappers.
+    view
+        How its observations and actions become scenes: a view (`relgym.envs.views`), or a function of
+        (observation space, action space) that makes one. Default: the env's own objects if it has a schema, else
+        its numbers as one object, or one per key of a Dict.
     targets
         What to learn, in causal order: `Target`, or its name ``"ball.vx"``. Default: the schema's targets, and
         if it names none, every property that changes.
@@ -53,6 +56,15 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         Whether to learn from the start on; see `learning`.
     predict
         Whether to predict before each step. Default true; false saves the time, and then nothing is counted.
+    learn_reward, learn_termination
+        Whether these are learned too, as properties of a bodiless object `task`.
+    bad_observations
+        What to do with NaN, infinity, wrong lengths, unknown objects, objects that changed their type:
+        ``"raise"`` (default) `ObservationError`, or ``"skip"`` them, counted in `skipped`.
+    background
+        Learn in a process of its own, behind a queue of at most this many transitions; steps then report nothing,
+        and `model` and `prequential` are those of the last `catch_up`. What finds the queue full is left out, and
+        counted in `dropped`. Default ``None``: learn in `step`.
     model
         A model file to go on from, instead of an empty model; it keeps its targets and config.
     window
@@ -60,17 +72,14 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
 
     Attributes
     ----------
-    model : WorldModel
-        What was learned; through other wrappers: ``env.get_wrapper_attr("model")``.
     view : View
-        How observations and actions become scenes.
-    prequential : Prequential
-        How many predictions were wrong, in total and lately.
+        How observations and actions become scenes. Final after the first reset, where a pair of numbers looks like
+        cosine and sine.
 
     Raises
     ------
     ConfigError
-        A vector env, an env without a schema, changed spaces, unknown parameters, or a model of another world.
+        A vector env, spaces that need a view of the user's, unknown parameters, or a model of another world.
 
     Notes
     -----
@@ -92,44 +101,54 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         self,
         env: gym.Env[Any, Any],
         *,
+        view: ViewLike = None,
         targets: Sequence[PlainTarget] | None = None,
         config: ModelConfig | Mapping[str, Any] | None = None,
         learn: bool = True,
         predict: bool = True,
+        learn_reward: bool = False,
+        learn_termination: bool = False,
+        bad_observations: BadObservations = "raise",
+        background: int | None = None,
         model: str | os.PathLike[str] | None = None,
         window: int = 1000,
     ) -> None:
         _refuse_vector_env(env)
-        chosen = None if targets is None else [_target(t) for t in targets]
-        settings = None if config is None else _config(config)
+        chosen = None if targets is None else [target_of(t) for t in targets]
+        settings = None if config is None else config_of(config)
         # Plain data only: recorded arguments are deep-copied, and a learner among them would be forked.
         RecordConstructorArgs.__init__(
             self,
+            view=view,
             targets=None if chosen is None else [target_to_json(t) for t in chosen],
             config=None if settings is None else settings.to_json(),
             learn=learn,
             predict=predict,
+            learn_reward=learn_reward,
+            learn_termination=learn_termination,
+            bad_observations=bad_observations,
+            background=background,
             model=None if model is None else os.fspath(model),
             window=window,
         )
         gym.Wrapper.__init__(self, env)
-        self.view = view_of(env)
-        self.prequential = Prequential(window)
-        self.model = _model(self.view.schema, settings, chosen, model)
-        self.learning = learn
-        self._predict = predict
-        self._scene: Scene | None = None
-        self._over = False
+        self.view = view_of(env, view, reward=learn_reward, terminated=learn_termination)
+        self._model_of = partial(model_of, config=settings, targets=chosen, path=model)
+        self._study_of = partial(Study, learn=learn, predict=predict, window=window, background=background)
+        self._follower = Follower(self.view, bad_observations)
         self._starts: list[Scene] = []
+        self._study: Study | None = None
+        if not is_open(self.view):
+            self._open_study()
 
     # ------------------------------------------------------------------ the Gymnasium contract
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; `ObservationError` when its first observation is no scene (the model is unchanged)."""
-        self._scene, self._over = None, False
+        self._follower.forget()
         observation, info = self.env.reset(seed=seed, options=options)
-        self._begin(observation)
+        self._begin(observation, info)
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -140,46 +159,81 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         ActionError
             An action outside the action space; model and env are unchanged.
         ObservationError
-            The next observation is no scene of this world. The env has stepped, the model is unchanged;
-            `reset` begins anew.
+            The next observation is no scene of this world, and such aren't skipped. The env has stepped, the model
+            is unchanged; `reset` begins anew.
         """
         checked = checked_action(self.env.action_space, action)
-        if self._over:
+        follower = self._follower
+        if follower.over:
             return self._step_over(action)
-        before = self.view.with_action(self.scene, checked)
-        prediction = self.model.predict_one(before) if self._predict else None
+        before = follower.act(checked)
+        prediction = None if self._study is None else self._study.expect(before)
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self._scene = None  # until the next observation proves sound
-        after = self._seen(observation)
-        report = self._take_up(before, prediction, after)
-        self._scene, self._over = after, bool(terminated or truncated)
+        follower.over = bool(terminated or truncated)
+        transition = follower.follow(
+            before, prediction, observation, info, reward=float(reward), terminated=bool(terminated)
+        )
+        report = NOTHING if self._study is None else self._study.take_up(transition, prediction)
         return observation, reward, terminated, truncated, {**info, "relgym": report}
+
+    def close(self) -> None:
+        """Close the env, and end the background process if there is one, once it has learned all."""
+        if self._study is not None:
+            self._study.close()
+        super().close()
 
     # ------------------------------------------------------------------ learning
     @property
+    def model(self) -> WorldModel:
+        """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``."""
+        return self.study.model
+
+    @property
+    def prequential(self) -> Prequential:
+        """How many predictions were wrong, in total and lately."""
+        return self.study.prequential
+
+    @property
+    def study(self) -> Study:
+        """Who learns; `ResetNeeded` where the view wants to see a first observation."""
+        if self._study is None:
+            raise ResetNeeded(
+                "whether pairs of numbers are cosine and sine of an angle is decided from the first observation: "
+                "call reset() first, or pass view=FlatView(..., angles=...)"
+            )
+        return self._study
+
+    @property
     def learning(self) -> bool:
         """Whether transitions are being learned from; `ConfigError` to ask it of a model without history."""
-        return self._learn
+        return self.study.learning
 
     @learning.setter
     def learning(self, learn: bool) -> None:
-        if learn and self.model.frozen:
-            raise ConfigError(
-                "this model was loaded without its history and can only predict: save it with "
-                "save(path, history=True), or pass learn=False"
-            )
-        self._learn = learn
+        self.study.learning = learn
 
     def pause(self) -> None:
         """Stop learning; predictions go on and are counted. ``learning = True`` goes on."""
         self.learning = False
 
     @property
+    def skipped(self) -> int:
+        """How many bad observations were skipped."""
+        return self._follower.skipped
+
+    @property
+    def dropped(self) -> int:
+        """How many transitions found the queue to the background process full."""
+        return self.study.dropped
+
+    def catch_up(self) -> WorldModel:
+        """Wait until the background process has learned all it was sent; the model as it then is."""
+        return self.study.catch_up()
+
+    @property
     def scene(self) -> Scene:
         """The current scene, without an action; `ResetNeeded` before the first reset or after a bad observation."""
-        if self._scene is None:
-            raise ResetNeeded("no current scene: call reset() first")
-        return self._scene
+        return self._follower.scene
 
     # ------------------------------------------------------------------ files
     @property
@@ -207,39 +261,34 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         ConfigError
             A space that can't be written.
         """
-        self.model.extra = self.record.to_json()
-        self.model.save(path, history=history)
+        model = self.catch_up()
+        model.extra = self._extra()
+        model.save(path, history=history)
 
     # ------------------------------------------------------------------ helpers
-    def _begin(self, observation: Any) -> None:
-        self._scene = self._seen(observation)
-        if len(self._starts) < STARTS:
-            self._starts.append(self._scene)
-            # So that model.save, too, writes a file to dream from.
-            self.model.extra = self.record.to_json()
+    def _open_study(self) -> None:
+        self._study = self._study_of(self._model_of(self.view.schema))
 
-    def _seen(self, observation: Any) -> Scene:
-        try:
-            return self.view.scene(observation)
-        except ObservationError as error:
-            raise ObservationError(
-                f"{error} (the env has moved on, the model is unchanged: call reset() to begin anew)"
-            ) from error
+    def _begin(self, observation: Any, info: dict[str, Any]) -> None:
+        if self._study is None:
+            self.view = self._follower.view = settled(self.view, [observation])
+            self._open_study()
+        scene = self._follower.begin(observation, info)
+        if scene is not None and len(self._starts) < STARTS:
+            self._starts.append(scene)
+            # So that model.save, too, writes a file to dream from.
+            self.model.extra = self._extra()
+
+    def _extra(self) -> dict[str, Any]:
+        return self.record.to_json() | {"view": self.view.to_json()}
 
     def _step_over(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """A step after an episode's end: an `Autoreset` inside resets, and the action means nothing."""
-        self._scene, self._over = None, False
+        self._follower.forget()
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self._begin(observation)
-        self._over = bool(terminated or truncated)
-        return observation, reward, terminated, truncated, {**info, "relgym": StepReport(None, {}, (), None)}
-
-    def _take_up(self, before: Scene, prediction: ScenePrediction | None, after: Scene) -> StepReport:
-        residuals, wrong = compared(prediction, after)
-        if prediction is not None:
-            self.prequential.count(residuals, wrong)
-        learned = self.model.learn_one(Transition(before, after)) if self._learn else None
-        return StepReport(prediction, residuals, wrong, learned)
+        self._begin(observation, info)
+        self._follower.over = bool(terminated or truncated)
+        return observation, reward, terminated, truncated, {**info, "relgym": NOTHING}
 
 
 def _refuse_vector_env(env: Any) -> None:
@@ -249,46 +298,3 @@ def _refuse_vector_env(env: Any) -> None:
             "(gym.make_vec(id, num_envs=n, vectorization_mode='sync', wrappers=[ModelLearner])): each then has "
             "a model of its own"
         )
-
-
-def _target(given: PlainTarget) -> Target:
-    if isinstance(given, Target):
-        return given
-    if not isinstance(given, str):
-        return target_from_json([*given, []] if len(given) == 2 else list(given))
-    type_name, dot, prop = given.rpartition(".")  # type names may hold dots
-    if not (dot and type_name and prop):
-        raise ConfigError(f"target {given!r}: expected 'ball.vx', ('ball', 'vx') or a Target")
-    return Target(type_name, prop)
-
-
-def _config(given: ModelConfig | Mapping[str, Any]) -> ModelConfig:
-    if isinstance(given, ModelConfig):
-        return given
-    try:
-        halves = {
-            "clustering": ClusteringConfig(**given.get("clustering", {})),
-            "classification": ClassificationConfig(**given.get("classification", {})),
-        }
-        return ModelConfig(**{**given, **halves})
-    except TypeError as error:
-        raise ConfigError(f"config={dict(given)!r}: {error}; see relgym.config.ModelConfig") from None
-
-
-def _model(
-    schema: SceneSchema,
-    config: ModelConfig | None,
-    targets: Sequence[Target] | None,
-    path: str | os.PathLike[str] | None,
-) -> WorldModel:
-    if path is None:
-        return WorldModel(schema, config, targets=targets)
-    if config is not None or targets is not None:
-        raise ConfigError("a loaded model keeps its targets and config: pass either model or those")
-    model = WorldModel.load(path)
-    if model.schema != schema:
-        raise ConfigError(
-            f"{path}: the model was learned in another world (objects {list(model.schema.order)}) than the env's "
-            f"(objects {list(schema.order)}); make the env with the arguments it was learned with"
-        )
-    return model

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.laws.frames import Bearings, axes_of, axis_names
+from relgym.laws.joints import Joint, Joints
 from relgym.laws.records import AxisLaw, PairLaw
 from relgym.laws.touching import Group
 from relgym.scene.geometry.vectors import FloatArray, dot
@@ -79,21 +80,21 @@ def respond(
 
 
 def compose(
-    engaged: Engaged, group: Group, share: FloatArray, now: FloatArray, free: FloatArray
+    engaged: Engaged, group: Group, joints: Joints, now: FloatArray, free: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Next velocities of all bodies in scenes with equally many contacts.
 
-    Returns velocities of shape ``(d, m, K)`` and each contact's change of the relative velocity of its two
+    Returns velocities of the shape of `free` and each contact's change of the relative velocity of its two
     bodies, ``(d, m, c)``.
 
     Parameters
     ----------
     engaged, group
         The laws and the contacts.
-    share
-        The first body's share of each contact's impulse, shape ``(m, c)``.
+    joints
+        Who takes which part of each contact's impulse.
     now, free
-        Velocities before, and of free bodies, shape ``(d, m, K)``.
+        Velocities (and spins) before, and of free bodies, shape ``(d [+ 1], m, K)``.
 
     Notes
     -----
@@ -102,53 +103,60 @@ def compose(
     result doesn't depend on its company. Cost O(sweeps * contacts).
     """
     velocity = free.copy()
-    impulse = np.zeros((len(now), *group.pairs.shape))
+    impulse = np.zeros(group.bearings.normal.shape)
     active = np.arange(len(group.pairs))
     for _ in range(SWEEPS):
         change = np.zeros(len(active))
         for k in range(group.pairs.shape[1]):
-            pair = group.pairs[active, k]
-            a, b, part = engaged.first[pair], engaged.second[pair], share[active, k]
+            joint, there = _joint(engaged, group, joints, active, k)
             own = impulse[:, active, k]
-            others = velocity[:, active, a] - velocity[:, active, b] - own
-            before = now[:, active, a] - now[:, active, b]
-            there = group.bearings.take((active, k))
-            new = respond(engaged.law.axes, engaged.chosen[:, pair], engaged.law.frame, there, before, others)
-            step = new - own
-            velocity[:, active, a] += part * step
-            velocity[:, active, b] -= (1.0 - part) * step
+            others = joint.relative(velocity) - own
+            chosen = engaged.chosen[:, group.pairs[active, k]]
+            new = respond(engaged.law.axes, chosen, engaged.law.frame, there, joint.relative(now), others)
+            joint.apply(new - own, velocity)
             impulse[:, active, k] = new
-            change = np.maximum(change, np.abs(step).max(axis=0))
+            change = np.maximum(change, np.abs(new - own).max(axis=0))
         active = active[change > SETTLED]
         if not len(active) or group.pairs.shape[1] == 1:
             break
     return velocity, impulse
 
 
+def _joint(
+    engaged: Engaged, group: Group, joints: Joints, scenes: NDArray[np.intp], contact: int
+) -> tuple[Joint, Bearings]:
+    """One contact of some scenes, and the directions there."""
+    pair = group.pairs[scenes, contact]
+    there = group.bearings.take((scenes, contact))
+    return joints.at(scenes, contact, engaged.first[pair], engaged.second[pair], there.normal), there
+
+
 def within(
-    engaged: Engaged, group: Group, velocity: FloatArray, impulse: FloatArray, slack: float
+    engaged: Engaged, group: Group, joints: Joints, velocity: FloatArray, impulse: FloatArray, slack: float
 ) -> NDArray[np.bool_]:
-    """Contacts that make bodies move as contacts were seen to make them, shape ``(m, c)``.
+    """Contacts that don't turn bodies back in a sense in which none was seen to, shape ``(m, c)``.
+
+    A contact turns a body back where the body moves, along an axis, in a sense in which it wouldn't without
+    the contact. What a contact slows down, or lets go, needs no precedent.
 
     Parameters
     ----------
-    engaged, group
-        The laws and the contacts.
+    engaged, group, joints
+        The laws, the contacts and their bodies.
     velocity, impulse
         What `compose` gave.
     slack
         Velocities up to this count as 0.
     """
-    rows = np.arange(len(group.pairs))[:, None]
-    a, b = engaged.first[group.pairs], engaged.second[group.pairs]
-    after = velocity[:, rows, a] - velocity[:, rows, b]
-    axes = axes_of(engaged.law.frame, group.bearings, after - impulse)
     seen = np.ones(group.pairs.shape, dtype=bool)
-    for k, axis in enumerate(axes):
-        value, chosen = dot(after, axis), engaged.chosen[k][group.pairs]
-        acts = np.abs(dot(impulse, axis)) > slack  # what is let go may move anyhow
-        for number, law in enumerate(engaged.law.axes[k]):
-            below, above = law.signs
-            strange = ((value < -slack) & (not below)) | ((value > slack) & (not above))
-            seen &= ~(strange & acts & (chosen == number))
+    scenes = np.arange(len(group.pairs))
+    for k in range(group.pairs.shape[1]):
+        joint, there = _joint(engaged, group, joints, scenes, k)
+        after = joint.relative(velocity)
+        free = after - impulse[..., k]
+        for j, axis in enumerate(axes_of(engaged.law.frame, there, free)):
+            value, without = dot(after, axis), dot(free, axis)
+            back, forth = (value < -slack) & (without >= -slack), (value > slack) & (without <= slack)
+            below, above = np.array([law.signs for law in engaged.law.axes[j]]).T[:, engaged.chosen[j][group.pairs[:, k]]]
+            seen[:, k] &= ~(back & ~below) & ~(forth & ~above)
     return seen

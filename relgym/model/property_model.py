@@ -206,7 +206,7 @@ class PropertyModel:
         """Slots of a mode's open roles, by the role classifiers; None if they can't be filled."""
         bodies = bodies_of(order, layout)
         place = {body: slot for slot, body in enumerate(bodies) if body >= 0}
-        played = self.casting.assign(self.mode(mode), example, tuple(place))
+        played = self.casting.assign(self.mode(mode), example, tuple(place), sure=self.config.abstain)
         if played is None:
             return None
         cast = iter(played)
@@ -259,7 +259,10 @@ class PropertyModel:
             if binding.open:
                 slots = self._cast(mode, binding, example, situation.order[0], layout)
             if slots is None:
-                continue
+                if not self.config.abstain:
+                    continue
+                # What lost the vote doesn't become likely because the winner's players are in doubt.
+                return replace(nothing, outcome=Outcome.OUTSIDE)
             rest = iter(slots)
             played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
             roles = tuple(layout.names[situation.order[0, s]] for s in played)
@@ -296,12 +299,18 @@ class PropertyModel:
             verdict.outcomes[~waiting] = _OUTSIDE
         for place in range(len(modes)):
             for mode in np.unique(ranking.modes[waiting, place]):
+                binding = self._binding(situation.signature, int(mode))
+                if binding is None:
+                    continue
                 part = np.flatnonzero(waiting & (ranking.modes[:, place] == mode))
-                done, values = self._apply(int(mode), percept, situation, x, part)
+                done, values = self._apply(int(mode), binding, percept, situation, x, part)
                 verdict.values[done], verdict.modes[done] = values, mode
                 verdict.outcomes[done] = _PREDICTED
                 verdict.margins[done] = ranking.margin[done] if place == 0 else 0.0
                 waiting[done] = False
+                if self.config.abstain:  # in doubt about the players
+                    verdict.outcomes[part[waiting[part]]] = _OUTSIDE
+                    waiting[part] = False
             if not waiting.any():
                 break
         return verdict
@@ -309,15 +318,13 @@ class PropertyModel:
     def _apply(
         self,
         mode: int,
+        binding: Binding,
         percept: Percept,
         situation: Situation,
         x: NDArray[np.float64],
         part: NDArray[np.intp],
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Those of the given examples whose roles can be filled, and the mode's values there."""
-        binding = self._binding(situation.signature, mode)
-        if binding is None:
-            return part[:0], np.empty(0)
         if not binding.open:
             return part, binding.values(x[part])[:, 0]
         done, values = [], []

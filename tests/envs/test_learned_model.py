@@ -501,8 +501,9 @@ def test_spaces_survive_json() -> None:
             "a": spaces.Box(-1.0, np.array([1.0, 2.0], np.float32), dtype=np.float32),
             "b": spaces.Discrete(3, start=1),
             "c": spaces.Box(-np.inf, np.inf, (2, 2), dtype=np.float64),
+            "d": spaces.Tuple([spaces.MultiDiscrete([2, 3], start=[1, 0]), spaces.MultiBinary(2)]),
         }
     )
     assert space_from_json(json.loads(json.dumps(space_to_json(space)))) == space
-    with pytest.raises(ConfigError, match="Box, Discrete and Dict"):
-        space_to_json(spaces.MultiBinary(2))
+    with pytest.raises(ConfigError, match="MultiBinary, Dict and Tuple spaces"):
+        space_to_json(spaces.Text(2))
