@@ -86,7 +86,7 @@ class BoxRelations:
 
     def on_top(self, touching: _Pairs) -> _Pairs:
         """Whether the first body lies on the second one; `touching` says which bodies touch, ``(K, K, n)``."""
-        found = self.less(self._axes.up).swapaxes(0, 1) & touching
+        found: _Pairs = self.less(self._axes.up).swapaxes(0, 1) & touching
         for h in self._axes.horizontal:
             low, high, offset = self._low[h], self._high[h], self._offset(h)
             top = np.minimum(high[:, None] + offset, high[None])

@@ -69,7 +69,7 @@ class Relations:
         self.layout, self.names = layout, names
         self._axes, self._plan = axes, plan
         self._sights = tuple(sights)
-        self._size = sum(sight.pose.shape[2] for sight in self._sights)
+        self._size: int = sum(sight.pose.shape[2] for sight in self._sights)
         self._kept: dict[str, _Table] = {}
         self._of: dict[int, FloatArray] = {}
         self._table: _Table | None = None
@@ -145,10 +145,13 @@ class Relations:
         sights = [Sight(self._plan, vectors, self._sights[0].eps)]
         return Relations(self.layout, self._axes, self.names, self._plan, sights)
 
+    def touched(self, body: int) -> _Table:
+        """Which bodies touch one, shape ``(n, K)``; it doesn't touch itself."""
+        return self.distances(body) <= self._sights[0].eps
+
     def context(self, body: int) -> _Table:
         """Return the target's close set (`close_set`), shape ``(n, K)``."""
-        distance = self.distances(body)
-        return close_set(distance <= self._sights[0].eps, distance, body)
+        return close_set(self.touched(body), self.distances(body), body)
 
     def normals(self, body: int) -> FloatArray:
         """Return the unit normals from each other body to this one, shape ``(n, K, d)``; NaN for itself."""

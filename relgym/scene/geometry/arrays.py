@@ -204,7 +204,7 @@ class ArrayGeometry:
         """Check the extents of n scenes and take up their polyhedra, for `fill` and `bounds`."""
         check_extents(self._bodies, self._axes, pose, self._spheres)
         cornered = pose.take(self._polyhedra, axis=1)
-        return Solids(self._kernel, cornered, cornered.take(self._turns, axis=0))
+        return Solids(self._kernel, cornered, cornered.take(self._turns, axis=0) != 0.0)
 
     def fill(
         self,
