@@ -30,6 +30,8 @@ class Background:
         What it begins with; a copy.
     prequential
         Where to begin counting the errors of predictions; ``None``: it doesn't predict.
+    precision
+        As of `Study`.
     queue
         Most transitions that may wait, >= 1. Raising it drops fewer when learning falls behind, and lets the model lag
         more.
@@ -46,13 +48,18 @@ class Background:
     depends on the machine, so the model isn't reproducible when any are.
     """
 
-    def __init__(self, model: WorldModel, prequential: Prequential | None, *, queue: int) -> None:
+    def __init__(
+        self, model: WorldModel, prequential: Prequential | None, *, queue: int, precision: float = 0.0
+    ) -> None:
         length = checked_count("background", queue, 1, 10**7)
         context = multiprocessing.get_context("spawn")
         self._queue: Any = context.Queue(length)
         self._answers, remote = context.Pipe(duplex=False)
         self._process = context.Process(
-            target=_learn, args=(model, prequential, self._queue, remote), daemon=True, name="relgym-learner"
+            target=_learn,
+            args=(model, prequential, precision, self._queue, remote),
+            daemon=True,
+            name="relgym-learner",
         )
         self._process.start()
         remote.close()  # so that the end of the process is the end of the pipe
@@ -108,7 +115,9 @@ class Background:
         self._answers.close()
 
 
-def _learn(model: WorldModel, prequential: Prequential | None, queue: Any, answers: Any) -> None:
+def _learn(
+    model: WorldModel, prequential: Prequential | None, precision: float, queue: Any, answers: Any
+) -> None:
     """The process' life: learn what comes; answer every ``None`` with all that was learned so far."""
     trouble: Exception | None = None
     while True:
@@ -117,14 +126,16 @@ def _learn(model: WorldModel, prequential: Prequential | None, queue: Any, answe
             answers.send((model, prequential) if trouble is None else trouble)
         elif trouble is None:
             try:
-                _take_up(model, prequential, _unpacked(model.schema, packed))
+                _take_up(model, prequential, precision, _unpacked(model.schema, packed))
             except Exception as error:
                 trouble = error
 
 
-def _take_up(model: WorldModel, prequential: Prequential | None, transition: Transition) -> None:
+def _take_up(
+    model: WorldModel, prequential: Prequential | None, precision: float, transition: Transition
+) -> None:
     if prequential is not None:
-        residuals, wrong = compared(model.predict_one(transition.before), transition.after)
+        residuals, wrong = compared(model.predict_one(transition.before), transition.after, precision)
         prequential.count(residuals, wrong)
     model.learn_one(transition)
 

@@ -4,30 +4,26 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import gymnasium as gym
-from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 
 from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_action
 from relgym.envs.model_files import EnvRecord
+from relgym.envs.views import View
 from relgym.errors import ConfigError
-from relgym.model.storage import target_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
-from relgym.wrappers.follower import BadObservations, Follower
+from relgym.wrappers.follower import BadObservations
+from relgym.wrappers.observer import STARTS, Observer
 from relgym.wrappers.prequential import Prequential
-from relgym.wrappers.settings import PlainTarget, config_of, model_of, target_of
-from relgym.wrappers.study import NOTHING, Study
-from relgym.wrappers.views import ViewLike, is_open, settled, view_of
+from relgym.wrappers.settings import PlainTarget
+from relgym.wrappers.study import NOTHING
+from relgym.wrappers.views import ViewLike, view_of
 
 __all__ = ["STARTS", "ModelLearner"]
-
-STARTS = 16
-"""How many first scenes of episodes a model file keeps, for dreams to start from."""
 
 
 class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -70,12 +66,6 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     window
         How many steps count as the latest in `prequential`.
 
-    Attributes
-    ----------
-    view : View
-        How observations and actions become scenes. Final after the first reset, where a pair of numbers looks like
-        cosine and sine.
-
     Raises
     ------
     ConfigError
@@ -114,41 +104,46 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         window: int = 1000,
     ) -> None:
         _refuse_vector_env(env)
-        chosen = None if targets is None else [target_of(t) for t in targets]
-        settings = None if config is None else config_of(config)
+        self._observer = Observer(
+            view_of(env, view, reward=learn_reward, terminated=learn_termination),
+            env.observation_space,
+            env.action_space,
+            targets=targets,
+            config=config,
+            model=model,
+            learn=learn,
+            predict=predict,
+            window=window,
+            background=background,
+            bad_observations=bad_observations,
+            metadata={
+                "env": None if env.spec is None else env.spec.id,
+                "render_fps": env.metadata.get("render_fps"),
+            },
+        )
         # Plain data only: recorded arguments are deep-copied, and a learner among them would be forked.
         RecordConstructorArgs.__init__(
             self,
+            **self._observer.arguments,
             view=view,
-            targets=None if chosen is None else [target_to_json(t) for t in chosen],
-            config=None if settings is None else settings.to_json(),
             learn=learn,
             predict=predict,
             learn_reward=learn_reward,
             learn_termination=learn_termination,
             bad_observations=bad_observations,
             background=background,
-            model=None if model is None else os.fspath(model),
             window=window,
         )
         gym.Wrapper.__init__(self, env)
-        self.view = view_of(env, view, reward=learn_reward, terminated=learn_termination)
-        self._model_of = partial(model_of, config=settings, targets=chosen, path=model)
-        self._study_of = partial(Study, learn=learn, predict=predict, window=window, background=background)
-        self._follower = Follower(self.view, bad_observations)
-        self._starts: list[Scene] = []
-        self._study: Study | None = None
-        if not is_open(self.view):
-            self._open_study()
 
     # ------------------------------------------------------------------ the Gymnasium contract
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; `ObservationError` when its first observation is no scene (the model is unchanged)."""
-        self._follower.forget()
+        self._observer.followers[0].forget()
         observation, info = self.env.reset(seed=seed, options=options)
-        self._begin(observation, info)
+        self._observer.begin({0: (observation, info)})
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -163,54 +158,56 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
             is unchanged; `reset` begins anew.
         """
         checked = checked_action(self.env.action_space, action)
-        follower = self._follower
+        observer, follower = self._observer, self._observer.followers[0]
         if follower.over:
             return self._step_over(action)
         before = follower.act(checked)
-        prediction = None if self._study is None else self._study.expect(before)
+        prediction = observer.expect(before)
         observation, reward, terminated, truncated, info = self.env.step(action)
         follower.over = bool(terminated or truncated)
-        transition = follower.follow(
-            before, prediction, observation, info, reward=float(reward), terminated=bool(terminated)
+        report = observer.follow(
+            0, before, prediction, observation, info, reward=reward, terminated=bool(terminated)
         )
-        report = NOTHING if self._study is None else self._study.take_up(transition, prediction)
         return observation, reward, terminated, truncated, {**info, "relgym": report}
+
+    def _step_over(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """A step after an episode's end: an `Autoreset` inside resets, and the action means nothing."""
+        follower = self._observer.followers[0]
+        follower.forget()
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._observer.begin({0: (observation, info)})
+        follower.over = bool(terminated or truncated)
+        return observation, reward, terminated, truncated, {**info, "relgym": NOTHING}
 
     def close(self) -> None:
         """Close the env, and end the background process if there is one, once it has learned all."""
-        if self._study is not None:
-            self._study.close()
+        self._observer.close()
         super().close()
 
     # ------------------------------------------------------------------ learning
     @property
+    def view(self) -> View:
+        """How observations and actions become scenes; final after the first reset, where angles are open."""
+        return self._observer.view
+
+    @property
     def model(self) -> WorldModel:
         """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``."""
-        return self.study.model
+        return self._observer.study.model
 
     @property
     def prequential(self) -> Prequential:
         """How many predictions were wrong, in total and lately."""
-        return self.study.prequential
-
-    @property
-    def study(self) -> Study:
-        """Who learns; `ResetNeeded` where the view wants to see a first observation."""
-        if self._study is None:
-            raise ResetNeeded(
-                "whether pairs of numbers are cosine and sine of an angle is decided from the first observation: "
-                "call reset() first, or pass view=FlatView(..., angles=...)"
-            )
-        return self._study
+        return self._observer.study.prequential
 
     @property
     def learning(self) -> bool:
         """Whether transitions are being learned from; `ConfigError` to ask it of a model without history."""
-        return self.study.learning
+        return self._observer.study.learning
 
     @learning.setter
     def learning(self, learn: bool) -> None:
-        self.study.learning = learn
+        self._observer.study.learning = learn
 
     def pause(self) -> None:
         """Stop learning; predictions go on and are counted. ``learning = True`` goes on."""
@@ -219,33 +216,30 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     @property
     def skipped(self) -> int:
         """How many bad observations were skipped."""
-        return self._follower.skipped
+        return self._observer.skipped
 
     @property
     def dropped(self) -> int:
         """How many transitions found the queue to the background process full."""
-        return self.study.dropped
+        return self._observer.study.dropped
 
     def catch_up(self) -> WorldModel:
         """Wait until the background process has learned all it was sent; the model as it then is."""
-        return self.study.catch_up()
+        return self._observer.study.catch_up()
 
     @property
     def scene(self) -> Scene:
         """The current scene, without an action; `ResetNeeded` before the first reset or after a bad observation."""
-        return self._follower.scene
+        return self._observer.followers[0].scene
 
     # ------------------------------------------------------------------ files
     @property
     def record(self) -> EnvRecord:
         """What a model file says of the env: spaces and the first scenes of the first episodes."""
-        spec = self.env.spec
-        known = {"env": None if spec is None else spec.id, "render_fps": self.env.metadata.get("render_fps")}
-        metadata = {name: value for name, value in known.items() if value is not None}
-        return EnvRecord(self.env.observation_space, self.env.action_space, tuple(self._starts), metadata)
+        return self._observer.record
 
     def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
-        """Write the model, the env's spaces and some first scenes to one file, atomically.
+        """Write the model, the env's spaces and view and some first scenes to one file, atomically.
 
         ``gym.make("relgym/LearnedModel-v0", model=path)`` needs nothing else.
 
@@ -261,40 +255,12 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         ConfigError
             A space that can't be written.
         """
-        model = self.catch_up()
-        model.extra = self._extra()
-        model.save(path, history=history)
-
-    # ------------------------------------------------------------------ helpers
-    def _open_study(self) -> None:
-        self._study = self._study_of(self._model_of(self.view.schema))
-
-    def _begin(self, observation: Any, info: dict[str, Any]) -> None:
-        if self._study is None:
-            self.view = self._follower.view = settled(self.view, [observation])
-            self._open_study()
-        scene = self._follower.begin(observation, info)
-        if scene is not None and len(self._starts) < STARTS:
-            self._starts.append(scene)
-            # So that model.save, too, writes a file to dream from.
-            self.model.extra = self._extra()
-
-    def _extra(self) -> dict[str, Any]:
-        return self.record.to_json() | {"view": self.view.to_json()}
-
-    def _step_over(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """A step after an episode's end: an `Autoreset` inside resets, and the action means nothing."""
-        self._follower.forget()
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        self._begin(observation, info)
-        self._follower.over = bool(terminated or truncated)
-        return observation, reward, terminated, truncated, {**info, "relgym": NOTHING}
+        self._observer.save(path, history=history)
 
 
 def _refuse_vector_env(env: Any) -> None:
     if isinstance(env, gym.vector.VectorEnv):
         raise ConfigError(
-            "expected a single env, got a vector env, whose envs a single learner can't follow; wrap each of them "
-            "(gym.make_vec(id, num_envs=n, vectorization_mode='sync', wrappers=[ModelLearner])): each then has "
-            "a model of its own"
+            "expected a single env, got a vector env: VectorModelLearner(env) learns one model from all of its envs, "
+            "and gym.make_vec(id, num_envs=n, vectorization_mode='sync', wrappers=[ModelLearner]) one from each"
         )

@@ -28,6 +28,8 @@ class Study:
         Whether to learn, and whether to predict before.
     window
         How many steps count as the latest.
+    precision
+        Relative precision of what is observed; errors below it aren't counted as wrong.
     background
         Length of the queue to a process that learns in the background; ``None``: learn here.
 
@@ -46,15 +48,19 @@ class Study:
         learn: bool = True,
         predict: bool = True,
         window: int = 1000,
+        precision: float = 0.0,
         background: int | None = None,
     ) -> None:
         self.model = model
         self.prequential = Prequential(window)
         self._predict = predict
+        self._precision = precision
         self.learning = learn
         self._background: Background | None = None
         if background is not None:
-            self._background = Background(model, self.prequential if predict else None, queue=background)
+            self._background = Background(
+                model, self.prequential if predict else None, precision=precision, queue=background
+            )
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy has a model of its own; a process can't be copied, so the copy learns here.
@@ -94,7 +100,7 @@ class Study:
             if self._learn:
                 self._background.put(transition)
             return NOTHING
-        residuals, wrong = compared(prediction, transition.after)
+        residuals, wrong = compared(prediction, transition.after, self._precision)
         if prediction is not None:
             self.prequential.count(residuals, wrong)
         learned = self.model.learn_one(transition) if self._learn else None

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import gymnasium as gym
 from gymnasium import spaces
 
-from relgym.envs.views import FlatView, SceneView, TaskView, View, view_from_json
+from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ConfigError
 
 __all__ = ["SceneView", "View", "ViewLike", "chosen_view", "is_open", "settled", "view_of"]
@@ -23,7 +23,7 @@ def view_of(
     """The view of an env.
 
     An env with a ``schema`` (`relgym.envs.SceneEnv`) shows scenes already. Any other is seen as numbers: one
-    object, or one per key of a Dict (`FlatView`).
+    object, or one per key of a Dict (`NumbersView`).
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def chosen_view(
     view: Any
     if given is None:
         if schema is None:
-            view = FlatView(observation_space, action_space)
+            view = NumbersView(observation_space, action_space)
         else:
             view = SceneView(schema, observation_space, action_space)
     elif isinstance(given, Mapping):
@@ -82,17 +82,17 @@ def chosen_view(
         view = given(observation_space, action_space) if callable(given) else given
     if not isinstance(view, View):
         raise ConfigError(
-            f"view={given!r}: expected a view (FlatView, TableView, FunctionView, ...), or a function of "
+            f"view={given!r}: expected a view (NumbersView, TableView, FunctionView, ...), or a function of "
             f"(observation_space, action_space) that makes one, got {type(view).__name__}"
         )
     return TaskView(view, reward=reward, terminated=terminated) if reward or terminated else view
 
 
 def is_open(view: View) -> bool:
-    """Whether a view wants to see first observations before its schema is final (`FlatView.settled`)."""
-    return isinstance(view, (FlatView, TaskView)) and view.open
+    """Whether a view wants to see first observations before its schema is final (`NumbersView.settled`)."""
+    return isinstance(view, (NumbersView, TaskView)) and view.open
 
 
 def settled(view: View, observations: Sequence[Any]) -> View:
     """The view, final, after some first observations."""
-    return view.settled(observations) if isinstance(view, (FlatView, TaskView)) else view
+    return view.settled(observations) if isinstance(view, (NumbersView, TaskView)) else view

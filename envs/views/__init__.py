@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from relgym.envs.views.base import View
-from relgym.envs.views.flat import FlatView
 from relgym.envs.views.function import FunctionView
+from relgym.envs.views.numeric import NumbersView
 from relgym.envs.views.records import Angle, Part, Rows, Static
 from relgym.envs.views.scene import SceneView
 from relgym.envs.views.table import TableView
@@ -18,8 +18,8 @@ __all__ = [
     "REWARD",
     "TERMINATED",
     "Angle",
-    "FlatView",
     "FunctionView",
+    "NumbersView",
     "Part",
     "Rows",
     "SceneView",
@@ -53,7 +53,7 @@ def view_from_json(data: Mapping[str, Any]) -> View:
 
 
 _READERS: dict[str, Callable[[Mapping[str, Any]], View]] = {
-    "flat": FlatView.from_json,
+    "flat": NumbersView.from_json,
     "scene": SceneView.from_json,
     "table": TableView.from_json,
 }

@@ -1,4 +1,4 @@
-"""Which of an observation's numbers lie where in the scenes of a `FlatView`."""
+"""Which of an observation's numbers lie where in the scenes of a `NumbersView`."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def arranged(
     names
         Names of all numbers, in order.
     parts, angles, static
-        What there is: see `FlatView`; every number is in one part.
+        What there is: see `NumbersView`; every number is in one part.
     action
         Type of the action object.
     axes

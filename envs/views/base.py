@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
+
 from relgym.scene.objects import Scene, SceneSchema
 
-__all__ = ["View"]
+__all__ = ["View", "precision_of"]
 
 
 @runtime_checkable
@@ -23,6 +25,11 @@ class View(Protocol):
     """
 
     schema: SceneSchema
+
+    @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: 0 for float64, 4 roundings for float32."""
+        ...
 
     def scene(
         self,
@@ -67,3 +74,8 @@ class View(Protocol):
     def to_json(self) -> dict[str, Any]:
         """Plain data that `relgym.envs.views.view_from_json` reads back."""
         ...
+
+
+def precision_of(*single: bool) -> float:
+    """Relative precision of numbers some of which may be float32: 0 if none is, else four roundings."""
+    return 4.0 * float(np.finfo(np.float32).eps) if any(single) else 0.0

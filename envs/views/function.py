@@ -37,7 +37,9 @@ class FunctionView:
         Function of a scene that returns the observation that shows it; needed only by dreams of such
         observations.
     actions
-        As of `FlatView`.
+        As of `NumbersView`.
+    precision
+        Relative precision of the numbers, ``5e-7`` for float32: smaller errors aren't counted as wrong.
 
     Raises
     ------
@@ -66,8 +68,9 @@ class FunctionView:
         *,
         inverse: Callable[[Scene], Any] | None = None,
         actions: Sequence[str] | None = None,
+        precision: float = 0.0,
     ) -> None:
-        self._function, self._inverse = function, inverse
+        self._function, self._inverse, self.precision = function, inverse, precision
         self._acts: Acts | None = None
         if ACTION in schema.order:
             check_action_space(schema, action_space)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from gymnasium import spaces
 
 from relgym.envs.actions import acting, check_action_space
 from relgym.envs.spaces_json import space_from_json, space_to_json
+from relgym.envs.views.base import precision_of
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.storage import schema_from_json, schema_to_json
 from relgym.scene.objects import ACTION, Scene, SceneSchema
@@ -42,6 +44,11 @@ class SceneView:
         self._needed = frozenset(
             name for name in schema.order if (t := schema.type_of(name)).has_body and not t.optional
         )
+
+    @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return precision_of(*(box.dtype == np.float32 for box in self._boxes.values()))
 
     def scene(
         self,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
+from relgym.envs.views.base import precision_of
 from relgym.envs.views.matching import matched
 from relgym.envs.views.records import Rows, Static, identifiers, merged
 from relgym.errors import ConfigError, ObservationError
@@ -42,7 +43,7 @@ class TableView:
         so that the sum of squared distances is smallest; a row farther than 1 from all is a new object. Default:
         the k-th row is always the same object.
     actions, static, up, planar
-        As of `FlatView`.
+        As of `NumbersView`.
 
     Raises
     ------
@@ -123,6 +124,11 @@ class TableView:
         )
 
     # ------------------------------------------------------------------ scenes
+    @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return precision_of(self._space.dtype in (np.float16, np.float32))
+
     def scene(
         self,
         observation: Any,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from relgym.envs.views.base import View
-from relgym.envs.views.flat import FlatView
+from relgym.envs.views.numeric import NumbersView
 from relgym.errors import ConfigError
 from relgym.scene.objects import TASK, ObjectType, Scene
 
@@ -56,13 +56,18 @@ class TaskView:
         )
 
     @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return self.view.precision
+
+    @property
     def open(self) -> bool:
         """Whether the view of the state has pairs of numbers that may yet turn out to be angles."""
         return bool(getattr(self.view, "open", False))
 
     def settled(self, observations: Sequence[Any]) -> TaskView:
-        """The view with angles decided from some first observations: see `FlatView.settled`."""
-        if not isinstance(self.view, FlatView):
+        """The view with angles decided from some first observations: see `NumbersView.settled`."""
+        if not isinstance(self.view, NumbersView):
             return self
         wanted = {"reward": REWARD in self._names, "terminated": TERMINATED in self._names}
         return TaskView(self.view.settled(observations), **wanted)

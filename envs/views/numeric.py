@@ -13,15 +13,16 @@ from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
 from relgym.envs.views.angles import candidates, circular, decoded, disjoint, tolerance
 from relgym.envs.views.arrangement import arranged, default_parts, numbered
+from relgym.envs.views.base import precision_of
 from relgym.envs.views.leaves import Numbers
 from relgym.envs.views.records import Angle, Part, Static, identifiers
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import Float1D, Scene
 
-__all__ = ["FlatView"]
+__all__ = ["NumbersView"]
 
 
-class FlatView:
+class NumbersView:
     """Numbers as properties of objects without bodies, or with them where the user says so.
 
     A flat Box, Discrete, MultiDiscrete, MultiBinary or Tuple is one object, `self`; a Dict is one object per
@@ -58,7 +59,7 @@ class FlatView:
     Examples
     --------
     >>> box, push = spaces.Box(-9, 9, (2,), np.float64), spaces.Discrete(2)
-    >>> view = FlatView(box, push, names=("x", "v"))
+    >>> view = NumbersView(box, push, names=("x", "v"))
     >>> scene = view.with_action(view.scene(np.array([1.0, 2.0])), 1)
     >>> scene["self"]["v"], scene["action"]["a"]
     (2.0, 1.0)
@@ -98,7 +99,7 @@ class FlatView:
         """Whether some pairs of numbers may yet turn out to be angles: see `settled`."""
         return bool(self._candidates())
 
-    def settled(self, observations: Sequence[Any]) -> FlatView:
+    def settled(self, observations: Sequence[Any]) -> NumbersView:
         """The view with angles decided from some first observations; itself where nothing is open.
 
         Raises
@@ -114,7 +115,7 @@ class FlatView:
         bounded, single = np.isfinite(low) & np.isfinite(high), self._numbers.single
         found = [p for p in pairs if circular(seen, p, bounded=bool(bounded[p[0]]), single=single[p[0]])]
         angles = [Angle(self.names[i], self.names[j]) for i, j in disjoint(found)]
-        return FlatView.from_json(self.to_json() | {"angles": [[a.cos, a.sin, a.name] for a in angles]})
+        return NumbersView.from_json(self.to_json() | {"angles": [[a.cos, a.sin, a.name] for a in angles]})
 
     def _candidates(self) -> tuple[tuple[int, int], ...]:
         if not self._auto:
@@ -123,6 +124,11 @@ class FlatView:
         return tuple(p for p in pairs if self._owner[self.names[p[0]]] == self._owner[self.names[p[1]]])
 
     # ------------------------------------------------------------------ scenes
+    @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return precision_of(*self._numbers.single)
+
     def scene(
         self,
         observation: Any,
@@ -173,7 +179,7 @@ class FlatView:
             raise ObservationError(
                 f"{self.names[i]!r} and {self.names[j]!r} were taken for cosine and sine of an angle, but now they are "
                 f"{numbers[i]:g} and {numbers[j]:g}; say which pairs are angles, "
-                "view=FlatView(..., angles=()) if none is"
+                "view=NumbersView(..., angles=()) if none is"
             )
         last = None if before is None else float(before[self._numbers.width + k])
         return decoded(float(numbers[i]), float(numbers[j]), last=last, single=single)
@@ -203,7 +209,7 @@ class FlatView:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> FlatView:
+    def from_json(cls, data: Mapping[str, Any]) -> NumbersView:
         """Read what `to_json` wrote."""
         space = space_from_json(data["observation"])
         return cls(
