@@ -228,6 +228,8 @@ def within(
         for j, axis in enumerate(axes_of(engaged.law.frame, there, free)):
             value, without = dot(after, axis), dot(free, axis)
             back, forth = (value < -slack) & (without >= -slack), (value > slack) & (without <= slack)
-            below, above = np.array([law.signs for law in engaged.law.axes[j]]).T[:, engaged.chosen[j][group.pairs[:, k]]]
+            below, above = np.array([law.signs for law in engaged.law.axes[j]]).T[
+                :, engaged.chosen[j][group.pairs[:, k]]
+            ]
             seen[:, k] &= ~(back & ~below) & ~(forth & ~above)
     return seen
