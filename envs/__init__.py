@@ -11,6 +11,7 @@ if __name__ != "relgym.envs":
 
 _HOMES = {
     "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
+    "BallGoalEnv": "relgym.envs.ball_goal",
     "EnvState": "relgym.envs.base",
     "FlatSpec": "relgym.envs.flat",
     "Flattener": "relgym.envs.flat",
@@ -27,6 +28,7 @@ _HOMES = {
 
 __all__ = [
     "BallBoxRampEnv",
+    "BallGoalEnv",
     "EnvState",
     "FlatSpec",
     "Flattener",

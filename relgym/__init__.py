@@ -17,6 +17,7 @@ if (_ROOT / "pyproject.toml").is_file() and (_ROOT / "envs" / "__init__.py").is_
 
 # Entry points are strings: importing relgym loads neither pymunk nor the learner.
 gymnasium.register("relgym/BallBoxRamp-v0", "relgym.envs.ball_box_ramp:BallBoxRampEnv", max_episode_steps=200)
+gymnasium.register("relgym/BallGoal-v0", "relgym.envs.ball_goal:BallGoalEnv", max_episode_steps=500)
 gymnasium.register(
     "relgym/LearnedModel-v0",
     "relgym.envs.learned_model:LearnedModelEnv",

@@ -100,7 +100,7 @@ def _of_group(
     cast = contacts.cast
     now, free, columns = book.free_motion(cast, vectors)
     joints = book.joints(contacts, group, columns)
-    velocity, impulse = compose(engaged, group, joints, now, free)
+    velocity, impulse, _ = compose(engaged, group, joints, now, free)
     for k, pair in enumerate(group.pairs[0].tolist()):
         a, b = cast.first[[pair]], cast.second[[pair]]
         there = group.bearings.take((slice(None), k))

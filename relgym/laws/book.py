@@ -167,16 +167,16 @@ class LawBook:
             return
         joints = self.joints(contacts, group, motion.columns)
         before, free = now[:, scenes], motion.velocity[:, scenes]
-        after, impulse = compose(laws[0], group, joints, before, free)
+        after, impulse, settled = compose(laws[0], group, joints, before, free)
         least = laws[0].chosen[:, group.pairs].min(axis=0)
         lawful = ((least >= 0) & joints.known()).all(axis=1, keepdims=True)
         governed = slice(None) if laws[0].law.frame == POINT else slice(cast.dimensions)
         stated = ~involved | (lawful & np.isfinite(after[governed]).all(axis=0))
         slack = SPREAD * self.tolerance
         seen = within(laws[0], group, joints, after, impulse, slack).all(axis=1, keepdims=True)
-        sure = stated & (~involved | seen)
+        sure = stated & (~involved | (seen & settled[:, None]))
         for rival in laws[1:]:
-            other, _ = compose(rival, group, joints, before, free)
+            other = compose(rival, group, joints, before, free).velocity
             sure &= (np.abs(other - after)[governed] <= slack).all(axis=0) | ~involved
         motion.velocity[:, scenes] = np.where(involved & stated, after, free)
         motion.stated[scenes] &= stated

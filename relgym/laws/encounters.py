@@ -117,8 +117,11 @@ class EncounterStore:
         free = [self._free(book, kinds, side)[:, part] for side in "ab"]
         now, after = ([self._column(f"{name}_{side}")[:, part] for side in "ab"] for name in ("now", "after"))
         arms = [self._column(f"arm_{side}")[0, part] for side in "ab"]
+        relative = [np.asarray(a[: self._d] - b[: self._d]) for a, b in (now, free, after)]
         return Encounters(
-            *(a[: self._d] - b[: self._d] for a, b in (now, free, after)),
+            relative[0],
+            relative[1],
+            relative[2],
             Bearings(
                 *(np.ascontiguousarray(rows[part, self._at[n]].T) for n in ("normal", "centres", "angles"))
             ),

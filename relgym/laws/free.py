@@ -83,11 +83,14 @@ class FreeLearner:
         if right and not _power_of_two(self.seen):
             return False
         self._news += 1
-        unexplained = 0 if self.law is None else self.law.unexplained
-        if len(self.store.rows) < FEWEST or self._news <= unexplained // 4:
+        if len(self.store.rows) < FEWEST or self._news <= self._patience():
             return False
         self._news = 0
         return self.fit(tolerance)
+
+    def _patience(self) -> int:
+        """How much news doesn't call for another search: ever more while there is no law, or one that fails."""
+        return self.seen // 4 if self.law is None else self.law.unexplained // 4
 
     def fit(self, tolerance: float) -> bool:
         """Learn the law anew from the examples kept; whether it changed."""

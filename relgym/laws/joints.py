@@ -57,7 +57,8 @@ class Joint:
         centres: FloatArray = a[:d] - b[:d]
         if self.grip is None:
             return centres
-        return centres - (a[d] * self.arms[0] + b[d] * self.arms[1]) * turned(self.normal)
+        points: FloatArray = centres - (a[d] * self.arms[0] + b[d] * self.arms[1]) * turned(self.normal)
+        return points
 
     def apply(self, change: FloatArray, moving: FloatArray) -> None:
         """Let a change of the relative velocity, shape ``(d, n)``, act on all bodies' velocities, in place."""

@@ -24,7 +24,7 @@ from relgym.envs.model_files import EnvRecord
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.errors import ActionError, ConfigError, ModelFileError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Scene
+from relgym.scene.objects import Scene, Target
 from relgym.wrappers import ModelLearner
 
 ID = "relgym/LearnedModel-v0"
@@ -289,8 +289,7 @@ def test_a_dream_of_other_objects_is_like_a_scene_that_has_them() -> None:
 def test_objects_of_unknown_bounds_are_refused(truck: ModelLearner) -> None:
     schema = dataclasses.replace(truck.model.schema, objects=(("box1", "box"), ("action", "action")))
     boxed = truck.scene
-    model = copy.deepcopy(truck.model)
-    model.schema = schema
+    model = WorldModel(schema, targets=[Target("box", "px")])
     model.extra = recorded_extra = {**truck.record.to_json(), "starts": []}
     recorded_extra["spaces"] = EnvRecord(
         spaces.Dict({"box1": truck.observation_space["box1"]}), truck.action_space
