@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 
 class Slider(gym.Env[Any, Any]):
-    """A box pushed left or right: v' = 0.8 v + 0.5 (a - 1), x' = x + v'; reward is -x', and it ends beyond `limit`.
+    """A box pushed left or right: v' = 0.8 v + 0.5 a, x' = x + v'; reward is -x', and it ends beyond `limit`.
 
     Observes (x, v) as float64; an episode is truncated after `length` steps. `says`, where it is set, replaces the
     next observation.
@@ -19,7 +19,7 @@ class Slider(gym.Env[Any, Any]):
 
     def __init__(self, length: int = 1000, limit: float = 1e6) -> None:
         self.observation_space: spaces.Space[Any] = spaces.Box(-100.0, 100.0, (2,), np.float64)
-        self.action_space: spaces.Space[Any] = spaces.Discrete(3)
+        self.action_space: spaces.Space[Any] = spaces.Box(-1.0, 1.0, (1,), np.float64)
         self.length, self.limit = length, limit
         self.x = self.v = 0.0
         self.steps = 0
@@ -34,7 +34,7 @@ class Slider(gym.Env[Any, Any]):
         return self._seen(), {"limit": self.limit}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        self.v = 0.8 * self.v + 0.5 * (int(action) - 1)
+        self.v = 0.8 * self.v + 0.5 * float(action[0])
         self.x += self.v
         self.steps += 1
         ended = abs(self.x) > self.limit

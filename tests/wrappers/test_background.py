@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from typing import Any
 
+import numpy as np
 import pytest
 from carts import run
 from plain_envs import Slider
@@ -33,7 +34,7 @@ def test_the_background_learns_the_same_model_and_counts_the_same_errors() -> No
     there.close()
     assert (there.model.seen, twin.model.seen) == (90, 80)
     twin.reset(seed=0)
-    assert twin.step(0)[4]["relgym"].learned is not None  # a copy learns in the foreground
+    assert twin.step(np.zeros(1))[4]["relgym"].learned is not None  # a copy learns in the foreground
 
 
 def test_what_finds_the_queue_full_is_dropped_and_counted() -> None:

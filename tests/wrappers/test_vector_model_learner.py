@@ -62,13 +62,13 @@ def test_every_autoreset_mode_learns_like_a_single_env(mode: AutoresetMode) -> N
     for transition in kept:
         alone.predict_one(transition.before)
         alone.learn_one(transition)
-        push = transition.before["action"]["a"] - 1.0
+        push = transition.before["action"]["a"]
         now, then = transition.before["self"], transition.after["self"]
         assert then["v"] == 0.8 * now["v"] + 0.5 * push  # no leap from one episode to the next
         assert transition.after["task"]["reward"] == -then["x"]
     assert envs.model.to_json(history=True) == alone.to_json(history=True)
     (mode_of_v,) = envs.model.modes("self", "v")
-    assert mode_of_v.formula(6) == "v' = 0.8 v + 0.5 action.a - 0.5"
+    assert mode_of_v.formula(6) == "v' = 0.8 v + 0.5 action.a"
     # With NEXT_STEP the step that resets is no transition.
     pauses = 3 * N if mode is AutoresetMode.NEXT_STEP else 0
     assert len(kept) >= N * STEPS - pauses - N
@@ -92,7 +92,7 @@ def test_every_env_has_its_report() -> None:
     envs = VectorModelLearner(sliders(AutoresetMode.NEXT_STEP))
     envs.reset(seed=0)
     for k in range(LENGTH + 1):
-        *_, infos = envs.step(np.ones(N, np.int64))
+        *_, infos = envs.step(np.ones((N, 1)))
         reports = infos["relgym"]
         assert reports.shape == (N,)
         taught = [report.learned is not None for report in reports]
@@ -136,18 +136,18 @@ def test_a_bad_observation_of_one_env_is_no_excuse_for_leaps_of_the_others() -> 
     second: Any = envs.env.unwrapped.envs[1]  # type: ignore[attr-defined]
     second.says = np.array([np.nan, 0.0])
     with pytest.raises(ObservationError, match="'x0': expected a finite number, got nan"):
-        envs.step(np.zeros(N, np.int64))
+        envs.step(np.zeros((N, 1)))
     second.says = None
     seen = envs.model.seen
     with pytest.raises(gym.error.ResetNeeded):
-        envs.step(np.zeros(N, np.int64))
+        envs.step(np.zeros((N, 1)))
     envs.reset(seed=1)
-    envs.step(np.zeros(N, np.int64))
+    envs.step(np.zeros((N, 1)))
     assert envs.model.seen == seen + N
     lenient = VectorModelLearner(sliders(AutoresetMode.NEXT_STEP), bad_observations="skip")
     lenient.reset(seed=0)
     lenient.env.unwrapped.envs[1].says = np.array([np.nan, 0.0])  # type: ignore[attr-defined]
-    lenient.step(np.zeros(N, np.int64))
+    lenient.step(np.zeros((N, 1)))
     assert (lenient.model.seen, lenient.skipped) == (N - 1, 1)
 
 
@@ -166,5 +166,5 @@ def test_illegal_actions_change_nothing() -> None:
     envs = VectorModelLearner(sliders(AutoresetMode.NEXT_STEP))
     envs.reset(seed=0)
     with pytest.raises(ActionError):
-        envs.step(np.array([0, 1, 2, 3]))
+        envs.step(np.full((N, 1), 2.0))
     assert envs.env.unwrapped.envs[0].steps == 0  # type: ignore[attr-defined]
