@@ -7,7 +7,9 @@ import importlib
 from typing import Any
 
 _HOMES = {
+    "Apprentice": "relgym.wrappers.sb3.apprentice",
     "DreamCheckup": "relgym.wrappers.sb3.dreaming",
+    "DreamVecEnv": "relgym.wrappers.sb3.dreaming",
     "Dyna": "relgym.wrappers.sb3.dyna",
     "DynaConfig": "relgym.wrappers.sb3.settings",
     "PermutedReplay": "relgym.wrappers.sb3.permuting",
@@ -19,12 +21,15 @@ _HOMES = {
     "SceneStock": "relgym.wrappers.sb3.stock",
     "TransitionRecorder": "relgym.wrappers.sb3.recorder",
     "TrustGate": "relgym.wrappers.sb3.gate",
+    "explore": "relgym.wrappers.sb3.dreaming",
     "replay_options": "relgym.wrappers.sb3.replay",
 }
 """Where each public name lives; loaded on first use."""
 
 __all__ = [
+    "Apprentice",
     "DreamCheckup",
+    "DreamVecEnv",
     "Dyna",
     "DynaConfig",
     "Imagination",
@@ -36,6 +41,7 @@ __all__ = [
     "SceneStock",
     "TransitionRecorder",
     "TrustGate",
+    "explore",
     "replay_options",
 ]
 
