@@ -165,12 +165,10 @@ def _perceptron(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) 
 
 
 def _rules(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
-    seed = _seed(rng)
-
     def make() -> Any:
         from river import rules
 
-        return rules.AMRules(seed=seed, **setting)
+        return rules.AMRules(**setting)
 
     return StreamingRegressor(make)
 

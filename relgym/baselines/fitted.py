@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -57,7 +58,11 @@ class _Fitted:
         self._mean = x.mean(axis=0) if self._scale else np.zeros(x.shape[1])
         deviation = x.std(axis=0) if self._scale else np.ones(x.shape[1])
         self._deviation = np.where(deviation > 0.0, deviation, 1.0)
-        self._estimator = self._make().fit(self._scaled(x), target(y))
+        with warnings.catch_warnings():
+            from sklearn.exceptions import ConvergenceWarning
+
+            warnings.simplefilter("ignore", ConvergenceWarning)  # a budget of iterations is a setting, too
+            self._estimator = self._make().fit(self._scaled(x), target(y))
 
     def _scaled(self, x: Float2D) -> Float2D:
         scaled: Float2D = (x - self._mean) / self._deviation

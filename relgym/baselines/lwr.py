@@ -19,9 +19,9 @@ _CHUNK = 256
 class LocallyWeightedRegression:
     """A linear function of each query's own, fitted to its nearest neighbours (Atkeson, Moore & Schaal, 1997).
 
-    Features are brought to [0, 1] each; rows of neighbours are multiplied by ``d ** -power``, d their Euclidean distance
-    from the query (§4.7.1: d⁻³). Examples that lie exactly on the query are averaged. All as in the original system,
-    save that the fit is a ridge regression instead of stepwise.
+    Features are brought to [0, 1] each; rows of neighbours are multiplied by ``d ** -power``, d their Euclidean
+    distance from the query (§4.7.1: d⁻³). Examples that lie exactly on the query are averaged. All as in the original
+    system, save that the fit is a ridge regression instead of stepwise.
 
     Parameters
     ----------
@@ -92,7 +92,9 @@ class LocallyWeightedRegression:
         return np.where(exact[:, None], (values * hits[..., None]).sum(axis=1) / counts, fitted)
 
 
-def _fits(offsets: NDArray[np.float64], values: NDArray[np.float64], weights: Float2D, ridge: float) -> Float2D:
+def _fits(
+    offsets: NDArray[np.float64], values: NDArray[np.float64], weights: Float2D, ridge: float
+) -> Float2D:
     """Value at offset 0 of a weighted linear fit to each query's neighbours.
 
     Shapes: offsets ``(n, k, d)``, values ``(n, k, m)``, weights ``(n, k)``; result ``(n, m)``.

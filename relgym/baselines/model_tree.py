@@ -13,7 +13,7 @@ __all__ = ["LinearModelTree"]
 
 
 class LinearModelTree:
-    """scikit-learn's CART, each leaf with a ridge regression of its examples; an estimator with ``fit`` and ``predict``.
+    """scikit-learn's CART with a ridge regression in each leaf; an estimator with ``fit`` and ``predict``.
 
     Parameters
     ----------
@@ -41,7 +41,9 @@ class LinearModelTree:
         from sklearn.tree import DecisionTreeRegressor
 
         self._tree = DecisionTreeRegressor(
-            max_depth=self.depth or None, min_samples_leaf=self.leaf if self.depth else len(x), random_state=self.seed
+            max_depth=self.depth or None,
+            min_samples_leaf=self.leaf if self.depth else len(x),
+            random_state=self.seed,
         ).fit(x, y)
         leaves = self._tree.apply(x)
         self._weights = {
