@@ -123,8 +123,8 @@ def classify(
 ) -> dict[str, Any]:
     """Train a classifier on the true modes of one batch; test after some numbers of blocks (§4.7.2).
 
-    It is taught which mode of the analytic list holds. A prediction is right if the predicted mode explains the example,
-    whichever mode really held: ties are forgiven. Examples that no mode explains are neither taught nor tested.
+    It is taught which mode of the analytic list holds. A prediction is right if the predicted mode explains the
+    example, whichever really held: ties are forgiven. Examples that no mode explains are neither taught nor tested.
 
     Parameters as of `regress`; `baseline` is one of `relgym.baselines.catalogue.CLASSIFIERS`.
 

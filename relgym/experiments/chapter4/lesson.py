@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from relgym.config import ModelConfig
+from relgym.config import ClassificationConfig, ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.testing import TARGETS, confusions, scores_of
@@ -26,10 +26,14 @@ _BLOCKS_PER_SEED: Final = 40
 
 
 def config_of(learner: str) -> ModelConfig:
-    """Configuration of a learner by name (`relgym.experiments.chapter4.protocol.LEARNERS`)."""
+    """Configuration of a learner by name (`relgym.experiments.chapter4.protocol.LEARNERS`).
+
+    ``"one-polarity"`` is the thesis' learner without §3.4.5: the first mode of a pair is always the positive class.
+    """
     known = {
         "original": ModelConfig.original(),
         "thesis": ModelConfig.thesis(),
+        "one-polarity": ModelConfig.thesis(classification=ClassificationConfig.thesis(both_polarities=False)),
         "world": ModelConfig(frames="world"),
         "default": ModelConfig(),
     }
@@ -87,7 +91,8 @@ def lesson(
     return {
         "scores": scores,
         "report": plain(report(model)),
-        "text": model.describe(),
+        "modes": _modes(model),
+        "text": _text(model, BALL_EXPERIMENTS[experiment].incline),
         "trees": _trees(model),
         "confusions": confusions(model, fresh, laws),
         "training": _mode_examples(blocks),
@@ -128,6 +133,34 @@ def test_blocks(experiment: int, tests: Mapping[str, Any]) -> list[Block]:
         for seed in seeds
         for block in list(ball_blocks(experiment, seed=seed, blocks=cycle, test=True))[:each]
     ]
+
+
+def _modes(model: WorldModel) -> dict[str, list[dict[str, Any]]]:
+    """Learned modes as numbers, by target that modes predict; the first ones have most examples."""
+    found = {}
+    for target in TARGETS:
+        part = model.property_model(*target.split("."))
+        if not model.governs(part.target):
+            ordered = sorted(part.modes, key=lambda mode: -mode.examples)
+            found[target] = [
+                {
+                    "id": mode.id,
+                    "examples": mode.examples,
+                    "weights": dict(mode.roles[0].terms),
+                    "intercept": mode.intercept,
+                    "others": sum(len(role.terms) for role in mode.open_roles),
+                    "function": mode.formula(4),
+                }
+                for mode in ordered
+            ]
+    return found
+
+
+def _text(model: WorldModel, incline: float) -> str:
+    """The model for people; laws of contacts also along the world's axes, on level ground, on ramps and on walls."""
+    if not model.governed:
+        return model.describe()
+    return model.describe(frame="world", incline=(0.0, incline, 90.0))
 
 
 def _trees(model: WorldModel) -> list[dict[str, Any]]:

@@ -51,6 +51,8 @@ class Protocol:
         Trainings per learner in the transfer experiments; 20 in the thesis (§4.9).
     trials
         Roll-outs; 80 in the thesis (§4.8).
+    long_batches
+        Trainings per learner in experiment 3, whose trainings are the longest.
     comparison_batches
         Trainings per baseline.
     tuning_blocks
@@ -64,6 +66,7 @@ class Protocol:
     variances: tuple[float, ...] = (1e-20, 1e-15, 1e-10, 1e-8, 1e-5)
     transfer_batches: int = 20
     trials: int = 80
+    long_batches: int = 50
     comparison_batches: int = 50
     tuning_blocks: int = 40
 
@@ -82,6 +85,7 @@ class Protocol:
             batches,
             noise_batches=min(batches, whole.noise_batches),
             transfer_batches=min(batches, whole.transfer_batches),
+            long_batches=batches,
             comparison_batches=batches,
         )
 
@@ -96,6 +100,7 @@ class Protocol:
             noise_batches=1,
             variances=(1e-15, 1e-10, 1e-5),
             transfer_batches=min(batches, 2),
+            long_batches=1,
             comparison_batches=1,
             tuning_blocks=8,
         )
