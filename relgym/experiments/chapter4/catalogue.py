@@ -168,14 +168,20 @@ _ROWS: Final[Sequence[tuple[str, str, str, str, Callable[[Protocol], Plan], Any]
      partial(figures_accuracy.by_mode_shown, target="ball.vx")),
     ("rates", "All learners beside the thesis' rates", "§4.3.4, §4.4.4", "beyond", _rates,
      tables_errors.rates_shown),
-    ("comparison", "All baselines at equal features", "§4.7", "beyond", _headline,
+    ("baselines", "All baselines at equal features", "§4.7", "beyond", _headline,
      figures_comparison.headline_shown),
     ("tuning", "Settings of the baselines", "§4.7", "beyond", plans.tunings, figures_comparison.tuning_shown),
 )  # fmt: skip
 """Name, caption, section, group, tasks and rendering of every job, in the order of the thesis."""
 
+
+def _groups(name: str, group: str) -> tuple[str, ...]:
+    kind = name.partition("-")[0]
+    return (group, f"{kind}s") if kind in ("table", "figure") else (group,)
+
+
 JOBS: Final[Mapping[str, Job]] = {
-    name: Job(name, title, source, (group, name.partition("-")[0] + "s"), plan, show)
+    name: Job(name, title, source, _groups(name, group), plan, show)
     for name, title, source, group, plan, show in _ROWS
 }
 """All jobs, in the order of the thesis."""

@@ -156,7 +156,7 @@ def noise_shown(protocol: Protocol, values: Values) -> Shown:
         panel.legend(fontsize=7)
         save(figure, path)
 
-    note = "y velocity, experiment 1. No error is expected to be below the noise itself: the next state carries it, too."
+    note = "y velocity, experiment 1. No error can be below the noise: the next state carries it, too."
     return Shown(f"{table(heading, lines)}\n\n{note}", [heading, *lines], draw)
 
 
@@ -199,9 +199,9 @@ def headline_shown(_: Protocol, values: Values) -> Shown:
         for seen, (a, b) in won.items()
     )
     note = (
-        "Quantiles and mean of the absolute error over all test examples, corners included; modes: the median error of "
-        "each true mode,\naveraged, so that rare ones count. lost: measures in which the baseline errs less. Errors below "
-        "1e-12 are level."
+        "Quantiles and mean of the absolute error over all test examples, corners included; modes: the median error "
+        "of each true mode,\naveraged, so that rare ones count. lost: measures in which the baseline errs less. Errors "
+        "below 1e-12 are level."
     )
     return Shown(f"{wins}\n\n{table(heading, lines)}\n\n{note}", [heading, *lines], None)
 
@@ -231,7 +231,7 @@ def _texts(measures: Sequence[float]) -> list[Cell]:
 
 # ------------------------------------------------------------------ tuning
 def tuning_shown(_: Protocol, values: Values) -> Shown:
-    """Every setting's error on tuning seeds; the star is what is reported, the best one what tuning would choose now."""
+    """Every setting's error on tuning seeds; stars: what is reported, and what tuning would choose now."""
     heading = ["baseline", "features", "setting", "mean error", "wrong %", "reported", "best"]
     lines: list[list[Cell]] = []
     for group, runs in values.items():
