@@ -56,7 +56,8 @@ class LocallyWeightedRegression:
 
     def predict_one(self, x: Float1D) -> Float1D:
         """Values of one row, shape ``(m,)``."""
-        return self.predict_batch(x[None])[0]
+        values: Float1D = self.predict_batch(x[None])[0]
+        return values
 
     def predict_batch(self, x: Float2D) -> Float2D:
         """Values of rows of shape ``(n, d)``, shape ``(n, m)``."""

@@ -24,7 +24,8 @@ class Persistence:
 
     def predict_one(self, x: Float1D) -> Float1D:
         """Zero for each velocity."""
-        return self.predict_batch(x[None])[0]
+        values: Float1D = self.predict_batch(x[None])[0]
+        return values
 
     def predict_batch(self, x: Float2D) -> Float2D:
         """Zeros, shape ``(n, len(velocity))``."""

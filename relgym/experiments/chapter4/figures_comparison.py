@@ -65,7 +65,7 @@ def lwr_shown(_: Protocol, values: Values, number: str) -> Shown:
 
 
 # ------------------------------------------------------------------ figure 4.21
-def classifiers_shown(_: Protocol, values: Values) -> Shown:
+def classifiers_shown(protocol: Protocol, values: Values) -> Shown:
     """Shares of misclassified examples of experiment 2; our learners' are those of wrong predictions."""
     heading = ["target", "classifier", "features", "blocks", "wrong %", "thesis %"]
     rates = {group: _rates(runs) for group, runs in values.items()}
@@ -230,7 +230,7 @@ def _texts(measures: Sequence[float]) -> list[Cell]:
 
 
 # ------------------------------------------------------------------ tuning
-def tuning_shown(_: Protocol, values: Values) -> Shown:
+def tuning_shown(protocol: Protocol, values: Values) -> Shown:
     """Every setting's error on tuning seeds; stars: what is reported, and what tuning would choose now."""
     heading = ["baseline", "features", "setting", "mean error", "wrong %", "reported", "best"]
     lines: list[list[Cell]] = []
@@ -241,7 +241,7 @@ def tuning_shown(_: Protocol, values: Values) -> Shown:
         for k, run in enumerate(runs):
             setting = ", ".join(f"{key}={value}" for key, value in run["setting"].items()) or "-"
             error, wrong = losses[k]
-            shown = [f"{error:.3e}", round(100 * wrong, 3)]
+            shown: list[Cell] = [f"{error:.3e}", round(100 * wrong, 3)]
             marks = ["*" if k == setting_of(name, seen) else "", "*" if k == best else ""]
             lines.append([name, seen, setting, *shown, *marks])
     return Shown(table(heading, lines), [heading, *lines])

@@ -22,7 +22,8 @@ _CLOSE: Final = 6e-3
 def wrong_rate(value: Mapping[str, Any]) -> float:
     """Share of wrong predictions of a lesson's last test, both coordinates."""
     parts = [target["counted"] for target in value["scores"][-1]["targets"].values()]
-    return sum(p["wrong"] for p in parts) / max(sum(p["examples"] for p in parts), 1)
+    wrong: int = sum(p["wrong"] for p in parts)
+    return wrong / max(sum(p["examples"] for p in parts), 1)
 
 
 def best_run(values: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
@@ -49,7 +50,8 @@ def modes_shown(_: Protocol, values: Values, experiment: int) -> Shown:
     """Tables 4.2, 4.9 and 4.17."""
     number = _TABLES[experiment]
     axes = ("x",) if experiment == 3 else ("x", "y")
-    texts, rows = [], [["axis", "number", "behaviour", "function", "thesis", *values]]
+    texts: list[str] = []
+    rows: list[list[Cell]] = [["axis", "number", "behaviour", "function", "thesis", *values]]
     runs = {learner: best_run(each) for learner, each in values.items()}
     for axis in axes:
         published = MODES[number, axis]
@@ -70,19 +72,19 @@ def modes_shown(_: Protocol, values: Values, experiment: int) -> Shown:
 def _mode_lines(
     axis: str, published: Sequence[PublishedMode], counts: Mapping[str, Mapping[int, int | str]]
 ) -> list[list[Cell]]:
-    lines: list[list[Cell]] = [
-        [row.number, row.behaviour, _function(axis, row), row.examples]
-        + [each.get(row.number, "-") for each in counts.values()]
-        for row in published
-    ]
-    lines.append(["", "modes that are no row", "", ""] + [each.get(-1, "") for each in counts.values()])
+    lines: list[list[Cell]] = []
+    for row in published:
+        known = (each.get(row.number, "-") for each in counts.values())
+        lines.append([row.number, row.behaviour, _function(axis, row), row.examples, *known])
+    lines.append(["", "modes that are no row", "", "", *(each.get(-1, "") for each in counts.values())])
     return lines
 
 
 def _counts(run: Mapping[str, Any], target: str, published: Sequence[PublishedMode]) -> dict[int, int | str]:
     """Examples by row of the table; -1: how many modes are no row of it."""
     if target not in run["modes"]:
-        return {row.number: "law" for row in published if row.number} | {-1: "", 0: ""}
+        laws: dict[int, int | str] = {row.number: "law" for row in published if row.number}
+        return {**laws, -1: "", 0: ""}
     found: dict[int, int | str] = {}
     others = 0
     for mode in run["modes"][target]:

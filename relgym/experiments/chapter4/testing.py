@@ -50,7 +50,7 @@ def _columns(
     after = np.concatenate([b.vectors[1:] for b in part])
     prediction = model.predict_batch(layout, before)
     counted = [explicable(b, laws) for b in part]
-    found = {}
+    found: dict[str, tuple[NDArray[Any], ...]] = {}
     for k, (name, prop) in enumerate(prediction.parts):
         index = layout.index(name)
         target, column = f"{layout.types[index].name}.{prop}", layout.column(index, prop)

@@ -65,14 +65,12 @@ def _dask(address: str) -> Iterator[None]:
 @contextmanager
 def _ray(address: str) -> Iterator[None]:
     joblib, ray = _library("joblib"), _library("ray", extra="ray")
-    from ray.util.joblib import register_ray
-
     try:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
     except (OSError, ValueError, RuntimeError) as error:
         raise _unreachable("Ray head node", address, error) from error
     try:
-        register_ray()
+        _library("ray.util.joblib", extra="ray").register_ray()
         with joblib.parallel_config(backend="ray"):
             yield
     finally:

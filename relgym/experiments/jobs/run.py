@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from relgym.errors import ConfigError
+from relgym.errors import ConfigError, StoreError
 from relgym.experiments.jobs.clusters import cluster
 from relgym.experiments.jobs.pace import Pace
 from relgym.experiments.jobs.store import Result, ResultStore
@@ -80,15 +80,11 @@ def run(
     """
     chosen = workers or os.cpu_count() or 1
     distinct = list(dict.fromkeys(tasks))
-    missing, known = [], []
-    for task in distinct:
-        found = store.get(task)
-        (missing if found is None else known).append((task, found))
-    waiting = [task for task, _ in missing]
+    known = {task: found for task in distinct if (found := store.get(task)) is not None}
+    waiting = [task for task in distinct if task not in known]
     pace = Pace(waiting, chosen)
-    for task, found in known:
-        if found is not None:
-            pace.learn(task, found.seconds)
+    for task, found in known.items():
+        pace.learn(task, found.seconds)
     done = len(known)
 
     def standing(task: Task | None) -> Progress:
@@ -108,8 +104,6 @@ def results(tasks: Sequence[Task], store: ResultStore) -> list[Any]:
     for task in tasks:
         found = store.get(task)
         if found is None:
-            from relgym.errors import StoreError
-
             raise StoreError(f"{store.path(task)}: no result yet; run the task first")
         values.append(found.value)
     return values
