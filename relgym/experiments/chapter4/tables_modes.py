@@ -23,7 +23,7 @@ def wrong_rate(value: Mapping[str, Any]) -> float:
     """Share of wrong predictions of a lesson's last test, both coordinates."""
     parts = [target["counted"] for target in value["scores"][-1]["targets"].values()]
     wrong: int = sum(p["wrong"] for p in parts)
-    return wrong / max(sum(p["examples"] for p in parts), 1)
+    return wrong / max(1, int(sum(p["examples"] for p in parts)))
 
 
 def best_run(values: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
