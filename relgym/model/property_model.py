@@ -18,6 +18,7 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
+from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
 from relgym.scene.objects import SceneLayout, Target
@@ -55,6 +56,8 @@ class PropertyModel:
     ----------
     clusterer, classifier, casting
         The learners of modes, of their preconditions and of who plays their roles.
+    limits
+        Which modes are limits: they take no part in the vote but cut off what its winner predicts.
     """
 
     def __init__(self, target: Target, vocabulary: Vocabulary, config: ModelConfig) -> None:
@@ -63,6 +66,7 @@ class PropertyModel:
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
         self.classifier = ModeClassifier(vocabulary, config.classification)
         self.casting = Casting(vocabulary, config.classification)
+        self.limits = Limits()
         self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -98,13 +102,13 @@ class PropertyModel:
             How the target object is situated, in a single scene.
         """
         report = self.clusterer.learn_one(table, row, y)
-        if report.changed:
+        if report.changed or self.limits.overstepped(y, self.clusterer.scale.tolerance):
             self._follow(table)
         number = len(self.clusterer.y) - 1
         seen = replace(example, row=number)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(self._values_one(situation.signature, table.x[row].tolist()))
-        assigned = UNKNOWN if report.mode == NOISE else report.mode
+        assigned = UNKNOWN if report.mode == NOISE or report.mode in self.limits else report.mode
         played = self._played(table, np.array([number]), report.mode)[0].tolist()
         self.classifier.observe(seen, assigned, fits, values, roles=played)
         if played:
@@ -120,11 +124,14 @@ class PropertyModel:
     def _follow(self, table: ExampleTable) -> None:
         """The set of modes changed: what the classifiers remember is labelled anew."""
         self._bindings.clear()
+        self.limits = find_limits(self.clusterer, table)
         numbers = self.classifier.exemplars.rows.astype(np.intp)
-        ids, fits = self.clusterer.fits(table, numbers)
+        known, fits = self.clusterer.fits(table, numbers)
+        ids = tuple(i for i in known if i not in self.limits)
+        fits = fits[:, [i not in self.limits for i in known]]
         values = self._values_many(table, self.clusterer.rows[numbers], ids)
         labels = self.clusterer.labels[numbers].astype(np.int64)
-        self.classifier.sync(ids, np.where(labels == NOISE, UNKNOWN, labels), fits, values)
+        self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self._recast(table)
 
@@ -206,7 +213,7 @@ class PropertyModel:
         """Slots of a mode's open roles, by the role classifiers; None if they can't be filled."""
         bodies = bodies_of(order, layout)
         place = {body: slot for slot, body in enumerate(bodies) if body >= 0}
-        played = self.casting.assign(self.mode(mode), example, tuple(place))
+        played = self.casting.assign(self.mode(mode), example, tuple(place), sure=self.config.abstain)
         if played is None:
             return None
         cast = iter(played)
@@ -259,12 +266,16 @@ class PropertyModel:
             if binding.open:
                 slots = self._cast(mode, binding, example, situation.order[0], layout)
             if slots is None:
-                continue
+                if not self.config.abstain:
+                    continue
+                # What lost the vote doesn't become likely because the winner's players are in doubt.
+                return replace(nothing, outcome=Outcome.OUTSIDE)
             rest = iter(slots)
             played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
             roles = tuple(layout.names[situation.order[0, s]] for s in played)
             margin = ranking.margin if place == 0 else 0.0
-            return Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
+            found = Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
+            return self.limits.cut_off(found)
         return replace(nothing, outcome=Outcome.NO_ROLES)
 
     def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
@@ -296,28 +307,33 @@ class PropertyModel:
             verdict.outcomes[~waiting] = _OUTSIDE
         for place in range(len(modes)):
             for mode in np.unique(ranking.modes[waiting, place]):
+                binding = self._binding(situation.signature, int(mode))
+                if binding is None:
+                    continue
                 part = np.flatnonzero(waiting & (ranking.modes[:, place] == mode))
-                done, values = self._apply(int(mode), percept, situation, x, part)
+                done, values = self._apply(int(mode), binding, percept, situation, x, part)
                 verdict.values[done], verdict.modes[done] = values, mode
                 verdict.outcomes[done] = _PREDICTED
                 verdict.margins[done] = ranking.margin[done] if place == 0 else 0.0
                 waiting[done] = False
+                if self.config.abstain:  # in doubt about the players
+                    verdict.outcomes[part[waiting[part]]] = _OUTSIDE
+                    waiting[part] = False
             if not waiting.any():
                 break
+        self.limits.cut_off_all(verdict.values, verdict.modes)
         return verdict
 
     def _apply(
         self,
         mode: int,
+        binding: Binding,
         percept: Percept,
         situation: Situation,
         x: NDArray[np.float64],
         part: NDArray[np.intp],
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Those of the given examples whose roles can be filled, and the mode's values there."""
-        binding = self._binding(situation.signature, mode)
-        if binding is None:
-            return part[:0], np.empty(0)
         if not binding.open:
             return part, binding.values(x[part])[:, 0]
         done, values = [], []
@@ -336,6 +352,7 @@ class PropertyModel:
             "clusterer": self.clusterer.to_json(),
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
+            "limits": self.limits.to_json(),
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -347,6 +364,7 @@ class PropertyModel:
         self.clusterer.restore(data["clusterer"], arrays)
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
         self.casting.restore(data["casting"])
+        self.limits = Limits.from_json(data.get("limits", {}))
         self._bindings.clear()
 
 

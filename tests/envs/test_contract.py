@@ -27,6 +27,7 @@ MADE: list[tuple[str, dict[str, Any]]] = [
     ("relgym/BallBoxRamp-v0", {"objects": ("box", "ramp", "ramp"), "balls": 3, "type_names": "thesis"}),
     ("relgym/BallBoxRamp-v0", {"objects": ()}),
     ("relgym/TruckPush-v0", {"n_boxes": 5, "redraw": "step", "bystanders": 2}),
+    ("relgym/TruckPush-v0", {"task": "push", "bystanders": 2}),
 ]
 
 ids = pytest.mark.parametrize("env_id", IDS)
@@ -50,11 +51,11 @@ def test_observations_lie_in_their_space(env_id: str, arguments: dict[str, Any])
     env.action_space.seed(0)
     for seed in range(3):
         observation, _ = env.reset(seed=seed)
-        truncated = False
-        while not truncated:
+        terminated = truncated = False
+        while not (terminated or truncated):
             assert env.observation_space.contains(observation)
             observation, _, terminated, truncated, _ = env.step(env.action_space.sample())
-            assert not terminated
+            assert not terminated or scene_env(env_id, **arguments).task is not None
 
 
 @ids
