@@ -89,12 +89,12 @@ def parameters_shown(_: Protocol, __: Values) -> Shown:
 
 def configurations_shown(_: Protocol, __: Values) -> Shown:
     """Some initial configurations, with the paths that follow."""
-    blocks = list(ball_blocks(1, seed=TRAINING_SEEDS[0], blocks=40, order=None))[::5]
+    blocks = list(ball_blocks(1, seed=TRAINING_SEEDS[0], blocks=40, order=None))[::7]
     heading = ["ramp", "touching", "ball", "direction"]
     lines: list[list[Cell]] = [[str(b.configuration[name]) for name in heading] for b in blocks]
 
     def draw(path: Path) -> None:
-        figure, panels = canvas(13.0, 5.0, 2, 4)
+        figure, panels = canvas(12.0, 5.6, 2, 3)
         for panel, block in zip(panels.flat, blocks, strict=True):
             c = block.configuration
             near = "touching" if c["touching"] else "apart"
@@ -144,8 +144,8 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
 
 # ------------------------------------------------------------------ figures 4.8 and 4.9
 _LEVEL: Final = (("A", (0.6, -0.8)), ("B", (-0.6, -0.8)))
-_UPRIGHT: Final = (("A", (0.8, 0.6)), ("B", (-0.8, -0.6)), ("C", (0.8, -0.6)), ("D", (-0.8, 0.6)))
-"""Velocities before the collision; upright: signs as in Figure 4.9, vx and vy alike in A and B."""
+_UPRIGHT: Final = (("A", (0.8, -0.6)), ("B", (-0.8, 0.6)), ("C", (0.8, 0.6)), ("D", (-0.8, -0.6)))
+"""Velocities before the collision. Upright: friction has the sign of vx in A and B (mode 4), not in C and D."""
 
 
 def collisions_shown(_: Protocol, __: Values, *, level: bool) -> Shown:
@@ -187,11 +187,12 @@ def _draw_collisions(path: Path, arrows: Sequence[tuple[Any, ...]]) -> None:
         for vector, colour, tail, label in (
             (before, "black", -np.array(before), "v"),
             (after, "#4878a8", np.zeros(2), "v'"),
-            (friction, "#c44e52", wall, "friction"),
+            (friction, "#c44e52", wall - 0.2 * np.array(normal), "friction"),
         ):
             tip = tail + np.array(vector)
             panel.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.8})
-            panel.text(*(0.5 * (tail + tip) + 0.08), label, color=colour, fontsize=9)
+            side = -0.5 * np.array(normal) if label == "friction" else np.full(2, 0.08)
+            panel.text(*(0.5 * (tail + tip) + side), label, color=colour, fontsize=9, ha="center")
         panel.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), xticks=[], yticks=[], aspect="equal")
         panel.set_title(f"case {name}", fontsize=10)
     save(figure, path)
