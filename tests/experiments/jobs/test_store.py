@@ -52,7 +52,9 @@ def test_no_space_left_leaves_nothing_half_written(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, failing, full)
-    with pytest.raises(StoreError, match="no space left to keep a result; free some and run the same command"):
+    with pytest.raises(
+        StoreError, match="no space left to keep a result; free some and run the same command"
+    ):
         write_atomically(path, b"new")
     assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
     assert path.read_bytes() == b"old"
