@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from relgym.config import ClassificationConfig, ModelConfig
+from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.testing import TARGETS, confusions, scores_of
@@ -30,10 +30,11 @@ def config_of(learner: str) -> ModelConfig:
 
     ``"one-polarity"`` is the thesis' learner without §3.4.5: the first mode of a pair is always the positive class.
     """
+    thesis = ModelConfig.thesis()
     known = {
         "original": ModelConfig.original(),
-        "thesis": ModelConfig.thesis(),
-        "one-polarity": ModelConfig.thesis(classification=ClassificationConfig.thesis(both_polarities=False)),
+        "thesis": thesis,
+        "one-polarity": replace(thesis, classification=replace(thesis.classification, both_polarities=False)),
         "world": ModelConfig(frames="world"),
         "default": ModelConfig(),
     }
