@@ -251,10 +251,12 @@ class ModeClusterer:
         ids = table.signature_ids[self.rows]
         part = np.flatnonzero(ids == ids[-1])
         slots = table.signatures[ids[-1]]
-        order, _ = slots.preference(self.target)
+        order, stages = slots.preference(self.target)
         order = order[order < len(slots.columns)]
         rows = self.rows[part]
-        return estimate_noise(table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor)
+        return estimate_noise(
+            table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor, own=stages[0]
+        )
 
     def _start_over(self) -> None:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""
