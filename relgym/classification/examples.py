@@ -190,7 +190,8 @@ def mode_value(mode: int) -> str:
 
 def consequence(name: str, k: float, mode: int) -> str:
     """Name of the number that says where a property would get to if a mode held."""
-    return f"{name} {'-' if k < 0 else '+'} {'' if abs(k) == 1.0 else f'{abs(k):.6g} '}{mode_value(mode)}"
+    size = f"{abs(k):.6g}"
+    return f"{name} {'-' if k < 0 else '+'} {'' if size == '1' else f'{size} '}{mode_value(mode)}"
 
 
 def difference(i: int, j: int) -> str:

@@ -36,16 +36,23 @@ class Approximation:
 
 
 def approximate(
-    x: NDArray[np.float64], y: NDArray[np.float64], *, floor: float, terms: int, stds: float, left: float
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    present: NDArray[np.float64],
+    *,
+    floor: float,
+    terms: int,
+    stds: float,
+    left: float,
 ) -> Approximation | None:
     """The best sparse function of nearly all rows, if it leaves little of the change; else None.
 
     Parameters
     ----------
     x
-        Rows ``(n, d)``; column 0 is the target's present value.
-    y
-        Responses ``(n,)``.
+        Rows ``(n, d)``.
+    y, present
+        Responses and what their changes count from, shape ``(n,)``.
     floor
         Rounding noise, in units of y.
     terms
@@ -60,7 +67,7 @@ def approximate(
     Cost O(n d terms), three times over.
     """
     kept = np.ones(len(y), dtype=bool)
-    change = y - x[:, 0]
+    change = y - present
     for _ in range(ROUNDS):
         fit = forward_stepwise(x[kept], y[kept], sigma=floor, max_terms=terms, eliminate=False)
         error = np.abs(y - fit.predict(x))

@@ -272,15 +272,21 @@ class ModeClusterer:
         self._start_over()
 
     # ------------------------------------------------------------------ discovery (§3.2.2)
+    @property
+    def _needed(self) -> int:
+        """Examples that found a mode: each verifies it by as many bits as tell it from all values seen."""
+        return least_examples(self.y, self.scale, self.config)
+
     def _discover(self, table: ExampleTable, example: int) -> None:
         signature = int(table.signature_ids[self.rows[example]])
         search = self._searches.setdefault(signature, _Search())
         search.waiting += 1
-        if search.waiting <= search.failures // 6:
+        patience = search.failures // 6 if not self.approximate else search.failures * search.failures
+        if search.waiting <= patience:  # what an approximation leaves is mostly its own tail
             return
         for _ in range(MOST_DISCOVERIES):
             pool = self._pool(table, signature)
-            if len(pool) < least_examples(self.y[pool], self.scale, self.config):
+            if len(pool) < self._needed:
                 break  # not a failure: nothing was searched
             if not self._search_once(table, signature, pool, fresh=search.waiting):
                 search.failures += 1
@@ -309,7 +315,8 @@ class ModeClusterer:
         x, y = slots.matrix(table.x[self.rows[recent]], order), self.y[recent]
         left = LEFT if slots.features else LEFT_LINEAR
         stds = self.scale.inlier_stds
-        found = approximate(x, y, floor=self.floor, terms=terms, stds=stds, left=left)
+        present = slots.present(table.x[self.rows[recent]], self.target)
+        found = approximate(x, y, present, floor=self.floor, terms=terms, stds=stds, left=left)
         if found is None:
             return
         self._spread, self.approximate = found.sigma, True
@@ -344,6 +351,7 @@ class ModeClusterer:
             scale=self.scale,
             config=self.config,
             rng=self._rng,
+            needed=self._needed,
         )
         if found is None:
             return False

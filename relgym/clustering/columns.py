@@ -51,8 +51,8 @@ class SlotSignature:
     given
         (type, property) pairs whose next values are columns too (`Target.given`).
     chained
-        The same for pairs among which the order is still to be found: columns only of the target itself and of
-        bodiless objects.
+        The same for pairs among which the order is still to be found: columns only of the target itself, of bodiless
+        objects, and, for reward and termination, of any object that is alone of its type.
     library
         Non-linear features offered.
     """
@@ -72,12 +72,12 @@ class SlotSignature:
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """All columns that a row holds, in order of preference."""
-        found = []
+        found, task = [], self.types[0].name == TASK
         for slot, t in enumerate(self.types):
             supplied = {own for own in t.pose_columns() if own >= 0}
             for k, prop in enumerate(t.properties):
                 found.append(Column(slot, prop, self._rank(slot, k in supplied)))
-            alone = slot == 0 or (self.singleton(slot) and not t.has_body)
+            alone = slot == 0 or (self.singleton(slot) and (task or not t.has_body))
             pairs = dict.fromkeys((*self.given, *(self.chained if alone else ())))
             primes = [prop for name, prop in pairs if name == t.name]
             found.extend(Column(slot, prop + PRIME, self._rank(slot, posed=False)) for prop in primes)
@@ -173,7 +173,8 @@ class SlotSignature:
     def preference(self, target: Target) -> tuple[NDArray[np.intp], tuple[int, ...]]:
         """Columns that a target's functions may use, in order of preference, and where its stages end.
 
-        The target property's own column comes first. The stages are the numbers of leading columns that are
+        The target property's own column comes first, except for the task's: its present values are no columns of its
+        functions at all. The stages are the numbers of leading columns that are
         tried together: what the target and bodiless objects have; non-linear features of these; then what other
         objects have; then poses as well. Next values are left out unless the target is given them.
         """
@@ -192,7 +193,15 @@ class SlotSignature:
         rest.sort(key=lambda k: (_STAGE[self.at(k).rank], k))
         stage = [_STAGE[self.at(k).rank] for k in rest]
         ends = tuple(dict.fromkeys(1 + sum(s <= last for s in stage) for last in range(4)))
+        if target.type == TASK:  # what a step is worth doesn't depend on what the last one was
+            return np.array(rest, dtype=np.intp), tuple(max(0, end - 1) for end in ends)
         return np.array([first, *rest], dtype=np.intp), ends
+
+    def present(self, x: NDArray[np.float64], target: Target) -> NDArray[np.float64]:
+        """What changes count from, shape ``(n,)``: the property's present value; 0 for reward and termination."""
+        if target.type == TASK:
+            return np.zeros(len(x))
+        return x[:, self._index[0, target.property]]
 
     def _allowed(self, index: int, target: Target) -> bool:
         width = len(self.columns)
@@ -201,7 +210,7 @@ class SlotSignature:
 
     def _open(self, column: Column, target: Target) -> bool:
         name = self.types[column.slot].name
-        if name == TASK and target.type != TASK:
+        if name == TASK:
             return False  # the world goes on whatever it is worth
         return not column.property.endswith(PRIME) or (name, column.property.rstrip(PRIME)) in target.given
 

@@ -66,6 +66,7 @@ def find_mode(
     scale: Scale,
     config: ClusteringConfig,
     rng: np.random.Generator,
+    needed: int | None = None,
 ) -> Consensus | None:
     """Search rows of one slot signature for a function that enough of them obey.
 
@@ -78,8 +79,10 @@ def find_mode(
         smaller samples and is the simpler law.
     fresh
         Number of rows at the end that no earlier search has seen: each sample holds one of them.
+    needed
+        Examples that found a mode; default: `least_examples` of these responses.
     """
-    needed = least_examples(y, scale, config)
+    needed = least_examples(y, scale, config) if needed is None else needed
     rows = _recent(len(y), fresh, rng)
     for columns, terms, size in plans(stages, config):
         if len(rows) < max(needed, size):

@@ -75,8 +75,9 @@ def unified(
     pooled = np.concatenate(sides)
     allowed = simpler_than[0].parameters + simpler_than[1].parameters
     everyone = [side[signatures[side] == signature] for side in (new, old)]
-    if _persist(table.x[:, order[0]], rows, y, everyone, scale, config):
-        return signature, LinearFit((int(order[0]),), (1.0,), 0.0, 0.0)
+    own = slots.column(0, target.property)
+    if own in order and _persist(table.x[:, own], rows, y, everyone, scale, config):
+        return signature, LinearFit((own,), (1.0,), 0.0, 0.0)
     for width in stages[:1] if config.own_only else stages:
         x = slots.matrix(table.x[rows[pooled]], order[:width])
         fit = forward_stepwise(x, y[pooled], sigma=scale.sigma, max_terms=min(config.max_terms, allowed))

@@ -139,10 +139,13 @@ def _try(
     order = order[: stages[min(1, len(stages) - 1)]]
     x, y = slots.matrix(table.x[clusterer.rows[rows]], order), clusterer.y[rows]
     most = model.config.clustering.max_terms
-    found = approximate(x, y, floor=clusterer.floor, terms=most, stds=clusterer.scale.inlier_stds, left=LEFT)
+    present = slots.present(table.x[clusterer.rows[rows]], model.target)
+    found = approximate(
+        x, y, present, floor=clusterer.floor, terms=most, stds=clusterer.scale.inlier_stds, left=LEFT
+    )
     if found is None:
         return None
-    change = float((y - x[:, 0])[found.inliers].std())
+    change = float((y - present)[found.inliers].std())
     text = [
         (w, slots.named(int(order[c]))) for c, w in zip(found.fit.columns, found.fit.weights, strict=True)
     ]
@@ -156,8 +159,7 @@ def _present(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) 
     values = np.zeros(len(rows))
     for number in np.unique(table.signature_ids[places]):
         part = np.flatnonzero(table.signature_ids[places] == number)
-        column = table.signatures[int(number)].column(0, model.target.property)
-        values[part] = table.x[places[part], column]
+        values[part] = table.signatures[int(number)].present(table.x[places[part]], model.target)
     return values
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.classification.examples import Vocabulary
 from relgym.clustering.columns import PRIME, SlotSignature
-from relgym.scene.objects import SceneSchema, Target
+from relgym.scene.objects import TASK, SceneSchema, Target
 
 __all__ = ["Conditions"]
 
@@ -28,12 +28,12 @@ class Conditions:
         The scenes' schema.
     target
         Its `given` pairs count where they belong to the target's own object or to a bodiless one, of which there is
-        one only.
+        one only; for reward and termination, of which no object is part, all count.
     """
 
     def __init__(self, schema: SceneSchema, target: Target) -> None:
         own, alone = target.type, {t.name for t in schema.types if not t.has_body}
-        self.pairs = tuple(pair for pair in target.given if pair[0] == own or pair[0] in alone)
+        self.pairs = tuple(p for p in target.given if own == TASK or p[0] == own or p[0] in alone)
         self._own = own
         self._columns: dict[int, NDArray[np.intp]] = {}
 

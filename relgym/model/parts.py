@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch
-from relgym.scene.objects import ACTION, Scene, SceneLayout, SceneSchema, Target
+from relgym.scene.objects import ACTION, TASK, Scene, SceneLayout, SceneSchema, Target
 
 __all__ = ["Parts"]
 
@@ -113,6 +114,8 @@ class Parts:
             raise ConfigError(
                 f"target {target} can't be learned: it comes from outside the world; leave it out"
             )
+        if self.open and t.name == TASK:  # worth is a function of what was, what was done and what came of it
+            target = replace(target, given=tuple(p for p in self.perception.chained if p[0] != TASK))
         self.targets = in_order((*self.targets, target)) if self.open else (*self.targets, target)
         self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config, self.schema)
         self.tables.setdefault(target.type, ExampleTable())
