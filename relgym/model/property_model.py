@@ -94,7 +94,7 @@ class PropertyModel:
         return self._unexplained
 
     def _judge(self) -> bool:
-        seen = len(self.clusterer.y)
+        seen = self.clusterer.seen
         if not self.clusterer.clusters:
             return seen >= HOPELESS
         return seen >= DOUBTFUL and bool((self.clusterer.labels[-DOUBTFUL:] == NOISE).mean() > 0.5)
@@ -160,6 +160,12 @@ class PropertyModel:
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
         return report
+
+    def keep(self, rows: NDArray[np.bool_]) -> None:
+        """Forget the examples of dropped rows of the example table, shape ``(rows,)``."""
+        numbers = self.clusterer.keep(rows)
+        exemplars = self.classifier.exemplars.columns["row"]
+        exemplars[:] = numbers[exemplars]
 
     def refresh(self, budget: int | None) -> int:
         """Re-learn stale classifiers within a budget of work (None: all); returns the work spent."""
