@@ -453,7 +453,7 @@ class ModeClusterer:
             "largest": self._largest,
             "reach": self._reach,
             "spread": self._spread,
-            "floor": self.floor,
+            "rounding": self.floor,
             "approximate": self.approximate,
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
@@ -472,7 +472,7 @@ class ModeClusterer:
         self._next_id = int(data["next_id"])
         self._largest, self._reach = float(data["largest"]), float(data["reach"])
         self.approximate = bool(data["approximate"])
-        self._spread, self.floor = float(data["spread"]), float(data["floor"])
+        self._spread, self.floor = float(data["spread"]), float(data["rounding"])
         self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}
         self.clusters = {int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]}
