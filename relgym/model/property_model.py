@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.mode_classifier import ModeClassifier
+from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
@@ -18,6 +19,8 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
+from relgym.model.grouping import distinct, members
+from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
 from relgym.scene.objects import SceneLayout, Target
@@ -55,6 +58,8 @@ class PropertyModel:
     ----------
     clusterer, classifier, casting
         The learners of modes, of their preconditions and of who plays their roles.
+    limits
+        Which modes are limits: they take no part in the vote but cut off what its winner predicts.
     """
 
     def __init__(self, target: Target, vocabulary: Vocabulary, config: ModelConfig) -> None:
@@ -63,6 +68,7 @@ class PropertyModel:
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
         self.classifier = ModeClassifier(vocabulary, config.classification)
         self.casting = Casting(vocabulary, config.classification)
+        self.limits = Limits()
         self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -98,13 +104,13 @@ class PropertyModel:
             How the target object is situated, in a single scene.
         """
         report = self.clusterer.learn_one(table, row, y)
-        if report.changed:
+        if report.changed or self.limits.overstepped(y, self.clusterer.scale.tolerance):
             self._follow(table)
         number = len(self.clusterer.y) - 1
         seen = replace(example, row=number)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(self._values_one(situation.signature, table.x[row].tolist()))
-        assigned = UNKNOWN if report.mode == NOISE else report.mode
+        assigned = UNKNOWN if report.mode == NOISE or report.mode in self.limits else report.mode
         played = self._played(table, np.array([number]), report.mode)[0].tolist()
         self.classifier.observe(seen, assigned, fits, values, roles=played)
         if played:
@@ -120,11 +126,14 @@ class PropertyModel:
     def _follow(self, table: ExampleTable) -> None:
         """The set of modes changed: what the classifiers remember is labelled anew."""
         self._bindings.clear()
+        self.limits = find_limits(self.clusterer, table)
         numbers = self.classifier.exemplars.rows.astype(np.intp)
-        ids, fits = self.clusterer.fits(table, numbers)
+        known, fits = self.clusterer.fits(table, numbers)
+        ids = tuple(i for i in known if i not in self.limits)
+        fits = fits[:, [i not in self.limits for i in known]]
         values = self._values_many(table, self.clusterer.rows[numbers], ids)
         labels = self.clusterer.labels[numbers].astype(np.int64)
-        self.classifier.sync(ids, np.where(labels == NOISE, UNKNOWN, labels), fits, values)
+        self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self._recast(table)
 
@@ -267,7 +276,8 @@ class PropertyModel:
             played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
             roles = tuple(layout.names[situation.order[0, s]] for s in played)
             margin = ranking.margin if place == 0 else 0.0
-            return Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
+            found = Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
+            return self.limits.cut_off(found)
         return replace(nothing, outcome=Outcome.NO_ROLES)
 
     def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
@@ -290,8 +300,8 @@ class PropertyModel:
         if not modes:
             return verdict
         situation = percept.situation(index)
-        x = percept.rows(index, following)
-        ranking = self.classifier.rank_batch(situation.examples, self._values(situation.signature, x, modes))
+        x = percept.rows(index, following, ordered=self._casts(situation.signature))
+        ranking = self._rank_batch(situation, x)
         verdict.outcomes[:] = _NO_ROLES
         waiting = np.ones(n, dtype=bool)
         if self.config.abstain and len(modes) > 1:
@@ -313,6 +323,7 @@ class PropertyModel:
                     waiting[part] = False
             if not waiting.any():
                 break
+        self.limits.cut_off_all(verdict.values, verdict.modes)
         return verdict
 
     def _apply(
@@ -327,14 +338,29 @@ class PropertyModel:
         """Those of the given examples whose roles can be filled, and the mode's values there."""
         if not binding.open:
             return part, binding.values(x[part])[:, 0]
-        done, values = [], []
-        for i in part:
-            example = replace(situation.examples[int(i)], key=situation.keys[int(i)])
-            slots = self._cast(mode, binding, example, situation.order[i], percept.layout)
+        examples, order = situation.examples, situation.order
+        done, values = np.zeros(len(part), dtype=np.bool_), np.full(len(part), np.nan)
+        # Players depend on the relations and the order alone: one search for all scenes that share them.
+        first, which = distinct(examples.table[part], order[part])
+        for i, alike in zip(part[first].tolist(), members(which), strict=True):
+            slots = self._cast(mode, binding, examples[i], order[i], percept.layout)
             if slots is not None:
-                done.append(i)
-                values.append(binding.value(x[i].tolist(), slots))
-        return np.array(done, dtype=np.intp), np.array(values)
+                done[alike], values[alike] = True, binding.values_as(x[part[alike]], slots)
+        return part[done], values[done]
+
+    def _casts(self, signature: SlotSignature) -> bool:
+        """Whether some mode has a role that several objects could play."""
+        bindings = (self._binding(signature, mode) for mode in self.classifier.modes)
+        return any(binding is not None and bool(binding.open) for binding in bindings)
+
+    def _rank_batch(self, situation: Situation, x: NDArray[np.float64]) -> RankingBatch:
+        """Rank the modes for n examples; a single mode has no rival and needs no look at the scene."""
+        modes, n = self.classifier.modes, len(x)
+        if len(modes) == 1:
+            sure = np.ones(n, dtype=np.bool_)
+            return RankingBatch(np.full((n, 1), modes[0]), np.zeros((n, 1)), np.full(n, np.inf), sure, sure)
+        shown = situation.glimpse(self.classifier.relations)
+        return self.classifier.rank_batch(shown, self._values(situation.signature, x, modes))
 
     # ------------------------------------------------------------------ saving
     def to_json(self, *, history: bool) -> dict[str, Any]:
@@ -343,6 +369,7 @@ class PropertyModel:
             "clusterer": self.clusterer.to_json(),
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
+            "limits": self.limits.to_json(),
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -354,6 +381,7 @@ class PropertyModel:
         self.clusterer.restore(data["clusterer"], arrays)
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
         self.casting.restore(data["casting"])
+        self.limits = Limits.from_json(data.get("limits", {}))
         self._bindings.clear()
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from relgym.classification.binary import BinaryClassifier
 from relgym.classification.role_classifier import RoleKind
+from relgym.clustering.mode import Mode
 from relgym.errors import ConfigError
 from relgym.laws.text import LEGEND, LawRow, WorldRow, law_rows, world_rows
 from relgym.model.text import Cell, amount, indented, table, wrapped
@@ -265,11 +266,18 @@ def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
 
 
 def _target_report(part: PropertyModel, digits: int) -> TargetReport:
-    modes = tuple(ModeRow(m.id, m.examples, m.formula(digits)) for m in part.modes)
+    modes = tuple(ModeRow(m.id, m.examples, _function(part, m, digits)) for m in part.modes)
     pairs = tuple(_pair_table(c) for c in part.classifier.classifiers)
     return TargetReport(
         str(part.target), part.target.type, part.clusterer.noise_examples, modes, pairs, _role_rows(part)
     )
+
+
+def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
+    if mode.id not in part.limits:
+        return mode.formula(digits)
+    side = "least" if mode.id == part.limits.low else "most"
+    return f"{mode.formula(digits)} at {side}: a limit to what the others predict"
 
 
 def _pair_table(classifier: BinaryClassifier) -> PairTable:
