@@ -47,8 +47,11 @@ def test_a_dream_of_pushing_is_judged_as_the_world() -> None:
 def test_dreams_are_seen_as_the_world_is() -> None:
     pytest.importorskip("pygame")
     env = gym.make("relgym/BallGoal-v0")
-    model = ModelLearner(env).model
-    dream = LearnedModelEnv(model, like=env, render_mode="rgb_array")
+    learner = ModelLearner(env, predict=False)
+    learner.reset(seed=0)
+    for _ in range(40):
+        learner.step(learner.action_space.sample())
+    dream = LearnedModelEnv(learner.model, like=env, render_mode="rgb_array")
     dream.reset(seed=0)
     picture = dream.render().astype(int)
     assert (np.abs(picture - np.array([255, 214, 92])).max(axis=2) < 3).mean() > 0.0005  # the goal
