@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.actions import acting, without_action
 from relgym.envs.arguments import check_options, checked_action, checked_count, checked_least
+from relgym.envs.flat import FlatSpec
 from relgym.envs.learned_model_ends import Cause, explained, horizon_reached, parts_of
 from relgym.envs.learned_model_judges import Judge, Judges, Start, TaskFunctions
 from relgym.envs.learned_model_setting import Setting, check_knowledge
@@ -203,13 +204,21 @@ class LearnedModelEnv(gym.Env[Any, Any]):
             raise ConfigError("nothing to render to: make the env with render_mode='rgb_array' or 'human'")
         if self._viewer is None:
             self._viewer = SceneViewer(self.render_mode, fps=self.metadata["render_fps"])
-        return self._viewer.show(self.scene)
+        regions = getattr(self.task, "regions", None)
+        return self._viewer.show(self.scene, marks=() if regions is None else regions(self.scene))
 
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._viewer is not None:
             self._viewer.close()
             self._viewer = None
+
+    @property
+    def flat_spec(self) -> FlatSpec:
+        """What flat views of the dream show unless told otherwise: what those of the real env do."""
+        world = self._setting.world
+        spec: FlatSpec = FlatSpec() if world is None else getattr(world.unwrapped, "flat_spec", FlatSpec())
+        return spec
 
     @property
     def scene(self) -> Scene:
