@@ -106,9 +106,7 @@ def respond(
     return change
 
 
-def compose(
-    engaged: Engaged, group: Group, joints: Joints, now: FloatArray, free: FloatArray
-) -> Composed:
+def compose(engaged: Engaged, group: Group, joints: Joints, now: FloatArray, free: FloatArray) -> Composed:
     """Next velocities of all bodies in scenes with equally many contacts.
 
     Parameters
