@@ -79,6 +79,14 @@ def test_the_checker_has_nothing_to_say_of_a_model_in_memory(cart: ModelLearner)
     check_env(gym.make(ID, model=cart.model, like=CartEnv()).unwrapped, skip_render_check=True)
 
 
+@pytest.mark.sb3
+@pytest.mark.parametrize("horizon", [None, 40])
+def test_sb3s_checker_has_nothing_to_say(model_file: Path, horizon: int | None) -> None:
+    from stable_baselines3.common import env_checker
+
+    env_checker.check_env(gym.make(ID, model=str(model_file), horizon=horizon))  # warnings are errors
+
+
 def test_same_seed_same_dream(model_file: Path) -> None:
     def dream() -> list[Any]:
         env = gym.make(ID, model=str(model_file), max_episode_steps=40)
