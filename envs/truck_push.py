@@ -152,8 +152,6 @@ class TruckPushEnv(SceneEnv):
     * v0: initial version.
     """
 
-    flat_spec = FLAT
-
     def __init__(
         self,
         n_boxes: int = 3,
@@ -189,6 +187,8 @@ class TruckPushEnv(SceneEnv):
             task=PushTask() if task else None,
             time_limit=STEPS if task else None,
         )
+        if task:
+            self.flat_spec = FLAT
         self._columns = {name: cut.start for name, cut in self._cuts}
         self._friction_columns = [self._columns[name] + _OWN for name in names]
         self._stacks: Stacks = ()

@@ -123,7 +123,6 @@ def test_doctor_finds_everything_that_the_tests_run_with() -> None:
         (("inspect", "CartPole-v1"), "schema"),
         (("inspect", "relgym/TruckPush-v0", "-a", "n_boxes"), "NAME=VALUE"),
         (("inspect", "relgym/TruckPush-v0", "-a", "n_boxes=99"), "n_boxes"),
-        (("learn", "CartPole-v1", "--steps", "5", "--out", "x.json"), "schema"),
     ],
 )
 def test_foreseeable_errors_are_sentences(arguments: tuple[str, ...], message: str) -> None:

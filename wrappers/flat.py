@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from relgym.envs.arguments import refuse_vector_env
 from relgym.envs.flat import FlatSpec, Flattener
-from relgym.wrappers.views import view_of
+from relgym.errors import ConfigError
+from relgym.wrappers.views import SceneView, view_of
 
 __all__ = ["FlatView"]
 
@@ -57,7 +58,13 @@ class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordCons
         gym.ObservationWrapper.__init__(self, env)
         if spec is None and env.has_wrapper_attr("flat_spec"):
             spec = env.get_wrapper_attr("flat_spec")
-        self._schema = view_of(env).schema
+        view = view_of(env)
+        if not isinstance(view, SceneView):
+            raise ConfigError(
+                f"{env} has no `schema`: expected an env whose observations are scenes (relgym.envs.SceneEnv); "
+                "observations that are numbers need no flattening, or gymnasium.wrappers.FlattenObservation"
+            )
+        self._schema = view.schema
         self.flattener = Flattener(self._schema, spec or FlatSpec())
         self.observation_space = self.flattener.space
 

@@ -8,75 +8,29 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from itertools import groupby
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from time import perf_counter
-from typing import Any, Final, TypeAlias
+from time import perf_counter, process_time
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.experiments.bar import Measure, measured, report
-from relgym.experiments.blocks import Block
+from relgym.experiments.bar import measured, report
 from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_blocks, truck_blocks
+from relgym.experiments.law_classic import CLASSICS, Classic, classic_transitions
+from relgym.experiments.law_score import SEEDS, TESTS, Part, Rows, score, taught
+from relgym.experiments.law_trials import inexpressible, noise, other_worlds
 from relgym.experiments.rollouts import largest_errors
-from relgym.experiments.rooms import Room, rooms
+from relgym.experiments.rooms import rooms
 from relgym.model.report import report as report_of
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Transition
+from relgym.scene.objects import SceneSchema, Transition
 from relgym.scene.relations import Extractor
 
-__all__ = ["Score", "main", "score", "taught"]
-
-WRONG: Final = 1e-9
-"""A velocity component off by more than this is wrong."""
-
-SEEDS: Final = tuple(range(400, 410))
-"""Training seeds; nothing was chosen on them."""
-
-TESTS: Final = tuple(range(500, 505))
-"""Seeds of the test sets, 24,000 transitions each."""
-
-Rows: TypeAlias = tuple[str, list[Measure], list[str]]
-
-
-@dataclass(frozen=True, slots=True)
-class Score:
-    """One-step predictions: how many, wrong ones, and those that the model declined to make."""
-
-    transitions: int
-    wrong: int
-    silent: int
-
-
-def score(model: WorldModel, parts: Iterable[Block | Room]) -> Score:
-    """Predict every transition one step ahead."""
-    total = wrong = silent = 0
-    for layout, group in groupby(parts, key=lambda part: part.layout):
-        for part in group:
-            found = model.predict_batch(layout, part.vectors[:-1])
-            columns = [layout.column(layout.index(name), prop) for name, prop in found.parts]
-            off = np.abs(found.vectors[:, columns] - part.vectors[1:, columns]).max(axis=1) > WRONG
-            total += len(off)
-            wrong += int((off & found.ok).sum())
-            silent += int((~found.ok).sum())
-    return Score(total, wrong, silent)
-
-
-def taught(parts: Iterable[Block], keep: Callable[[Block], NDArray[np.bool_]] | None = None) -> WorldModel:
-    """A model that learned, one by one, the transitions that `keep` marks (default: all)."""
-    model: WorldModel | None = None
-    for block in parts:
-        model = model or WorldModel(block.schema)
-        marked = np.ones(len(block), dtype=bool) if keep is None else keep(block)
-        for use, transition in zip(marked.tolist(), block.transitions(), strict=True):
-            if use:
-                model.learn_one(transition)
-    assert model is not None, "no blocks, no schema"
-    return model
+__all__ = ["main"]
 
 
 def _one_step(seeds: Sequence[int]) -> Rows:
@@ -115,7 +69,7 @@ def _transfer(seeds: Sequence[int]) -> Rows:
         models = [taught(ball_blocks(home, seed=seed)) for seed in seeds]
         for other in (15.0, 30.0, 45.0, 60.0, 75.0):
             away = BallExperiment(other, elasticity, (friction,), 120)
-            values = [_bad(score(m, ball_blocks(away, seed=TESTS[0], test=True))) for m in models]
+            values = [score(m, ball_blocks(away, seed=TESTS[0], test=True)).bad for m in models]
             name = f"learned at {incline:g}, used at {other:g} degrees, mu {friction:g}: of 24,000"
             measures.append(measured(name, 0, values))
     return "other inclines", measures, []
@@ -137,7 +91,7 @@ def _rooms(seeds: Sequence[int]) -> Rows:
                     rng=np.random.default_rng([TESTS[0], seed]),
                     steps=400,
                 )
-                values.append(_bad(score(model, found)))
+                values.append(score(model, found).bad)
             measures.append(measured(f"laws of {experiment}, {objects} objects: of {400 * count}", 0, values))
     return "rooms never seen", measures, []
 
@@ -167,7 +121,7 @@ class _Touching:
         self.kind = kind
         self._extractor: Extractor | None = None
 
-    def __call__(self, block: Block) -> NDArray[np.bool_]:
+    def __call__(self, block: Part) -> NDArray[np.bool_]:
         self._extractor = self._extractor or Extractor(block.schema)
         found = self._extractor.extract(block.layout, block.vectors[:-1])
         ball = block.layout.bodies.index(block.layout.index("ball"))
@@ -187,7 +141,7 @@ def _online(seeds: Sequence[int]) -> Rows:
                 model = model or WorldModel(block.schema)
                 spent += [_timed(model, transition) for transition in block.transitions()]
                 if k in at:
-                    found[k].append(_bad(score(model, test)))
+                    found[k].append(score(model, test).bad)
             exact.append(found[blocks][-1] == 0)
             costs.append(1e3 * sum(spent) / len(spent))
         for n in at:
@@ -206,26 +160,40 @@ def _timed(model: WorldModel, transition: Transition) -> float:
     return perf_counter() - start
 
 
+_FRAMES: Final[tuple[Literal["auto", "world"], ...]] = ("auto", "world")
+
+
 def _no_contact(seeds: Sequence[int]) -> Rows:
-    differences, ratios = [], []
-    for seed in seeds:
-        parts = []
-        for frames in ("auto", "world"):
-            start, model = perf_counter(), None
-            for block in truck_blocks("step", seed=seed, repeats=1):
-                model = model or WorldModel(block.schema, ModelConfig(frames=frames))
-                for transition in block.transitions():
-                    model.learn_one(transition)
-            assert model is not None, "no blocks, no schema"
-            parts.append((json.dumps(model.to_json()["targets"]), perf_counter() - start))
-        differences.append(parts[0][0] != parts[1][0])
-        ratios.append(parts[0][1] / parts[1][1])
-    title = "truck-push: nothing for laws to say"
-    return title, [measured("other modes", 0, differences), measured("time, ratio", 1.2, ratios)], []
+    streams: dict[str, Callable[[int], tuple[SceneSchema, list[Transition]]]] = {"truck-push": _truck}
+    for classic in CLASSICS:
+        for body in (False, True):
+            name = f"{classic.env}{' as a body' if body else ''}"
+            streams[name] = partial(_classic, classic, body)
+    measures = []
+    for name, stream in streams.items():
+        pairs = [[_learned(*stream(seed), frames) for frames in _FRAMES] for seed in seeds]
+        measures.append(measured(f"{name}: other modes", 0, [one[0] != two[0] for one, two in pairs]))
+        measures.append(measured(f"{name}: time, ratio", 1.2, [one[1] / two[1] for one, two in pairs]))
+    return "nothing for laws to say", measures, []
 
 
-def _bad(found: Score) -> int:
-    return found.wrong + found.silent
+def _truck(seed: int) -> tuple[SceneSchema, list[Transition]]:
+    blocks = list(truck_blocks("step", seed=seed, repeats=1))
+    return blocks[0].schema, [each for block in blocks for each in block.transitions()]
+
+
+def _classic(classic: Classic, body: bool, seed: int) -> tuple[SceneSchema, list[Transition]]:
+    return classic_transitions(classic, 400, seed=seed, body=body)
+
+
+def _learned(
+    schema: SceneSchema, transitions: Sequence[Transition], frames: Literal["auto", "world"]
+) -> tuple[str, float]:
+    """The modes after some transitions, and the seconds of processor time that learning them took."""
+    model, start = WorldModel(schema, ModelConfig(frames=frames)), process_time()
+    for transition in transitions:
+        model.learn_one(transition)
+    return json.dumps(model.to_json()["targets"]), process_time() - start
 
 
 ROWS: Final[dict[int, Callable[[Sequence[int]], Rows]]] = {
@@ -235,7 +203,10 @@ ROWS: Final[dict[int, Callable[[Sequence[int]], Rows]]] = {
     4: _rooms,
     5: _parts_of_the_world,
     6: _online,
+    7: other_worlds,
+    8: noise,
     9: _no_contact,
+    10: inexpressible,
 }
 
 

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from relgym.envs.physics import BallWorld, Obstacle, Point
-from relgym.scene.objects import POSE, Float2D, Kinematics, ObjectType, SceneLayout, SceneSchema, Target
+from relgym.scene.objects import (
+    POSE,
+    Float2D,
+    Kinematics,
+    ObjectType,
+    Scene,
+    SceneLayout,
+    SceneSchema,
+    Target,
+    Transition,
+)
 from relgym.scene.shapes import Box, Prism, Sphere, Wedge, outline
 
 __all__ = ["Room", "room_schema", "rooms"]
@@ -40,6 +52,14 @@ class Room:
     schema: SceneSchema
     layout: SceneLayout
     vectors: Float2D
+
+    def __len__(self) -> int:
+        return len(self.vectors) - 1
+
+    def transitions(self) -> Iterator[Transition]:
+        """Its transitions in order."""
+        scenes = [Scene(self.schema, self.layout, vector) for vector in self.vectors]
+        return (Transition(before, after) for before, after in pairwise(scenes))
 
 
 def room_schema(objects: int) -> SceneSchema:

@@ -99,15 +99,16 @@ def _of_group(
 ) -> Iterator[ContactAccount]:
     cast = contacts.cast
     now, free, columns = book.free_motion(cast, vectors)
-    share = book.share(contacts, group, columns)
-    velocity, impulse = compose(engaged, group, share, now, free)
+    joints = book.joints(contacts, group, columns)
+    velocity, impulse, _ = compose(engaged, group, joints, now, free)
     for k, pair in enumerate(group.pairs[0].tolist()):
-        a, b = int(cast.first[pair]), int(cast.second[pair])
-        others = velocity[:, :, a] - velocity[:, :, b] - impulse[:, :, k]
-        axes = axes_of(engaged.law.frame, group.bearings.take((slice(None), k)), others)
-        before = now[:, :, a] - now[:, :, b]
-        told = _axes(engaged, pair, axes, before, others, digits)
-        names = [cast.layout.names[cast.layout.bodies[body]] for body in (a, b)]
+        a, b = cast.first[[pair]], cast.second[[pair]]
+        there = group.bearings.take((slice(None), k))
+        joint = joints.at(np.zeros(1, dtype=np.intp), k, a, b, there.normal)
+        others = joint.relative(velocity) - impulse[:, :, k]
+        axes = axes_of(engaged.law.frame, there, others)
+        told = _axes(engaged, pair, axes, joint.relative(now), others, digits)
+        names = [cast.layout.names[cast.layout.bodies[body]] for body in (int(a[0]), int(b[0]))]
         yield ContactAccount((names[0], names[1]), engaged.law.frame, tuple(told))
 
 

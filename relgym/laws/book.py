@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from relgym.laws.columns import Sources
 from relgym.laws.composition import Engaged, compose, within
+from relgym.laws.frames import POINT
 from relgym.laws.free import free_motion
+from relgym.laws.joints import Joints
 from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
 from relgym.laws.shares import EXTENT, share_values
 from relgym.laws.touching import Cast, Contacts, Group
@@ -30,7 +32,8 @@ class Motion:
     Attributes
     ----------
     velocity
-        Next velocities of all K bodies, shape ``(d, n, K)``.
+        Next velocities of all K bodies, and behind them their spins where some type has one; shape
+        ``(d [+ 1], n, K)``.
     known
         Whether that is a claim, shape ``(n, K)``: no rival law disagrees, and it lies within experience. False
         for bodies that aren't movers.
@@ -99,6 +102,11 @@ class LawBook:
             known = self._rounded[cast.layout] = np.array(places, dtype=np.intp)
         return known
 
+    def components(self, type_name: str) -> tuple[str, ...]:
+        """Properties of a type that the laws predict: its velocity, and its spin if contacts act on surfaces."""
+        sources = self.sources[type_name]
+        return sources.moving if self.pair is not None and self.pair.frame == POINT else sources.velocity
+
     def forget(self) -> None:
         """The laws changed: forget what was worked out from them."""
         self._engaged.clear()
@@ -117,7 +125,8 @@ class LawBook:
         cast = contacts.cast
         now, velocity, columns = self.free_motion(cast, vectors)
         stated = np.zeros((len(vectors), len(cast.layout.bodies)), dtype=bool)
-        stated[:, cast.movers] = np.isfinite(velocity[..., cast.movers]).all(axis=0)
+        for body in cast.movers:
+            stated[:, body] = np.isfinite(velocity[: self._count(cast, body), :, body]).all(axis=0)
         motion = Motion(velocity, stated.copy(), stated, np.zeros_like(stated), columns)
         for group in contacts.groups():
             self._collide(contacts, group, now, motion)
@@ -126,7 +135,7 @@ class LawBook:
     def free_motion(
         self, cast: Cast, vectors: NDArray[np.float64]
     ) -> tuple[FloatArray, FloatArray, dict[int, FloatArray]]:
-        """Velocities now and next, if nothing touched anything, and what the free laws read (`Motion`)."""
+        """Velocities (and spins) now and next, if nothing touched anything, and what free laws read (`Motion`)."""
         state = cast.padded(vectors)
         now = state[cast.velocities].transpose(0, 2, 1)
         velocity, columns = now.copy(), {}
@@ -134,9 +143,14 @@ class LawBook:
             sources, places = cast.sources[body]
             columns[body] = state[places]
             law = self.free.get(sources.type.name)
-            free = np.nan if law is None else free_motion(law, sources.names, columns[body])
-            velocity[..., body] = free
+            velocity[: len(sources.moving), :, body] = np.nan
+            if law is not None:
+                velocity[: len(law.components), :, body] = free_motion(law, sources.names, columns[body])
         return now, velocity, columns
+
+    def _count(self, cast: Cast, body: int) -> int:
+        """Number of components that the laws predict of a mover."""
+        return len(self.components(cast.sources[body][0].type.name))
 
     def _collide(self, contacts: Contacts, group: Group, now: FloatArray, motion: Motion) -> None:
         """Let the contacts of some scenes act, in place."""
@@ -151,23 +165,34 @@ class LawBook:
             motion.stated[scenes] &= ~involved
             motion.known[scenes] &= ~involved
             return
-        share = self.share(contacts, group, motion.columns)
+        joints = self.joints(contacts, group, motion.columns)
         before, free = now[:, scenes], motion.velocity[:, scenes]
-        after, impulse = compose(laws[0], group, share, before, free)
+        after, impulse, settled = compose(laws[0], group, joints, before, free)
         least = laws[0].chosen[:, group.pairs].min(axis=0)
-        lawful = ((least >= 0) & np.isfinite(share)).all(axis=1, keepdims=True)
-        stated = ~involved | (lawful & np.isfinite(after).all(axis=0))
+        lawful = ((least >= 0) & joints.known()).all(axis=1, keepdims=True)
+        governed = slice(None) if laws[0].law.frame == POINT else slice(cast.dimensions)
+        stated = ~involved | (lawful & np.isfinite(after[governed]).all(axis=0))
         slack = SPREAD * self.tolerance
-        seen = within(laws[0], group, after, impulse, slack).all(axis=1, keepdims=True)
-        sure = stated & (~involved | seen)
+        seen = within(laws[0], group, joints, after, impulse, slack).all(axis=1, keepdims=True)
+        sure = stated & (~involved | (seen & settled[:, None]))
         for rival in laws[1:]:
-            other, _ = compose(rival, group, share, before, free)
-            sure &= (np.abs(other - after) <= slack).all(axis=0) | ~involved
+            other = compose(rival, group, joints, before, free).velocity
+            sure &= (np.abs(other - after)[governed] <= slack).all(axis=0) | ~involved
         motion.velocity[:, scenes] = np.where(involved & stated, after, free)
         motion.stated[scenes] &= stated
         motion.known[scenes] &= sure
 
-    def share(
+    def joints(self, contacts: Contacts, group: Group, columns: Mapping[int, FloatArray]) -> Joints:
+        """Who takes which part of what the contacts do; NaN where that is unknown."""
+        cast, scenes = contacts.cast, group.scenes[:, None]
+        arms = [contacts.arms(scenes, bodies[group.pairs]) for bodies in (cast.first, cast.second)]
+        grip = None
+        if self.pair is not None and self.pair.frame == POINT:
+            grips = np.array([self.pair.grip(kind) for kind in cast.kinds])[group.pairs]
+            grip = np.where(np.any(arms, axis=0), grips, 1.0)
+        return Joints(self._share(contacts, group, columns), grip, np.stack(arms))
+
+    def _share(
         self, contacts: Contacts, group: Group, columns: Mapping[int, FloatArray]
     ) -> NDArray[np.float64]:
         """The first body's share of each impulse, shape ``(m, c)``; 1 where the other doesn't move."""

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.scene.axes import Axes
+from relgym.scene.axes import WORLD, Axes
 from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, Target
+from relgym.scene.shapes import Sphere
 
-__all__ = ["Sources", "vector_types"]
+__all__ = ["Sources", "spin_of", "vector_types"]
 
 
 def vector_types(schema: SceneSchema, targets: tuple[Target, ...]) -> tuple[ObjectType, ...]:
@@ -25,6 +26,22 @@ def vector_types(schema: SceneSchema, targets: tuple[Target, ...]) -> tuple[Obje
     return tuple(found)
 
 
+def spin_of(schema: SceneSchema, t: ObjectType, targets: tuple[Target, ...]) -> str | None:
+    """Name of the property that says how fast a round type spins in the plane; None where none is learned.
+
+    It is the one that is declared as the rate of the rotation about the depth axis. The point of a round body
+    that touches something is known: where its surface faces the other one. So is, with the spin, how fast it moves.
+    """
+    axes = Axes.of(schema)
+    if not axes.planar or not isinstance(t.shape, Sphere):
+        return None
+    rotation = f"r{WORLD[axes.depth]}"
+    angle = t.pose.get(rotation, rotation)
+    rates = [k.rate for k in schema.kinematics if (k.type, k.property) == (t.name, angle)]
+    known = {(target.type, target.property) for target in targets}
+    return next((rate for rate in rates if (t.name, rate) in known), None)
+
+
 @dataclass(frozen=True, slots=True)
 class Sources:
     """Columns that the laws of one moving type may read.
@@ -35,24 +52,34 @@ class Sources:
         The type.
     velocity
         Names of the velocity's components along the axes in use.
+    spin
+        Name of the property that is the angular velocity (`spin_of`), if there is one.
     names
-        Names of all columns: the velocity first, then the type's other properties (the pose left out: laws
+        Names of all columns: velocity and spin first, then the type's other properties (the pose left out: laws
         hold everywhere), then those of bodiless objects, as ``type.property``.
     """
 
     type: ObjectType
     velocity: tuple[str, ...]
+    spin: str | None
     names: tuple[str, ...]
 
     @classmethod
-    def of(cls, schema: SceneSchema, t: ObjectType) -> Sources:
-        """Return the columns of a type whose velocity is a vector."""
+    def of(cls, schema: SceneSchema, t: ObjectType, targets: tuple[Target, ...] = ()) -> Sources:
+        """Return the columns of a type whose velocity is a vector; `targets` are what is learned."""
         velocity = tuple(name for axis in Axes.of(schema).used if (name := t.velocity[axis]) is not None)
         posed = {t.properties[k] for k in t.pose_columns() if k >= 0}
-        others = [p for p in t.properties if p not in posed and p not in velocity]
+        spin = spin_of(schema, t, targets)
+        moving = velocity if spin is None else (*velocity, spin)
+        others = [p for p in t.properties if p not in posed and p not in moving]
         single = [b for b in schema.types if not b.has_body and _count(schema, b) == 1]
         outside = [f"{b.name}.{p}" for b in sorted(single, key=_by_name) for p in b.properties]
-        return cls(t, velocity, (*velocity, *others, *outside))
+        return cls(t, velocity, spin, (*moving, *others, *outside))
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """What laws of motion predict: the velocity's components, then the spin if there is one."""
+        return self.velocity if self.spin is None else (*self.velocity, self.spin)
 
     def places(self, layout: SceneLayout, index: int) -> NDArray[np.intp]:
         """Where the columns of an object lie in a state vector with NaN appended."""

@@ -4,22 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.laws.frames import Bearings, axes_of, axis_names
+from relgym.laws.joints import Joint, Joints
 from relgym.laws.records import AxisLaw, PairLaw
 from relgym.laws.touching import Group
 from relgym.scene.geometry.vectors import FloatArray, dot
 
-__all__ = ["SWEEPS", "Engaged", "compose", "respond", "within"]
+__all__ = ["SWEEPS", "Composed", "Engaged", "compose", "respond", "within"]
 
 SWEEPS = 400
 """Most sweeps over the contacts of a scene."""
 
+LEAP = 10
+"""After so many sweeps each, impulses that go on changing alike are extrapolated."""
+
+FARTHEST = 100.0
+"""Most sweeps that a leap stands for."""
+
 SETTLED = 1e-15
-"""Change of an impulse, in length per step, below which it has settled."""
+"""Change of an impulse, in length per step, up to which it has settled; at least a few roundings."""
+
+ROUNDINGS = 8.0 * float(np.finfo(np.float64).eps)
+
+
+class Composed(NamedTuple):
+    """What contacts do together.
+
+    Attributes
+    ----------
+    velocity
+        Next velocities of all bodies (and spins), shape ``(d [+ 1], m, K)``.
+    impulse
+        Each contact's change of the relative velocity of its two bodies, shape ``(d, m, c)``.
+    settled
+        Whether the scene's contacts came to agree with each other, shape ``(m,)``.
+    """
+
+    velocity: FloatArray
+    impulse: FloatArray
+    settled: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,77 +106,128 @@ def respond(
     return change
 
 
-def compose(
-    engaged: Engaged, group: Group, share: FloatArray, now: FloatArray, free: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def compose(engaged: Engaged, group: Group, joints: Joints, now: FloatArray, free: FloatArray) -> Composed:
     """Next velocities of all bodies in scenes with equally many contacts.
-
-    Returns velocities of shape ``(d, m, K)`` and each contact's change of the relative velocity of its two
-    bodies, ``(d, m, c)``.
 
     Parameters
     ----------
     engaged, group
         The laws and the contacts.
-    share
-        The first body's share of each contact's impulse, shape ``(m, c)``.
+    joints
+        Who takes which part of each contact's impulse.
     now, free
-        Velocities before, and of free bodies, shape ``(d, m, K)``.
+        Velocities (and spins) before, and of free bodies, shape ``(d [+ 1], m, K)``.
 
     Notes
     -----
     The velocity before stays what it is; only the free motion of a pair is replaced by *everything except
     itself*. Gauss-Seidel sweeps; every scene stops when its own impulses have settled, so that a scene's
     result doesn't depend on its company. Cost O(sweeps * contacts).
+
+    A ball jammed between two rough surfaces needs thousands of sweeps, of which each changes the impulses like the
+    one before: such a sequence is continued in a leap now and then (Aitken's extrapolation).
     """
-    velocity = free.copy()
-    impulse = np.zeros((len(now), *group.pairs.shape))
+    settling = _Settling(engaged, group, joints, now, free)
     active = np.arange(len(group.pairs))
-    for _ in range(SWEEPS):
-        change = np.zeros(len(active))
-        for k in range(group.pairs.shape[1]):
-            pair = group.pairs[active, k]
-            a, b, part = engaged.first[pair], engaged.second[pair], share[active, k]
-            own = impulse[:, active, k]
-            others = velocity[:, active, a] - velocity[:, active, b] - own
-            before = now[:, active, a] - now[:, active, b]
-            there = group.bearings.take((active, k))
-            new = respond(engaged.law.axes, engaged.chosen[:, pair], engaged.law.frame, there, before, others)
-            step = new - own
-            velocity[:, active, a] += part * step
-            velocity[:, active, b] -= (1.0 - part) * step
-            impulse[:, active, k] = new
-            change = np.maximum(change, np.abs(step).max(axis=0))
-        active = active[change > SETTLED]
-        if not len(active) or group.pairs.shape[1] == 1:
+    if group.pairs.shape[1] == 1:
+        settling.sweep(active)
+        return settling.result(active[:0])
+    still = np.maximum(SETTLED, ROUNDINGS * np.abs(free).max(axis=(0, 2)))
+    before = np.empty(0)
+    for sweep in range(1, SWEEPS + 1):
+        step = settling.sweep(active)
+        going = np.abs(step).max(axis=(0, 2)) > still[active]
+        active, step = active[going], step[:, going]
+        if not len(active):
             break
-    return velocity, impulse
+        if sweep % LEAP == 0:
+            settling.leap(active, before[:, going], step)
+        before = step
+    return settling.result(active)
+
+
+class _Settling:
+    """Impulses on their way to where they agree with each other, in scenes with equally many contacts."""
+
+    def __init__(
+        self, engaged: Engaged, group: Group, joints: Joints, now: FloatArray, free: FloatArray
+    ) -> None:
+        self.engaged, self.group, self.joints, self.now = engaged, group, joints, now
+        self.velocity = free.copy()
+        self.impulse = np.zeros(group.bearings.normal.shape)
+
+    def sweep(self, active: NDArray[np.intp]) -> FloatArray:
+        """Let every contact respond to all others, one after the other; how impulses changed, ``(d, n, c)``."""
+        law = self.engaged.law
+        steps = np.empty((len(self.impulse), len(active), self.group.pairs.shape[1]))
+        for k in range(steps.shape[2]):
+            joint, there = _joint(self.engaged, self.group, self.joints, active, k)
+            own = self.impulse[:, active, k]
+            others = joint.relative(self.velocity) - own
+            chosen = self.engaged.chosen[:, self.group.pairs[active, k]]
+            new = respond(law.axes, chosen, law.frame, there, joint.relative(self.now), others)
+            steps[..., k] = new - own
+            joint.apply(steps[..., k], self.velocity)
+            self.impulse[:, active, k] = new
+        return steps
+
+    def result(self, unsettled: NDArray[np.intp]) -> Composed:
+        """What has become of it; `unsettled` are the scenes that still changed in the last sweep."""
+        settled = np.ones(self.impulse.shape[1], dtype=bool)
+        settled[unsettled] = False
+        return Composed(self.velocity, self.impulse, settled)
+
+    def leap(self, active: NDArray[np.intp], before: FloatArray, step: FloatArray) -> None:
+        """Go on as two sweeps have gone, to where a sequence of steps with that ratio ends."""
+        kept = along = np.zeros(len(active))
+        for k in range(step.shape[2]):
+            kept = kept + dot(before[..., k], before[..., k])
+            along = along + dot(before[..., k], step[..., k])
+        ratio = np.clip(along / np.where(kept > 0.0, kept, 1.0), 0.0, 1.0 - 1.0 / FARTHEST)
+        steps = np.where(ratio > 0.5, ratio / (1.0 - ratio), 0.0)
+        for k in range(step.shape[2]):
+            joint, _ = _joint(self.engaged, self.group, self.joints, active, k)
+            joint.apply(steps * step[..., k], self.velocity)
+            self.impulse[:, active, k] += steps * step[..., k]
+
+
+def _joint(
+    engaged: Engaged, group: Group, joints: Joints, scenes: NDArray[np.intp], contact: int
+) -> tuple[Joint, Bearings]:
+    """One contact of some scenes, and the directions there."""
+    pair = group.pairs[scenes, contact]
+    there = group.bearings.take((scenes, contact))
+    return joints.at(scenes, contact, engaged.first[pair], engaged.second[pair], there.normal), there
 
 
 def within(
-    engaged: Engaged, group: Group, velocity: FloatArray, impulse: FloatArray, slack: float
+    engaged: Engaged, group: Group, joints: Joints, velocity: FloatArray, impulse: FloatArray, slack: float
 ) -> NDArray[np.bool_]:
-    """Contacts that make bodies move as contacts were seen to make them, shape ``(m, c)``.
+    """Contacts that don't turn bodies back in a sense in which none was seen to, shape ``(m, c)``.
+
+    A contact turns a body back where the body moves, along an axis, in a sense in which it wouldn't without
+    the contact. What a contact slows down, or lets go, needs no precedent.
 
     Parameters
     ----------
-    engaged, group
-        The laws and the contacts.
+    engaged, group, joints
+        The laws, the contacts and their bodies.
     velocity, impulse
         What `compose` gave.
     slack
         Velocities up to this count as 0.
     """
-    rows = np.arange(len(group.pairs))[:, None]
-    a, b = engaged.first[group.pairs], engaged.second[group.pairs]
-    after = velocity[:, rows, a] - velocity[:, rows, b]
-    axes = axes_of(engaged.law.frame, group.bearings, after - impulse)
     seen = np.ones(group.pairs.shape, dtype=bool)
-    for k, axis in enumerate(axes):
-        value, chosen = dot(after, axis), engaged.chosen[k][group.pairs]
-        acts = np.abs(dot(impulse, axis)) > slack  # what is let go may move anyhow
-        for number, law in enumerate(engaged.law.axes[k]):
-            below, above = law.signs
-            strange = ((value < -slack) & (not below)) | ((value > slack) & (not above))
-            seen &= ~(strange & acts & (chosen == number))
+    scenes = np.arange(len(group.pairs))
+    for k in range(group.pairs.shape[1]):
+        joint, there = _joint(engaged, group, joints, scenes, k)
+        after = joint.relative(velocity)
+        free = after - impulse[..., k]
+        for j, axis in enumerate(axes_of(engaged.law.frame, there, free)):
+            value, without = dot(after, axis), dot(free, axis)
+            back, forth = (value < -slack) & (without >= -slack), (value > slack) & (without <= slack)
+            below, above = np.array([law.signs for law in engaged.law.axes[j]]).T[
+                :, engaged.chosen[j][group.pairs[:, k]]
+            ]
+            seen[:, k] &= ~(back & ~below) & ~(forth & ~above)
     return seen

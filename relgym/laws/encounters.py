@@ -44,10 +44,12 @@ class EncounterStore:
         self.sources = sources
         self.kinds: list[Kind] = []
         d = len(Axes.of(schema).used)
+        self._d, moving = d, d + any(s.spin for s in sources.values())
         columns = max((len(s.names) for s in sources.values()), default=0)
         widths = {
-            "kind": 1, "now_a": d, "now_b": d, "after_a": d, "after_b": d, "normal": d, "centres": d,
-            "angles": 3, "extent_a": 1, "extent_b": 1, "x_a": columns, "x_b": columns,
+            "kind": 1, "now_a": moving, "now_b": moving, "after_a": moving, "after_b": moving,
+            "normal": d, "centres": d, "angles": 3, "arm_a": 1, "arm_b": 1, "extent_a": 1, "extent_b": 1,
+            "x_a": columns, "x_b": columns,
         }  # fmt: skip
         ends = np.cumsum(list(widths.values())).tolist()
         self._at = {name: slice(end - w, end) for (name, w), end in zip(widths.items(), ends, strict=True)}
@@ -74,7 +76,7 @@ class EncounterStore:
         *,
         wrong: bool,
     ) -> None:
-        """Keep a contact of a single scene; `after` are all bodies' next velocities, shape ``(d, K)``."""
+        """Keep a contact of a single scene; `after` are all bodies' next velocities (and spins)."""
         cast = contacts.cast
         a, b = int(cast.first[pair]), int(cast.second[pair])
         kind = cast.kinds[pair]
@@ -87,6 +89,7 @@ class EncounterStore:
         for side, body in (("a", a), ("b", b)):
             row[self._at[f"now_{side}"]] = state[cast.velocities[:, body]]
             row[self._at[f"after_{side}"]] = after[:, body]
+            row[self._at[f"arm_{side}"]] = contacts.arms(np.zeros(1, dtype=np.intp), np.array([body]))
             row[self._at[f"extent_{side}"]] = contacts.pose[0, body, 6 + cast.axes.used[0]]
             if body in cast.sources:
                 start = self._at[f"x_{side}"].start
@@ -111,18 +114,21 @@ class EncounterStore:
         part = np.flatnonzero(np.isin(kinds, usable))
         if not len(part):
             return None
-        free_a, free_b = self._free(book, kinds, "a"), self._free(book, kinds, "b")
-        take = np.take
+        free = [self._free(book, kinds, side)[:, part] for side in "ab"]
+        now, after = ([self._column(f"{name}_{side}")[:, part] for side in "ab"] for name in ("now", "after"))
+        arms = [self._column(f"arm_{side}")[0, part] for side in "ab"]
+        relative = [np.asarray(a[: self._d] - b[: self._d]) for a, b in (now, free, after)]
         return Encounters(
-            take(self._column("now_a") - self._column("now_b"), part, axis=1),
-            take(free_a - free_b, part, axis=1),
-            take(self._column("after_a") - self._column("after_b"), part, axis=1),
+            relative[0],
+            relative[1],
+            relative[2],
             Bearings(
                 *(np.ascontiguousarray(rows[part, self._at[n]].T) for n in ("normal", "centres", "angles"))
             ),
             kinds[part],
             tuple(self.kinds),
             book.tolerance,
+            np.stack([a[-1] * arms[0] + b[-1] * arms[1] for a, b in (now, free, after)]),
         )
 
     def shares(self, book: LawBook) -> dict[Kind, Share]:
@@ -135,7 +141,7 @@ class EncounterStore:
             if a not in book.free or b not in book.free:
                 continue
             part = np.flatnonzero(kinds == k)
-            mine, theirs = ((after[s] - free[s])[:, part] for s in (0, 1))
+            mine, theirs = ((after[s] - free[s])[: self._d, part] for s in (0, 1))
             share = find_share(
                 mine,
                 mine - theirs,
@@ -162,7 +168,9 @@ class EncounterStore:
             if name in book.free:
                 part = np.flatnonzero(kinds == k)
                 columns = self._column(f"x_{side}")[: len(self.sources[name].names), part]
-                velocity[:, part] = free_motion(book.free[name], self.sources[name].names, columns)
+                known = free_motion(book.free[name], self.sources[name].names, columns)
+                velocity[: len(self.sources[name].moving), part] = np.nan
+                velocity[: len(known), part] = known
         return velocity
 
     def _column(self, name: str) -> FloatArray:

@@ -2,6 +2,7 @@
 
 =========  ================================================================================================
 contact    the contact's normal (from B to A), and the direction in which the free motion slips along it
+point      the same, for the velocities of the points that touch: surfaces slip, not centres (bodies that spin)
 turned     the normal, and the normal turned by 90 degrees (in the plane only)
 centres    the line from B's centre to A's, and the slip direction across it
 world      the world's axes
@@ -20,12 +21,18 @@ import numpy as np
 
 from relgym.scene.geometry.vectors import FloatArray, dot, norm, rotation
 
-__all__ = ["FRAMES", "Bearings", "axes_of", "axis_names"]
+__all__ = ["FRAMES", "NORMAL_FRAMES", "POINT", "Bearings", "axes_of", "axis_names", "turned"]
 
-FRAMES = ("contact", "turned", "centres", "own", "world")
+POINT = "point"
+"""Name of the frame in which velocities are those of the points that touch."""
+
+FRAMES = ("contact", POINT, "turned", "centres", "own", "world")
 """All frames; of two that explain equally well the earlier is preferred."""
 
-_LETTERS = {"contact": "nt", "turned": "ns", "centres": "ct", "own": "abc", "world": "xyz"}
+NORMAL_FRAMES = ("contact", "turned")
+"""Frames along contact normals for the velocities of centres."""
+
+_LETTERS = {"contact": "nt", POINT: "nt", "turned": "ns", "centres": "ct", "own": "abc", "world": "xyz"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +75,12 @@ def axes_of(frame: str, bearings: Bearings, slipping: FloatArray) -> list[FloatA
     slipping
         Relative velocity whose slip counts, shape ``(d, n)``.
     """
-    if frame == "contact":
+    if frame in ("contact", POINT):
         return [bearings.normal, _across(bearings.normal, slipping)]
     if frame == "centres":
         return [bearings.centres, _across(bearings.centres, slipping)]
     if frame == "turned":
-        return [bearings.normal, _turned(bearings.normal)]
+        return [bearings.normal, turned(bearings.normal)]
     d = len(slipping)
     if frame == "world":
         return [np.broadcast_to(_unit(k, slipping), slipping.shape) for k in range(d)]
@@ -90,14 +97,15 @@ def _unit(k: int, like: FloatArray) -> FloatArray:
     return axis
 
 
-def _turned(normal: FloatArray) -> FloatArray:
+def turned(normal: FloatArray) -> FloatArray:
+    """Normals in the plane, turned by 90 degrees."""
     return np.stack([-normal[1], normal[0]])
 
 
 def _across(normal: FloatArray, velocity: FloatArray) -> FloatArray:
     """Direction of the part of a velocity across a normal."""
     if len(normal) == 2:  # exactly across, whatever rounding does to a slow slip
-        side = _turned(normal)
+        side = turned(normal)
         return np.where(dot(velocity, side) < 0.0, -side, side)
     part = velocity - dot(velocity, normal) * normal
     length = norm(part)

@@ -51,7 +51,7 @@ class FreeLearner:
     def __init__(self, sources: Sources, *, seed: int) -> None:
         self.sources = sources
         self.law: FreeLaw | None = None
-        self._d = len(sources.velocity)
+        self._d = len(sources.moving)
         self.store = Store(len(sources.names) + self._d, KEPT, seed=seed)
         self._rng = np.random.default_rng([seed, 1])
         self._news = 0
@@ -71,7 +71,7 @@ class FreeLearner:
         x
             The object's columns, shape ``(len(names),)``.
         after
-            Its next velocity, shape ``(d,)``.
+            Its next velocity, and spin if it has one, shape ``(d [+ 1],)``.
         right
             Whether the law explained it.
         tolerance
@@ -83,11 +83,14 @@ class FreeLearner:
         if right and not _power_of_two(self.seen):
             return False
         self._news += 1
-        unexplained = 0 if self.law is None else self.law.unexplained
-        if len(self.store.rows) < FEWEST or self._news <= unexplained // 4:
+        if len(self.store.rows) < FEWEST or self._news <= self._patience():
             return False
         self._news = 0
         return self.fit(tolerance)
+
+    def _patience(self) -> int:
+        """How much news doesn't call for another search: ever more while there is no law, or one that fails."""
+        return self.seen // 4 if self.law is None else self.law.unexplained // 4
 
     def fit(self, tolerance: float) -> bool:
         """Learn the law anew from the examples kept; whether it changed."""
@@ -101,15 +104,22 @@ class FreeLearner:
         if len(rows) < FEWEST:
             return None
         components = tuple(self._component(x, y[:, k], k, tolerance) for k in range(self._d))
+        # A spin that follows no law is no reason to have none of the velocity.
+        for count in dict.fromkeys((self._d, len(self.sources.velocity))):
+            law = self._law(components[:count], x, y[:, :count], tolerance)
+            if law.unexplained <= (1.0 - EXPLAINS) * len(rows):
+                return law
+        return None
+
+    def _law(
+        self, components: tuple[Piece, ...], x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float
+    ) -> FreeLaw:
         columns = dict(zip(self.sources.names, x.T, strict=True))
         values = np.stack([piece.values(columns, y[:, 0]) for piece in components], axis=1)
         wrong = int((np.abs(values - y) > tolerance).any(axis=1).sum())
-        if wrong > (1.0 - EXPLAINS) * len(rows):
-            return None
-        bits = function_bits(components, len(self.sources.names) + 1, len(rows))
-        return FreeLaw(
-            self.sources.type.name, components, len(rows), wrong, bits + self._d * EXCEPTION_BITS * wrong
-        )
+        bits = function_bits(components, len(self.sources.names) + 1, len(y))
+        bits += len(components) * EXCEPTION_BITS * wrong
+        return FreeLaw(self.sources.type.name, components, len(y), wrong, bits)
 
     def _component(self, x: NDArray[np.float64], y: NDArray[np.float64], k: int, tolerance: float) -> Piece:
         """One component's law: the shortest description among a few forms, the plainest first.

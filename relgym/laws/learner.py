@@ -85,7 +85,7 @@ class LawLearner:
         noise_std: float | str = "auto",
     ) -> None:
         self.schema = schema
-        self.sources = {t.name: Sources.of(schema, t) for t in vector_types(schema, targets)}
+        self.sources = {t.name: Sources.of(schema, t, targets) for t in vector_types(schema, targets)}
         self.book = LawBook(schema, self.sources)
         self._noise = None if noise_std == "auto" else float(noise_std)
         self._free = {name: FreeLearner(s, seed=seed) for name, s in self.sources.items()}
@@ -129,7 +129,7 @@ class LawLearner:
         if not self.ready(type_name) or self.book.pair is None:
             return float("inf")
         stated = self.book.free[type_name].bits + self.book.pair.bits
-        d = len(self.sources[type_name].velocity)
+        d = len(self.book.components(type_name))
         return stated + EXCEPTION_BITS * d * self.unexplained(type_name)
 
     # ------------------------------------------------------------------ learning
@@ -165,7 +165,7 @@ class LawLearner:
         right = {}
         for body in cast.movers:
             if stays[cast.layout.bodies[body]]:
-                right[body] = self._judge(motion, body, after)
+                right[body] = self._judge(cast, motion, body, after)
                 self._count(cast, body, right[body])
                 if not (cast.first[touching] == body).any() and not (cast.second[touching] == body).any():
                     changed |= self._learn_free(cast, body, motion, after[:, body], right[body])
@@ -178,9 +178,10 @@ class LawLearner:
             changed |= self._derive(sum(news))
         return changed
 
-    def _judge(self, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
-        value = motion.velocity[:, 0, body]
-        return bool(motion.stated[0, body] and (np.abs(value - after[:, body]) <= self.book.tolerance).all())
+    def _judge(self, cast: Cast, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
+        count = len(self.book.components(cast.sources[body][0].type.name))
+        off = np.abs(motion.velocity[:count, 0, body] - after[:count, body])
+        return bool(motion.stated[0, body] and (off <= self.book.tolerance).all())
 
     def _count(self, cast: Cast, body: int, right: bool) -> None:
         tally = self._tallies[cast.sources[body][0].type.name]
@@ -193,6 +194,7 @@ class LawLearner:
     ) -> bool:
         name = cast.sources[body][0].type.name
         learner = self._free[name]
+        after = after[: len(learner.sources.moving)]
         changed = learner.learn_one(motion.columns[body][:, 0], after, right, self.book.tolerance)
         if learner.seen in ESTIMATE_AT and self._noise is None:
             changed |= self._estimate(learner)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.laws.description import EXCEPTION_BITS
-from relgym.laws.frames import FRAMES, Bearings, axes_of, axis_names
+from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
+from relgym.laws.frames import FRAMES, POINT, Bearings, axes_of, axis_names, turned
 from relgym.laws.pieces import AxisExamples
 from relgym.laws.records import ONE, AxisLaw, Kind, Operator, PairLaw, Piece
 from relgym.laws.selection import AxisFit, fit_axis, refitted
@@ -19,6 +19,10 @@ __all__ = ["Encounters", "PairFit", "fit_pair"]
 
 JOINS = 0.98
 """A kind of contact obeys a law of other kinds if that explains at least this share of its examples."""
+
+
+TOLD = 100.0
+"""A change of more than this many tolerances tells how bodies divide it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,9 @@ class Encounters:
         The kinds.
     tolerance
         Largest residual of an explained velocity.
+    rims
+        How fast the surfaces of A and B move where they touch, against their centres and summed up, along the turned
+        normal: before, without this contact, and after it; shape ``(3, n)``. All 0 where nothing spins.
     """
 
     now: FloatArray
@@ -46,9 +53,20 @@ class Encounters:
     kinds: NDArray[np.intp]
     names: tuple[Kind, ...]
     tolerance: float
+    rims: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.kinds)
+
+    def at_points(self) -> Encounters | None:
+        """The contacts with the velocities of the points that touch; None where no spin is known to differ."""
+        if self.rims is None or not np.isfinite(self.rims).all() or not self.rims.any():
+            return None
+        side = turned(self.bearings.normal)
+        now, free, after = (
+            v - rim * side for v, rim in zip((self.now, self.free, self.after), self.rims, strict=True)
+        )
+        return replace(self, now=now, free=free, after=after)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +94,9 @@ def fit_pair(encounters: Encounters, *, rng: np.random.Generator, frames: Sequen
     for frame in frames:
         if frame == "turned" and d != 2:
             continue
-        found = _fit_frame(frame, encounters, np.inf if best is None else best.law.bits, rng=rng)
+        limit = np.inf if best is None else best.law.bits
+        fit = _fit_points if frame == POINT else _fit_frame
+        found = fit(frame, encounters, limit, rng=rng)
         if found is not None and (best is None or found.law.bits < best.law.bits - 1e-6):
             best = found
     assert best is not None, "without a limit every frame gives a law"
@@ -105,6 +125,33 @@ def _fit_frame(
         if bits >= limit:
             return None
     return PairFit(PairLaw(frame, tuple(laws), bits), explained)
+
+
+def _fit_points(
+    frame: str, encounters: Encounters, limit: float, *, rng: np.random.Generator
+) -> PairFit | None:
+    """The law of the points that touch, and how much of it the bodies' velocities feel."""
+    points = encounters.at_points()
+    found = None if points is None else _fit_frame(frame, points, limit, rng=rng)
+    if points is None or found is None:
+        return None
+    normal, told = encounters.bearings.normal, TOLD * encounters.tolerance
+    change, whole = (e.after - e.free for e in (encounters, points))
+    felt, slid = (c - dot(c, normal) * normal for c in (change, whole))
+    acts = found.explained & (norm(slid) > told)
+    grips, explained, bits = [], found.explained.copy(), found.law.bits
+    for k in np.unique(encounters.kinds).tolist():
+        part = encounters.kinds == k
+        if not (part & acts).any():
+            continue
+        rows = part & acts
+        grip = float(np.median(dot(felt, slid)[rows] / dot(slid, slid)[rows]))
+        left = norm(felt - grip * slid)
+        explained &= ~part | (left <= 2.0 * encounters.tolerance)
+        grips.append((encounters.names[k], grip))
+    bits += EXCEPTION_BITS * float((found.explained & ~explained).sum())
+    bits += (CONSTANT_BITS + 0.5 * float(np.log2(len(encounters)))) * len({f"{g:.6g}" for _, g in grips})
+    return PairFit(replace(found.law, bits=bits, grips=tuple(grips)), explained)
 
 
 def _axis_examples(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -20,6 +21,9 @@ Kind: TypeAlias = tuple[str, str]
 """Types of the two bodies of a contact: the first one moves."""
 
 Operator: TypeAlias = Literal["max", "min"]
+
+ALIKE = 1e-6
+"""Grips of different kinds of contacts that differ by at most this are one and the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,11 +160,15 @@ class PairLaw:
         For each axis the laws of different kinds of contacts (one law, unless materials differ).
     bits
         Description length of all of them.
+    grips
+        In the frame of the points that touch: for each kind with a body that spins, which part of a change along the
+        slip direction velocities take. Spins take the rest.
     """
 
     frame: str
     axes: tuple[tuple[AxisLaw, ...], ...]
     bits: float
+    grips: tuple[tuple[Kind, float], ...] = ()
 
     def law_of(self, axis: int, kind: Kind) -> AxisLaw | None:
         """The law for a kind of contact; that of all kinds, if they agree, for one never seen."""
@@ -168,22 +176,31 @@ class PairLaw:
         known = next((law for law in laws if kind in law.kinds), None)
         return laws[0] if known is None and len(laws) == 1 else known
 
+    def grip(self, kind: Kind) -> float:
+        """The grip of a kind of contact; that of all kinds, if they agree, for one never seen; else NaN."""
+        known = dict(self.grips)
+        if kind in known or not known:
+            return known.get(kind, math.nan)
+        alike = max(known.values()) - min(known.values()) <= ALIKE
+        return next(iter(known.values())) if alike else math.nan
+
     def says(self) -> tuple[Any, ...]:
         """What the law states: equal for laws that differ in examples and in rounding only."""
-        return self.frame, *(
-            tuple((law.says(), law.kinds if len(laws) > 1 else ()) for law in laws) for laws in self.axes
-        )
+        axes = (tuple((law.says(), law.kinds if len(laws) > 1 else ()) for law in laws) for laws in self.axes)
+        return self.frame, *axes, *((kind, f"{grip:.9g}") for kind, grip in self.grips)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
         axes = [[law.to_json() for law in laws] for laws in self.axes]
-        return {"frame": self.frame, "axes": axes, "bits": self.bits}
+        grips = [[*kind, grip] for kind, grip in self.grips]
+        return {"frame": self.frame, "axes": axes, "bits": self.bits, "grips": grips}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> PairLaw:
         """Read what `to_json` wrote."""
         axes = tuple(tuple(AxisLaw.from_json(law) for law in laws) for laws in data["axes"])
-        return cls(str(data["frame"]), axes, float(data["bits"]))
+        grips = tuple(((str(a), str(b)), float(grip)) for a, b, grip in data["grips"])
+        return cls(str(data["frame"]), axes, float(data["bits"]), grips)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ from itertools import product
 from relgym.clustering.mode import sum_text
 from relgym.errors import ConfigError
 from relgym.laws.book import LawBook
-from relgym.laws.frames import axis_names
-from relgym.laws.records import ONE, Kind, Piece
+from relgym.laws.frames import NORMAL_FRAMES, POINT, axis_names
+from relgym.laws.records import ALIKE, ONE, Kind, PairLaw, Piece
 from relgym.scene.axes import Axes
 
 __all__ = ["LEGEND", "LawRow", "WorldRow", "law_rows", "world_rows"]
@@ -84,19 +84,31 @@ def law_rows(book: LawBook, types: Iterable[str], digits: int = 7) -> tuple[LawR
         for law in laws:
             whom = "touching" if len(laws) == 1 else f"touching {_names(law.kinds)}"
             where = _DIRECTIONS.get(letter, f"along {letter}")
+            where += " (of the points that touch)" if book.pair.frame == POINT else ""
             statement = f"v'_{letter} = {law.formula(digits)}"
             rows.append(LawRow(f"{whom}, {where}", statement, book.pair.frame, law.examples, law.unexplained))
     for (a, b), share in sorted(book.shares.items()):
         statement = f"A's velocity takes {share.formula(digits)} of the change, B's the rest"
         rows.append(LawRow(f"{a} A touching {b} B", statement, book.pair.frame, 0, 0))
+    for grip, kinds in _grips(book.pair).items():
+        statement = f"velocities take {grip:.{digits}g} of the change along t, spins the rest"
+        rows.append(LawRow(f"touching {kinds}", statement, book.pair.frame, 0, 0))
     return tuple(rows)
+
+
+def _grips(law: PairLaw) -> dict[float, str]:
+    """Kinds of contacts by their grip, those that agree together."""
+    found: dict[float, list[Kind]] = {}
+    for kind, grip in law.grips:
+        same = next((g for g in found if abs(g - grip) <= ALIKE), grip)
+        found.setdefault(same, []).append(kind)
+    return {grip: _names(tuple(kinds)) for grip, kinds in found.items()}
 
 
 def _free_rows(book: LawBook, name: str, digits: int) -> Iterator[LawRow]:
     if (law := book.free.get(name)) is None:
         return
-    velocity = book.sources[name].velocity
-    pairs = zip(velocity, law.components, strict=True)
+    pairs = zip(book.components(name), law.components, strict=False)
     statement = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
     yield LawRow(f"{name} touching nothing", statement, "world", law.examples, law.unexplained)
 
@@ -131,7 +143,7 @@ def world_rows(book: LawBook, type_name: str, incline: float, digits: int = 7) -
         The world isn't planar, or the laws aren't stated along normals.
     """
     axes = Axes.of(book.schema)
-    if not axes.planar or book.pair is None or book.pair.frame not in ("contact", "turned"):
+    if not axes.planar or book.pair is None or book.pair.frame not in NORMAL_FRAMES:
         raise ConfigError(
             "functions along the world's axes follow from laws along contact normals, in the plane only"
         )
@@ -161,7 +173,7 @@ def _cases(
     assert book.pair is not None, "checked by the caller"
     velocity = book.sources[name].velocity
     now: list[_Form] = [{v: 1.0} for v in velocity]
-    free: list[_Form] = [dict(piece.terms) for piece in book.free[name].components]
+    free: list[_Form] = [dict(piece.terms) for piece in book.free[name].components[: len(velocity)]]
     letters = axis_names(book.pair.frame, 2)
     features = {f"u_{c}": _along(free, axis) for c, axis in zip(letters, axes, strict=True)}
     features |= {f"v_{c}": _along(now, axis) for c, axis in zip(letters, axes, strict=True)}

@@ -41,7 +41,10 @@ class Cast:
     both
         Whether the second one moves too, shape ``(P,)``.
     velocities
-        Column of every body's velocity along the axes in use, shape ``(d, K)``; of a 0 where it has none.
+        Column of every body's velocity along the axes in use, and of its spin where some type has one; shape
+        ``(d, K)`` or ``(d + 1, K)``; of a 0 where there is none.
+    spins
+        Whether a body's spin is learned, shape ``(K,)``.
     """
 
     axes: Axes
@@ -53,6 +56,7 @@ class Cast:
     kinds: tuple[Kind, ...]
     both: NDArray[np.bool_]
     velocities: NDArray[np.intp]
+    spins: NDArray[np.bool_]
 
     @classmethod
     def of(cls, schema: SceneSchema, layout: SceneLayout, sources: Mapping[str, Sources]) -> Cast:
@@ -68,6 +72,9 @@ class Cast:
                     pairs.append((a, b))
         first, second = (np.array([p[k] for p in pairs], dtype=np.intp) for k in (0, 1))
         columns = velocity_columns(layout, axes)
+        spin = _spin_columns(layout, sources)
+        if any(s.spin for s in sources.values()):
+            columns = np.concatenate([columns, spin[None]])
         return cls(
             axes,
             layout,
@@ -81,12 +88,25 @@ class Cast:
             tuple((types[a].name, types[b].name) for a, b in pairs),
             np.isin(second, np.array(movers, dtype=np.intp)),
             np.where(columns < 0, layout.width + 1, columns),
+            spin >= 0,
         )
+
+    @property
+    def dimensions(self) -> int:
+        """Number of components of a velocity."""
+        return len(self.axes.used)
 
     def padded(self, vectors: NDArray[np.float64]) -> FloatArray:
         """State vectors, columns first, with NaN and 0 behind them, shape ``(width + 2, n)``."""
         n = len(vectors)
         return np.concatenate([vectors.T, np.full((1, n), np.nan), np.zeros((1, n))])
+
+
+def _spin_columns(layout: SceneLayout, sources: Mapping[str, Sources]) -> NDArray[np.intp]:
+    """Column of every body's spin, shape ``(K,)``; -1 where it has none."""
+    names = [(i, sources.get(layout.types[i].name)) for i in layout.bodies]
+    found = [layout.column(i, s.spin) if s is not None and s.spin is not None else -1 for i, s in names]
+    return np.array(found, dtype=np.intp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +146,8 @@ class Contacts:
     @classmethod
     def of(cls, cast: Cast, relations: Relations, vectors: NDArray[np.float64]) -> Contacts:
         """Find the contacts of n scenes."""
-        touch = relations.relation("intersect")
-        return cls(cast, relations, poses(cast.layout, vectors), touch[:, cast.first, cast.second])
+        hits = relations.touching(cast.first, cast.second)
+        return cls(cast, relations, poses(cast.layout, vectors), hits)
 
     def groups(self) -> Iterator[Group]:
         """Scenes by their number of contacts, those without any left out."""
@@ -153,3 +173,11 @@ class Contacts:
             rows = np.broadcast_to(scenes, a.shape)[part]
             normals[:, part] = self.relations.normals(body)[rows, b[part]].T
         return Bearings(normals, between / np.where(length > 0.0, length, 1.0), angles)
+
+    def arms(self, scenes: NDArray[np.intp], bodies: NDArray[np.intp]) -> FloatArray:
+        """How far from their centres bodies that spin are touched; 0 for others. Negative if spins turn clockwise.
+
+        The arguments have a common shape after broadcasting.
+        """
+        radius = 0.5 * self.cast.axes.turn * self.pose[scenes, bodies, 6 + self.cast.axes.used[0]]
+        return np.where(self.cast.spins[bodies], radius, 0.0)

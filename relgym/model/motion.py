@@ -57,7 +57,7 @@ class Laws:
         self.learner = LawLearner(schema, known, seed=config.seed, noise_std=noise)
         self.governed: frozenset[str] = frozenset()
         self._components = {
-            (name, prop): k for name, s in self.learner.sources.items() for k, prop in enumerate(s.velocity)
+            (name, prop): k for name, s in self.learner.sources.items() for k, prop in enumerate(s.moving)
         }
         self._columns = max(2, sum(len(schema.type(t).properties) for _, t in schema.objects))
         self._seen = 0
@@ -68,7 +68,8 @@ class Laws:
 
     def governs(self, target: Target) -> bool:
         """Whether the laws predict a target."""
-        return target.type in self.governed and (target.type, target.property) in self._components
+        known = target.type in self.governed and (target.type, target.property) in self._components
+        return known and target.property in self.learner.book.components(target.type)
 
     def suffice(self, type_name: str, targets: Sequence[Target]) -> bool:
         """Whether the laws predict all targets of a type and have long been right: its modes may rest.
@@ -101,12 +102,9 @@ class Laws:
         """Whether a type's motion takes fewer bits by laws than by modes of every component."""
         if not self.learner.ready(type_name):
             return False
-        parts = [
-            part
-            for t, part in models.items()
-            if t.type == type_name and (t.type, t.property) in self._components
-        ]
-        if len(parts) < len(self.learner.sources[type_name].velocity):
+        governed = self.learner.book.components(type_name)
+        parts = [part for t, part in models.items() if t.type == type_name and t.property in governed]
+        if len(parts) < len(governed):
             return False
         return self.learner.bits(type_name) < sum(mode_bits(part, self._columns) for part in parts)
 
@@ -160,7 +158,7 @@ class Laws:
         free = book.free.get(name)
         if free is None:
             return ()
-        pairs = zip(self.learner.sources[name].velocity, free.components, strict=True)
+        pairs = zip(book.components(name), free.components, strict=False)
         first = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
         contacts = Contacts.of(book.cast(layout), percept.relations, percept.vectors)
         told = [

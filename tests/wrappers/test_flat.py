@@ -35,11 +35,12 @@ def test_the_goal_is_seen_from_afar_and_closely() -> None:
 
 
 def test_round_a_learner_and_its_dream() -> None:
-    learner = ModelLearner(pushing(), targets=["truck.vx"])
+    learner = ModelLearner(gym.make("relgym/TruckPush-v0", task=None), targets=["truck.vx"])
     env = FlatView(learner)
     first, _ = env.reset(seed=0)
-    env.step(env.action_space.sample())
-    assert learner.model.seen == 1
+    for force in np.linspace(0.2, 1.0, 30):  # enough for a mode or two
+        env.step(np.array([force], dtype=np.float32))
+    assert learner.model.modes("truck", "vx")
     dream = FlatView(LearnedModelEnv(learner.model, like=learner), spec=env.get_wrapper_attr("flat_spec"))
     seen, _ = dream.reset(seed=0)
     np.testing.assert_array_equal(seen, first)
