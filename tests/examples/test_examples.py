@@ -17,6 +17,10 @@ RUNS = {
 }
 
 NEED_SB3 = {
+    "dyna_ball.py": (
+        ["--decisions", "120", "--warm_up", "118", "--episodes", "1"],
+        "of 1 test episodes reach the goal",
+    ),
     "dyna_truck.py": (
         ["--steps", "400", "--warm_up", "390", "--episodes", "2"],
         "of 2 test episodes end on the goal after 400 real steps",
