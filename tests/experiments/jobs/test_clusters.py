@@ -52,7 +52,7 @@ def test_nobody_answers(backend: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         with pytest.raises(
-            ClusterError, match="answers at '127.0.0.1:9'.* start the cluster, or check --address"
+            ClusterError, match=r"answers at '127.0.0.1:9'.* start the cluster, or check --address"
         ):
             list(run(TASKS, ResultStore(tmp_path), backend=backend, address="127.0.0.1:9"))
     assert not list(tmp_path.iterdir())
