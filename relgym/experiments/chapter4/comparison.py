@@ -14,7 +14,7 @@ from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, make_classifier,
 from relgym.baselines.features import Features, columns, features
 from relgym.baselines.tuned import setting_of
 from relgym.experiments.blocks import Block
-from relgym.experiments.chapter4.lesson import taught_blocks, fresh_blocks
+from relgym.experiments.chapter4.lesson import fresh_blocks, taught_blocks
 from relgym.experiments.chapter4.scores import target_score
 from relgym.experiments.chapter4.testing import TARGETS
 from relgym.experiments.data import BALL_EXPERIMENTS

@@ -19,7 +19,7 @@ from relgym.model.text import plain
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneSchema
 
-__all__ = ["config_of", "lesson", "taught_blocks", "fresh_blocks"]
+__all__ = ["config_of", "fresh_blocks", "lesson", "taught_blocks"]
 
 _BLOCKS_PER_SEED: Final = 40
 """Every configuration once (Table 4.1)."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from relgym.config import ModelConfig
-from relgym.experiments.chapter4.lesson import config_of, taught_blocks, fresh_blocks
+from relgym.experiments.chapter4.lesson import config_of, fresh_blocks, taught_blocks
 from relgym.experiments.noise import corrupted, shortfall
 from relgym.experiments.online import learned
 

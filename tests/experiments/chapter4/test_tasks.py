@@ -9,7 +9,7 @@ import pytest
 
 from relgym.errors import ConfigError
 from relgym.experiments.chapter4 import comparison, pushing, rolled
-from relgym.experiments.chapter4.lesson import config_of, lesson, taught_blocks, fresh_blocks
+from relgym.experiments.chapter4.lesson import config_of, fresh_blocks, lesson, taught_blocks
 from relgym.experiments.chapter4.rolled import CAUSES, cause_of, trial_blocks
 
 TESTS = {"seeds": [110], "blocks": 3}
