@@ -59,7 +59,7 @@ def test_a_figure_and_a_table_are_written_and_put_on_the_page(tmp_path: Path) ->
     assert [m.name for m in made] == ["table-4.1", "figure-4.8"]
     assert (tmp_path / "figure-4.8.png").read_bytes().startswith(b"\x89PNG")
     with (tmp_path / "table-4.1.csv").open(newline="") as file:
-        assert next(csv.reader(file)) == ["parameter", "thesis", "values of the env"]
+        assert next(csv.reader(file)) == ["parameter", "printed", "values of the env"]
     assert page(tmp_path, tmp_path / "docs" / "results.md") == ["table-4.1", "figure-4.8"]
     text = (tmp_path / "docs" / "results.md").read_text()
     assert "`relgym reproduce figure-4.8 --fast`" in text and "40 configurations" in text
