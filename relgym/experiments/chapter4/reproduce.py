@@ -173,8 +173,8 @@ def _head(made: Sequence[Made]) -> str:
     return (
         "# Results\n\n"
         "Chapter IV of the thesis again, each table and figure beside what was printed. `relgym reproduce` wrote this "
-        "page; nothing\non it is typed by hand. *printed* is what the thesis says, § one of its sections; velocities are "
-        "in units per step.\n\n"
+        "page; nothing\non it is typed by hand. *printed* is what the thesis says, § one of its sections; velocities "
+        "are in units per step.\n\n"
         f"Learners:\n\n{learners}\n\n{contents}\n{rest}"
     )
 
