@@ -11,15 +11,23 @@ PYTEST := $(BIN)/python -m pytest
 VIZ := $(VENV)/.installed-viz
 DEV := $(VENV)/.installed-dev
 SB3 := $(VENV)/.installed-sb3
+DYNA := $(VENV)/.installed-dyna
 
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce test test-sb3 test-cluster slow bench coverage lint format types check wheel clean
+.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow bench coverage lint format types check
+.PHONY: wheel clean
 
 help:            ## show this list
 	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
 
 demo: $(VIZ)     ## learn the laws of both worlds and print them
 	$(BIN)/relgym demo
+
+dyna: $(DYNA)    ## agents that train in what they have learned, beside SAC (installs torch)
+	$(BIN)/relgym dyna
+
+dyna-full: $(DYNA) ## the whole comparison, hours; resumes where it was stopped
+	$(BIN)/python -m relgym.experiments.dyna --jobs 2
 
 reproduce: $(DEV) ## the thesis' tables and figures again, the fast way; writes docs/results.md
 	$(BIN)/relgym reproduce all --batches 2 --fast --page docs/results.md
@@ -73,6 +81,10 @@ $(VENV)/pyvenv.cfg:
 
 $(VIZ): $(VENV)/pyvenv.cfg pyproject.toml constraints.txt
 	$(PIP) -e '.[viz]'
+	@touch $@
+
+$(DYNA): $(VIZ)
+	$(PIP) -e '.[viz,sb3]'
 	@touch $@
 
 $(DEV): $(VIZ)

@@ -227,6 +227,23 @@ def envs(as_json: Json = False) -> None:
 
 
 @app.command()
+def dyna(
+    out: Annotated[Path, typer.Option(help="Folder for the picture and the runs.")] = Path("out/dyna"),
+    steps: Annotated[int, typer.Option(help="Real steps of each agent.", min=1)] = 1500,
+    seed: Seed = 0,
+    learned: Annotated[bool, typer.Option(help="Learn reward and termination too.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Let SAC learn to push a truck to its goal, with a model to dream in and without one (needs sb3)."""
+    from relgym.experiments.dyna_demo import demonstrate
+
+    out.mkdir(parents=True, exist_ok=True)
+    with _progress() as bar:
+        shown = demonstrate(out, steps=steps, seed=seed, learned=learned, bar=bar)
+    _echo_json(shown) if as_json else typer.echo(shown)
+
+
+@app.command()
 def inspect(env_id: EnvId, arg: Arguments = None, seed: Seed = 0) -> None:
     """Show an env's schema, and the relations in its first scene."""
     from relgym.experiments.inspection import inspected

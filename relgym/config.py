@@ -166,8 +166,8 @@ class ClusteringConfig:
         An example fits a function when its residual is at most this many σ. Default 4 (thesis 2, original 3).
         Raising it admits more of a noisy mode's tail.
     tail_stds
-        Noise within this many σ of a known mode never seeds another. Default 8. Raising it prevents
-        duplicates of a noisy frequent mode and hides behaviours that differ by less.
+        Noise within this many σ of a known mode never seeds another. Default 6: an estimated σ may be a third too
+        small. Raising it prevents duplicates of a noisy frequent mode and hides behaviours that differ by less.
     min_examples
         T of §3.2.2, examples needed to found a mode; it is deleted below half of them. ``"auto"`` (default):
         10 where data are exact, because each further example then verifies the function to many digits, up to
@@ -194,7 +194,7 @@ class ClusteringConfig:
 
     noise_std: float | Literal["auto"] = "auto"
     inlier_stds: float = 4.0
-    tail_stds: float = 8.0
+    tail_stds: float = 6.0
     min_examples: int | Literal["auto"] = "auto"
     draws: int = 1536
     max_terms: int = 8

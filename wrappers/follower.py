@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, Literal, TypeAlias
 
@@ -120,7 +119,7 @@ class Follower:
         if before is None or after is None:
             return None
         try:
-            return Transition(before, self.view.with_outcome(after, _finite(reward), terminated))
+            return Transition(before, self.view.with_outcome(after, reward, terminated))
         except ObservationError as error:
             self._complain(error)
             return None
@@ -152,13 +151,6 @@ class Follower:
             f"{error} (the env has moved on, the model is unchanged: call reset() to begin anew, or skip and count "
             "such observations with bad_observations='skip')"
         ) from error
-
-
-def _finite(reward: Any) -> float:
-    number = float(reward)
-    if not math.isfinite(number):
-        raise ObservationError(f"the reward: expected a finite number, got {number}")
-    return number
 
 
 def extrapolated(earlier: Scene, now: Scene) -> Scene:

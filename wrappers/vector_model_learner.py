@@ -245,9 +245,7 @@ def _schema(env: gym.vector.VectorEnv[Any, Any, Any]) -> Any:
     inner = env.unwrapped
     if hasattr(inner, "schema"):
         return inner.schema
-    if not hasattr(inner, "get_attr"):
+    # Asked first: an attribute that isn't there would end the processes of an AsyncVectorEnv.
+    if not hasattr(inner, "call") or not inner.call("has_wrapper_attr", "schema")[0]:
         return None
-    try:
-        return inner.get_attr("schema")[0]
-    except AttributeError:
-        return None
+    return inner.get_attr("schema")[0]

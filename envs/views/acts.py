@@ -12,7 +12,7 @@ from gymnasium import spaces
 from relgym.envs.actions import without_action
 from relgym.envs.views.records import identifiers
 from relgym.errors import ConfigError
-from relgym.scene.objects import ACTION, Float1D, ObjectType, Scene
+from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene
 
 __all__ = ["MOST_CHOICES", "Acts"]
 
@@ -82,6 +82,13 @@ class Acts:
             one_hot[int(numbers[k] - self._starts[k])] = 1.0
             shown.append(one_hot)
         return np.concatenate(shown)
+
+    def values_batch(self, actions: Any) -> Float2D:
+        """`values` of n actions, shape ``(n, len(properties))``; the same bits."""
+        numbers = np.asarray(actions, dtype=np.float64)
+        numbers = numbers.reshape(len(numbers), -1)
+        choices = [numbers[:, [k]] - self._starts[k] == np.arange(self._counts[k]) for k in self._indicated]
+        return np.concatenate([numbers, *choices], axis=1)
 
     def acting(self, scene: Scene, action: Any) -> Scene:
         """The scene with this action in it, in place of another one if there is one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from relgym.envs.views.base import View
 from relgym.envs.views.numeric import NumbersView
-from relgym.errors import ConfigError
+from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import TASK, ObjectType, Scene
 
 __all__ = ["REWARD", "TERMINATED", "TaskView"]
@@ -89,7 +90,11 @@ class TaskView:
         return self._with(acting, [0.0] * len(self._names))
 
     def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
-        """The scene together with what the step to it brought."""
+        """The scene together with what the step to it brought; `ObservationError` for a reward that is no number."""
+        if not math.isfinite(reward):
+            raise ObservationError(
+                f"the reward: expected a finite number, got {reward}; mend the env's reward"
+            )
         brought = {REWARD: float(reward), TERMINATED: float(terminated)}
         return self._with(self._bare(scene), [brought[name] for name in self._names])
 

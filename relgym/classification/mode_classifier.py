@@ -74,6 +74,12 @@ class ModeClassifier:
         """Pairs that wait to be learned anew, the most contradicted first."""
         return tuple(p.modes for p in sorted(self._pairs.values(), key=lambda p: p.urgency) if p.stale)
 
+    @property
+    def relations(self) -> frozenset[str]:
+        """Names of the binary relations that clauses ask for: `rank_batch` needs no others."""
+        used = self._familiarity().used
+        return frozenset(self.vocabulary.relations[column] for _, columns, _ in used for column in columns)
+
     # ----- asking -----
 
     def rank(self, example: Example, values: Sequence[float]) -> Ranking:

@@ -223,9 +223,11 @@ class ModeClusterer:
         """Noise among examples of the newest example's signature."""
         ids = table.signature_ids[self.rows]
         part = np.flatnonzero(ids == ids[-1])
-        order, _ = table.signatures[ids[-1]].preference(self.target)
+        order, stages = table.signatures[ids[-1]].preference(self.target)
         rows = self.rows[part]
-        return estimate_noise(table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor)
+        return estimate_noise(
+            table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor, own=stages[0]
+        )
 
     def _start_over(self) -> None:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""

@@ -75,6 +75,16 @@ class Binding:
                 total = total + weight * x[places[slot]]
         return total
 
+    def values_as(self, x: NDArray[np.float64], slots: tuple[int, ...]) -> NDArray[np.float64]:
+        """`value` on n rows with the open roles played by the same slots; the same bits."""
+        total = np.full(len(x), self.intercept)
+        for column, weight in self.fixed:
+            total = total + weight * x[:, column]
+        for terms, slot in zip(self.open, slots, strict=True):
+            for places, weight in terms:
+                total = total + weight * x[:, places[slot]]
+        return total
+
     def closest(
         self, x: NDArray[np.float64], y: NDArray[np.float64], slack: float
     ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:

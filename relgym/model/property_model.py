@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.mode_classifier import ModeClassifier
+from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
@@ -18,6 +19,7 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
+from relgym.model.grouping import distinct, members
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
@@ -298,8 +300,8 @@ class PropertyModel:
         if not modes:
             return verdict
         situation = percept.situation(index)
-        x = percept.rows(index, following)
-        ranking = self.classifier.rank_batch(situation.examples, self._values(situation.signature, x, modes))
+        x = percept.rows(index, following, ordered=self._casts(situation.signature))
+        ranking = self._rank_batch(situation, x)
         verdict.outcomes[:] = _NO_ROLES
         waiting = np.ones(n, dtype=bool)
         if self.config.abstain and len(modes) > 1:
@@ -336,14 +338,29 @@ class PropertyModel:
         """Those of the given examples whose roles can be filled, and the mode's values there."""
         if not binding.open:
             return part, binding.values(x[part])[:, 0]
-        done, values = [], []
-        for i in part:
-            example = replace(situation.examples[int(i)], key=situation.keys[int(i)])
-            slots = self._cast(mode, binding, example, situation.order[i], percept.layout)
+        examples, order = situation.examples, situation.order
+        done, values = np.zeros(len(part), dtype=np.bool_), np.full(len(part), np.nan)
+        # Players depend on the relations and the order alone: one search for all scenes that share them.
+        first, which = distinct(examples.table[part], order[part])
+        for i, alike in zip(part[first].tolist(), members(which), strict=True):
+            slots = self._cast(mode, binding, examples[i], order[i], percept.layout)
             if slots is not None:
-                done.append(i)
-                values.append(binding.value(x[i].tolist(), slots))
-        return np.array(done, dtype=np.intp), np.array(values)
+                done[alike], values[alike] = True, binding.values_as(x[part[alike]], slots)
+        return part[done], values[done]
+
+    def _casts(self, signature: SlotSignature) -> bool:
+        """Whether some mode has a role that several objects could play."""
+        bindings = (self._binding(signature, mode) for mode in self.classifier.modes)
+        return any(binding is not None and bool(binding.open) for binding in bindings)
+
+    def _rank_batch(self, situation: Situation, x: NDArray[np.float64]) -> RankingBatch:
+        """Rank the modes for n examples; a single mode has no rival and needs no look at the scene."""
+        modes, n = self.classifier.modes, len(x)
+        if len(modes) == 1:
+            sure = np.ones(n, dtype=np.bool_)
+            return RankingBatch(np.full((n, 1), modes[0]), np.zeros((n, 1)), np.full(n, np.inf), sure, sure)
+        shown = situation.glimpse(self.classifier.relations)
+        return self.classifier.rank_batch(shown, self._values(situation.signature, x, modes))
 
     # ------------------------------------------------------------------ saving
     def to_json(self, *, history: bool) -> dict[str, Any]:

@@ -7,9 +7,12 @@ import importlib
 from typing import Any
 
 _HOMES = {
+    "Apprentice": "relgym.wrappers.sb3.apprentice",
     "DreamCheckup": "relgym.wrappers.sb3.dreaming",
+    "DreamVecEnv": "relgym.wrappers.sb3.dreaming",
     "Dyna": "relgym.wrappers.sb3.dyna",
     "DynaConfig": "relgym.wrappers.sb3.settings",
+    "PermutedReplay": "relgym.wrappers.sb3.permuting",
     "Imagination": "relgym.wrappers.sb3.imagination",
     "LearnedTask": "relgym.wrappers.sb3.judges",
     "MixedDictReplayBuffer": "relgym.wrappers.sb3.replay",
@@ -19,12 +22,15 @@ _HOMES = {
     "SceneStock": "relgym.wrappers.sb3.stock",
     "TransitionRecorder": "relgym.wrappers.sb3.recorder",
     "TrustGate": "relgym.wrappers.sb3.gate",
+    "explore": "relgym.wrappers.sb3.dreaming",
     "replay_options": "relgym.wrappers.sb3.replay",
 }
 """Where each public name lives; loaded on first use."""
 
 __all__ = [
+    "Apprentice",
     "DreamCheckup",
+    "DreamVecEnv",
     "Dyna",
     "DynaConfig",
     "Imagination",
@@ -33,9 +39,11 @@ __all__ = [
     "MixedNStepReplayBuffer",
     "MixedReplayBuffer",
     "ModelCallback",
+    "PermutedReplay",
     "SceneStock",
     "TransitionRecorder",
     "TrustGate",
+    "explore",
     "replay_options",
 ]
 
