@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
+from relgym.clustering.features import library_of
 from relgym.model.grouping import distinct, members
 from relgym.scene.context import canonical_order, signature, slots
 from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, poses
@@ -95,6 +96,10 @@ class Perception:
         (type, property) pairs whose next values some target may use.
     geometry
         ``"arrays"`` (default) or ``"fcl"``.
+    chained
+        The same for pairs whose causal order is still to be found.
+    features
+        Non-linear features, as in `ModelConfig.features`.
     """
 
     def __init__(
@@ -102,9 +107,14 @@ class Perception:
         schema: SceneSchema,
         given: tuple[tuple[str, str], ...] = (),
         geometry: Literal["arrays", "fcl"] = "arrays",
+        *,
+        chained: tuple[tuple[str, str], ...] = (),
+        features: tuple[str, ...] = (),
     ) -> None:
         self.schema = schema
         self.given = given
+        self.chained = chained
+        self.libraries = {t.name: library_of(features, t.name, t.angles) for t in schema.types}
         self.extractor = Extractor(schema, geometry=geometry)
         self._contact_names = self.extractor.features
         self._pair_names = tuple(sorted({p for t in schema.types if t.has_body for p in _free(t)}))
@@ -149,7 +159,8 @@ class Perception:
     def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:
         """The slot signature of these types."""
         if (known := self._signatures.get(types)) is None:
-            known = self._signatures[types] = SlotSignature(types, self.given)
+            library = self.libraries[types[0].name]
+            known = self._signatures[types] = SlotSignature(types, self.given, self.chained, library)
         return known
 
     def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
