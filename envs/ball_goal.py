@@ -62,10 +62,7 @@ class GoalTask(Task):
 
     def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
         """Judge n steps; see `Task.judge`."""
-        far, near = (
-            sum(np.abs(column_of(layout, "goal", prop, vectors)) for prop in ("dx", "dy"))
-            for vectors in (before, after)
-        )
+        far, near = (_distance(layout, vectors) for vectors in (before, after))
         succeeded = column_of(layout, "goal", "held", after) >= self.hold
         return Judgement(far - near - 0.004 + 2.0 * succeeded, succeeded, succeeded)
 
@@ -75,6 +72,13 @@ class GoalTask(Task):
         x, y = ball["px"] + goal["dx"], ball["py"] + goal["dy"]
         w, h = self.half_width, self.half_height
         return (Region(x - w, y - h, 2 * w, 2 * h),)
+
+
+def _distance(layout: SceneLayout, vectors: Float2D) -> Float1D:
+    """From ball to goal along the axes, shape ``(n,)``."""
+    dx, dy = (column_of(layout, "goal", prop, vectors) for prop in ("dx", "dy"))
+    total: Float1D = np.abs(dx) + np.abs(dy)
+    return total
 
 
 _TASK: Final = GoalTask()

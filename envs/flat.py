@@ -87,7 +87,7 @@ class Flattener:
 
     Notes
     -----
-    Objects are masked where some may be absent: those of optional types, and of types with spare slots.
+    Objects are masked where some may be absent: those of optional types, and of types that `FlatSpec.slots` names.
     """
 
     def __init__(self, schema: SceneSchema, spec: FlatSpec) -> None:
@@ -142,7 +142,7 @@ class Flattener:
             spare = max(0, self.spec.slots.get(t.name, 0) - len(names))
             for name in (*names, *(f"{t.name} {k + 1} (spare)" for k in range(spare))):
                 yield from self._of(name, t)
-                if spare or t.optional:
+                if t.name in self.spec.slots or t.optional:
                     yield _Number(name, "", 1.0, 3)
 
     def _of(self, name: str, t: ObjectType) -> Iterator[_Number]:

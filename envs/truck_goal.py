@@ -54,7 +54,7 @@ FLAT: Final = FlatSpec(
 
 _DISTANCE = Range(20.0, 40.0, -1e4, 1e4)
 _BANDS = ((0.05, 0.12), (0.2, 0.3), (0.4, 0.5))  # slippery, middling, rough
-_PAD_DEPTH = 0.8  # of the picture
+_PAD_DEPTH = 1.5  # of the picture
 
 
 @dataclass(frozen=True, slots=True)

@@ -158,7 +158,7 @@ def _stacked_net(members: int, sizes: tuple[int, ...], generator: Any) -> Any:
     """All members as one net on arrays of shape ``(members, n, d)``."""
     import torch
 
-    class Linear(torch.nn.Module):  # type: ignore[misc,name-defined]
+    class Linear(torch.nn.Module):  # type: ignore[misc]
         def __init__(self, inputs: int, outputs: int) -> None:
             super().__init__()
             bound = inputs**-0.5

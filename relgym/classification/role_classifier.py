@@ -190,7 +190,7 @@ class RoleClassifier:
             for each in np.flatnonzero(type_row[row] & view.exists[row]).tolist():
                 if each != target:
                     (positives if each in players else negatives).append((row, target, each))
-        for_, against = np.array(positives, dtype=np.int64), np.array(negatives, dtype=np.int64)
+        for_, against = (np.array(some, dtype=np.int64).reshape(-1, 3) for some in (positives, negatives))
         row, target, player = for_.T
         parts = (
             view.table[row, :, player, target],

@@ -115,7 +115,9 @@ class World:
         still = {name: ObjectType(name, POSE, Box()) for name in self.blocks}
         objects = [(f"ball{k + 1}", ball.type) for k, ball in enumerate(self.balls)]
         objects += [(f"block{k + 1}", name) for k, name in enumerate(self.blocks)]
-        rates = [(t, p, v) for t in moving for p, v in zip(POSE[: self.dimensions], self._velocity, strict=True)]
+        rates = [
+            (t, p, v) for t in moving for p, v in zip(POSE[: self.dimensions], self._velocity, strict=True)
+        ]
         rates += [(t.name, "rz", "spin") for t in moving.values() if "spin" in t.properties]
         return SceneSchema(
             (*moving.values(), *still.values()),

@@ -106,8 +106,8 @@ def find_limits(clusterer: ModeClusterer, table: ExampleTable) -> Limits:
     for side, (value, mode) in ((-1.0, constants[0]), (1.0, constants[-1])):
         beyond = (side * (clusterer.y - value)).max() > slack
         if not beyond and _led_beyond(clusterer, table, mode, value, side):
-            changes = {"low": mode, "least": value} if side < 0 else {"high": mode, "most": value}
-            found = replace(found, **changes)
+            low = side < 0.0
+            found = replace(found, low=mode, least=value) if low else replace(found, high=mode, most=value)
     return found
 
 

@@ -102,7 +102,7 @@ def _sort_groups(
     for _, members in groups:
         if len(members) > 1:
             codes = ~toward[:, members]  # what touches the target has the highest codes, and comes first
-            keys: list[NDArray[Any]] = [np.round(relations.distance[:, body, members] / _SAME_DISTANCE)]
+            keys: list[NDArray[Any]] = [np.round(relations.distances(body)[:, members] / _SAME_DISTANCE)]
             if _ties(codes):
                 around = _around(relations, body, groups, toward) if around is None else around
                 keys.append(around[:, members])

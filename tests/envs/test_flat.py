@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -54,6 +56,17 @@ def test_spare_slots_are_padded_and_masked() -> None:
         *("car 1 (spare).speed", "car 1 (spare)", "car 2 (spare).speed", "car 2 (spare)"),
         *("left", "right"),
     )
+
+
+@pytest.mark.parametrize("bystanders", [0, 2, 7])
+def test_vectors_have_the_same_length_whatever_the_number_of_objects(bystanders: int) -> None:
+    env = TruckPushEnv(task="push", bystanders=bystanders)
+    flat = Flattener(env.schema, replace(env.flat_spec, slots={"box": 10}))
+    assert len(flat.names) == 1 + 10 * (4 + 1) + 2
+    env.reset(seed=0)
+    shown = flat(env.scene.layout, env.vector[None])[0]
+    masks = [value for name, value in zip(flat.names, shown.tolist(), strict=True) if "." not in name]
+    assert masks == [1.0] * (3 + bystanders) + [0.0] * (7 - bystanders)
 
 
 def test_an_empty_spec_shows_everything_as_it_is() -> None:

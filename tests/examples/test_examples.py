@@ -21,14 +21,35 @@ RUNS = {
     "view_table.py": (["--steps", "300"], "vx' = -0.99 vx"),
 }
 
+NEED_SB3 = {
+    "dyna_ball.py": (
+        ["--decisions", "120", "--warm_up", "118", "--episodes", "1"],
+        "of 1 test episodes reach the goal",
+    ),
+    "dyna_truck.py": (
+        ["--steps", "400", "--warm_up", "390", "--episodes", "2"],
+        "of 2 test episodes end on the goal after 400 real steps",
+    ),
+}
+"""Likewise for those that need Stable-Baselines3."""
+
 
 def test_every_example_is_run() -> None:
-    assert {path.name for path in EXAMPLES.glob("*.py")} == set(RUNS)
+    assert {path.name for path in EXAMPLES.glob("*.py")} == {*RUNS, *NEED_SB3}
 
 
 @pytest.mark.parametrize("name", sorted(RUNS))
 def test_example(name: str) -> None:
-    options, expected = RUNS[name]
+    _run(name, *RUNS[name])
+
+
+@pytest.mark.sb3
+@pytest.mark.parametrize("name", sorted(NEED_SB3))
+def test_example_with_stable_baselines3(name: str) -> None:
+    _run(name, *NEED_SB3[name])
+
+
+def _run(name: str, options: list[str], expected: str) -> None:
     script = EXAMPLES / name
     assert len(script.read_text(encoding="utf-8").splitlines()) < 120
     command = [sys.executable, "-X", "utf8", "-W", "error", str(script), *options]

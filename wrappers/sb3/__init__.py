@@ -7,7 +7,9 @@ import importlib
 from typing import Any
 
 _HOMES = {
+    "Apprentice": "relgym.wrappers.sb3.apprentice",
     "DreamCheckup": "relgym.wrappers.sb3.dreaming",
+    "DreamVecEnv": "relgym.wrappers.sb3.dreaming",
     "Dyna": "relgym.wrappers.sb3.dyna",
     "DynaConfig": "relgym.wrappers.sb3.settings",
     "Imagination": "relgym.wrappers.sb3.imagination",
@@ -16,15 +18,20 @@ _HOMES = {
     "MixedNStepReplayBuffer": "relgym.wrappers.sb3.replay",
     "MixedReplayBuffer": "relgym.wrappers.sb3.replay",
     "ModelCallback": "relgym.wrappers.sb3.callback",
+    "PermutedReplay": "relgym.wrappers.sb3.permuting",
     "SceneStock": "relgym.wrappers.sb3.stock",
     "TransitionRecorder": "relgym.wrappers.sb3.recorder",
     "TrustGate": "relgym.wrappers.sb3.gate",
+    "explore": "relgym.wrappers.sb3.dreaming",
+    "VectorAsVecEnv": "relgym.wrappers.sb3.vec_env",
     "replay_options": "relgym.wrappers.sb3.replay",
 }
 """Where each public name lives; loaded on first use."""
 
 __all__ = [
+    "Apprentice",
     "DreamCheckup",
+    "DreamVecEnv",
     "Dyna",
     "DynaConfig",
     "Imagination",
@@ -33,9 +40,12 @@ __all__ = [
     "MixedNStepReplayBuffer",
     "MixedReplayBuffer",
     "ModelCallback",
+    "PermutedReplay",
     "SceneStock",
     "TransitionRecorder",
     "TrustGate",
+    "VectorAsVecEnv",
+    "explore",
     "replay_options",
 ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from time import perf_counter
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import gymnasium as gym
 import numpy as np
@@ -15,13 +15,13 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 from relgym.errors import ConfigError
 from relgym.wrappers.sb3.apprentice import Apprentice, check_model
 from relgym.wrappers.sb3.imagination import Imagination, Imagined
-from relgym.wrappers.sb3.judges import Judge, LearnedTask, NeuralTask
+from relgym.wrappers.sb3.judges import Judge, LearnedTask, NeuralModel, NeuralTask
 from relgym.wrappers.sb3.lens import Lens, Observations
 from relgym.wrappers.sb3.replay import Mixing
 from relgym.wrappers.sb3.settings import DynaConfig
 from relgym.wrappers.sb3.stock import DreamModel, changing, permuted
 
-__all__ = ["Dyna", "judge_of", "lens_of"]
+__all__ = ["Dyna", "check_algorithm", "judge_of", "lens_of"]
 
 
 class Dyna(BaseCallback):  # type: ignore[misc]
@@ -100,7 +100,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
 
     # ------------------------------------------------------------------ Stable-Baselines3's callback
     def _init_callback(self) -> None:
-        _check_algorithm(self.model)
+        check_algorithm(self.model)
         lens = lens_of(self.training_env, self._like)
         _check_spaces(self.model, lens)
         check_model(self.world, lens)
@@ -136,11 +136,11 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         return self.model.replay_buffer
 
     def _due(self) -> bool:
-        return self.num_timesteps - self._dreamed_at >= self.config.every
+        return bool(self.num_timesteps - self._dreamed_at >= self.config.every)
 
     def _gradient_steps(self, trusted: bool) -> int:
         each = self.config.updates if trusted else self.config.updates_alone
-        return each * self.training_env.num_envs
+        return each * int(self.training_env.num_envs)
 
     def _dream(self) -> None:
         started = perf_counter()
@@ -213,7 +213,7 @@ def judge_of(lens: Lens, judge: Judge | Literal["learned"] | None, model: DreamM
     """Reward and termination of dreams: those given, learned ones, or else the env's own."""
     if judge == "learned":
         if hasattr(model, "judge_all"):
-            return NeuralTask(model)
+            return NeuralTask(cast(NeuralModel, model))
         return LearnedTask(lens.recorder.view.schema, changing(model))
     if judge is not None:
         return judge
@@ -228,7 +228,8 @@ def judge_of(lens: Lens, judge: Judge | Literal["learned"] | None, model: DreamM
     return found
 
 
-def _check_algorithm(algorithm: Any) -> None:
+def check_algorithm(algorithm: Any) -> None:
+    """Raise `ConfigError` unless an algorithm is off-policy and its replay buffer can mix."""
     if not isinstance(algorithm, OffPolicyAlgorithm):
         raise ConfigError(
             f"{type(algorithm).__name__} is not off-policy and has no replay buffer to mix: take SAC, TD3 or DQN, or "

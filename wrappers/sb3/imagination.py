@@ -139,7 +139,7 @@ class Imagination:
     ) -> tuple[_Step, Float2D]:
         """One decision in every dream; those that the model can't follow drop out."""
         actions, kept = policy(seen)
-        after, rewards, ended, known = self._follow(layout, vectors, self.lens.actions(actions))
+        after, rewards, ended, known = self.follow(layout, vectors, self.lens.actions(actions))
         following = self.lens.observations(layout, after)
         after, rewards, ended = after[known], rewards[known], ended[known]
         step = _Step(
@@ -147,10 +147,23 @@ class Imagination:
         )
         return step, after
 
-    def _follow(
+    def follow(
         self, layout: SceneLayout, vectors: Float2D, actions: NDArray[Any]
     ) -> tuple[Float2D, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
-        """The scenes after a decision, its rewards, where the episode ended and where the model knew."""
+        """The scenes after a decision.
+
+        Parameters
+        ----------
+        layout, vectors
+            Scenes without an action, shape ``(n, layout.width)``.
+        actions
+            Of the bare env, n rows.
+
+        Returns
+        -------
+        State vectors, rewards, where the episode ended, and where the model knew. What it didn't know of
+        stays where it was.
+        """
         after, rewards = vectors.copy(), np.zeros(len(vectors))
         ended, known = np.zeros(len(vectors), dtype=bool), np.ones(len(vectors), dtype=bool)
         for _ in range(self.lens.repeat):

@@ -8,7 +8,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config import ModelConfig
+from relgym.config import ClusteringConfig, ModelConfig
 from relgym.envs.tasks import Judgement
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import (
@@ -23,9 +23,12 @@ from relgym.scene.objects import (
 )
 from relgym.wrappers.sb3.acting import acting_all
 
-__all__ = ["Judge", "LearnedTask", "NeuralTask"]
+__all__ = ["Judge", "LearnedTask", "NeuralModel", "NeuralTask"]
 
 _NOW, _NEXT = "now", "next"
+
+_EXACT: Final = ModelConfig(frames="world", clustering=ClusteringConfig(min_examples=5))
+"""What a task says is free of noise, and success is rare at first: five examples found a mode."""
 
 
 class Judge(Protocol):
@@ -80,7 +83,7 @@ class LearnedTask:
             (name, prop) for name, t in single for prop in t.properties if (t.name, prop) in changing
         ]
         self._action = schema.type(ACTION).properties if ACTION in schema.order else ()
-        self.model = WorldModel(self._small_schema(), config or ModelConfig(frames="world"))
+        self.model = WorldModel(self._small_schema(), config or _EXACT)
 
     def _small_schema(self) -> SceneSchema:
         def named(pairs: list[tuple[str, str]]) -> tuple[str, ...]:

@@ -60,7 +60,7 @@ class Lens:
             layer = layer.env
         self.recorder = layer
         self._show.reverse()
-        base = layer.observation_space
+        base: Any = layer.observation_space  # a Dict of Boxes, as the recorder's view has checked
         self._dtypes = {name: part.dtype for name, part in base.spaces.items()}
         self._low = {name: part.low for name, part in base.spaces.items()}
         self._high = {name: part.high for name, part in base.spaces.items()}
@@ -105,8 +105,8 @@ class Lens:
         low, high = (
             np.concatenate([ends[name] for name in layout.names]) for ends in (self._low, self._high)
         )
-        within: NDArray[np.bool_] = ((low <= vectors) & (vectors <= high)).all(axis=1)
-        return within
+        within = (low <= vectors) & (vectors <= high)
+        return np.asarray(within.all(axis=1))
 
     def _raw(self, layout: SceneLayout, vectors: Float2D) -> dict[str, NDArray[Any]]:
         cuts = ((name, layout.slice(k)) for k, name in enumerate(layout.names))

@@ -35,7 +35,7 @@ class Mixing:
     """The buffer class of Stable-Baselines3 that is extended."""
 
     def __init__(self, buffer_size: int, *spaces_and_device: Any, **options: Any) -> None:
-        super().__init__(buffer_size, *spaces_and_device, **options)
+        super().__init__(buffer_size, *spaces_and_device, **options)  # type: ignore[call-arg]
         self.trusted = False
         self.real_ratio = 0.05
         self._device = spaces_and_device[2:3] or (options.get("device", "auto"),)

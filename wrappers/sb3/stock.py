@@ -71,7 +71,7 @@ class SceneStock:
                 del scenes[0]
 
     def draw(
-        self, n: int, *, from_start: float, rng: np.random.Generator
+        self, n: int, *, from_start: float, rng: np.random.Generator, layout: SceneLayout | None = None
     ) -> tuple[SceneLayout, NDArray[np.float64]]:
         """Draw n scenes with the same objects, some of them from where episodes began.
 
@@ -83,11 +83,14 @@ class SceneStock:
             Share of first scenes.
         rng
             Draws layout and scenes.
+        layout
+            Which objects they show; default: drawn, as often as each was seen.
         """
         if not self._all:
             raise ConfigError("no scenes to dream on from: add some that were really seen")
-        counts = np.array([len(scenes) for scenes in self._all.values()], dtype=np.float64)
-        layout = list(self._all)[int(rng.choice(len(counts), p=counts / counts.sum()))]
+        if layout is None:
+            counts = np.array([len(scenes) for scenes in self._all.values()], dtype=np.float64)
+            layout = list(self._all)[int(rng.choice(len(counts), p=counts / counts.sum()))]
         firsts, scenes = self._firsts.get(layout, []), self._all[layout]
         chosen = [
             pool[int(rng.integers(len(pool)))]
