@@ -75,8 +75,8 @@ def _columns(
 def true_modes(block: Block, target: str, laws: AnalyticModes) -> NDArray[np.int64]:
     """Number of each transition's analytic mode; where several contacts act at once, of the first that explains it.
 
-    A ball that slides into a wall is touched twice, and each coordinate follows one of the two. Shape ``(n,)``; -1 where
-    no mode explains the step.
+    A ball that slides into a wall is touched twice, and each coordinate follows one of the two. Shape ``(n,)``; -1
+    where no mode explains the step.
     """
     numbers = block.truth.mode[target].copy()
     v = block.columns("ball", "vx", "vy")
