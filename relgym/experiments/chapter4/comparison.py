@@ -14,9 +14,9 @@ from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, make_classifier,
 from relgym.baselines.features import Features, columns, features
 from relgym.baselines.tuned import setting_of
 from relgym.experiments.blocks import Block
-from relgym.experiments.chapter4.lesson import taught_blocks, test_blocks
+from relgym.experiments.chapter4.lesson import fresh_blocks, taught_blocks
 from relgym.experiments.chapter4.scores import target_score
-from relgym.experiments.chapter4.testing import TARGETS
+from relgym.experiments.chapter4.testing import TARGETS, true_modes
 from relgym.experiments.data import BALL_EXPERIMENTS
 from relgym.experiments.evaluate import TOLERANCE, explicable, mode_labels
 
@@ -56,7 +56,7 @@ def regress(
     known = REGRESSORS[baseline]
     number = setting_of(baseline, shown) if setting is None else setting
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
-    fresh = test_blocks(experiment, tests)
+    fresh = fresh_blocks(experiment, tests)
     seen = features(shown, blocks[0].schema, "ball")
     velocity = columns(seen, _VELOCITY)
     rng = np.random.default_rng([seed, order])
@@ -100,7 +100,7 @@ def _scores(
     for k, target in enumerate(TARGETS):
         found[target] = target_score(
             names[target],
-            np.concatenate([b.truth.mode[target] for b in blocks]),
+            np.concatenate([true_modes(b, target, laws) for b in blocks]),
             np.concatenate([c[target] for c in counted]),
             np.abs(predicted[:, k] - actual[:, k]),
             np.zeros(len(actual), dtype=np.bool_),
@@ -134,7 +134,7 @@ def classify(
     """
     number = setting_of(baseline, shown) if setting is None else setting
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
-    fresh = test_blocks(experiment, tests)
+    fresh = fresh_blocks(experiment, tests)
     seen = features(shown, blocks[0].schema, "ball")
     settings = CLASSIFIERS[baseline].settings[number]
     models = {
@@ -165,7 +165,7 @@ def _labelled(
     """Features, true modes and which modes explain each example; of those with a true mode."""
     laws = BALL_EXPERIMENTS[experiment].modes()
     x, _ = _examples(blocks, seen)
-    labels = np.concatenate([b.truth.mode[target] for b in blocks])
+    labels = np.concatenate([true_modes(b, target, laws) for b in blocks])
     before = np.concatenate([b.columns("ball", *_VELOCITY)[:-1] for b in blocks])
     after = np.concatenate([b.columns("ball", *_VELOCITY)[1:] for b in blocks])
     explaining = laws.explaining(target[-1], before, after, TOLERANCE)
