@@ -122,7 +122,7 @@ class VectorFlatView(gym.vector.VectorWrapper[Any, Any, Any, Any, Any], RecordCo
         self.observation_space = batch_space(self.flattener.space, self.num_envs)
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin episodes; flat observations, shape ``(num_envs, len(flattener.names))``."""
         observations, infos = self.env.reset(seed=seed, options=options)
