@@ -38,9 +38,8 @@ def main(args: Args) -> None:
     for envs in (1, 8):
         learner = learned(envs, args)
         wrong = sum(learner.prequential.wrong.values())
-        print(
-            f"{envs} envs: {wrong} wrong predictions on the way, {learner.prequential.recent:.1%} of the latest steps"
-        )
+        lately = learner.prequential.recent
+        print(f"{envs} envs: {wrong} wrong predictions on the way, {lately:.1%} of the latest steps")
     print(learner.model.describe(digits=4))
 
 

@@ -1,4 +1,4 @@
-"""What does CartPole obey, if its four numbers are a cart and a pole?
+"""CartPole with its four numbers as a cart and a pole: what do their positions obey.
 
 Run: python examples/view_numbers.py --steps 2000
 """
