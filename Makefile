@@ -18,7 +18,7 @@ DYNA := $(VENV)/.installed-dyna
 .PHONY: wheel clean example-highway example-ocatari
 
 help:            ## show this list
-	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
+	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 17
 
 demo: $(VIZ)     ## learn the laws of both worlds and print them
 	$(BIN)/relgym demo
@@ -90,7 +90,7 @@ $(VENV)-highway/.installed: pyproject.toml
 $(VENV)-ocatari/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)-ocatari
 	$(VENV)-ocatari/bin/python -m pip install --quiet --disable-pip-version-check 'ocatari==2.2.1' 'ale-py==0.12.1' \
-		'gymnasium>=1.2,<2' python-fcl 'scipy<1.17' rich typer
+		'gymnasium>=1.2,<2' python-fcl scipy rich typer
 	$(VENV)-ocatari/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 
