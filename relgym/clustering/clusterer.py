@@ -281,8 +281,7 @@ class ModeClusterer:
         signature = int(table.signature_ids[self.rows[example]])
         search = self._searches.setdefault(signature, _Search())
         search.waiting += 1
-        patience = search.failures // 6 if not self.approximate else search.failures * search.failures
-        if search.waiting <= patience:  # what an approximation leaves is mostly its own tail
+        if search.waiting <= self._patience(search, bool(table.signatures[signature].features)):
             return
         for _ in range(MOST_DISCOVERIES):
             pool = self._pool(table, signature)
@@ -294,6 +293,12 @@ class ModeClusterer:
             search.failures = 0
         search.waiting = 0
 
+    def _patience(self, search: _Search, wide: bool) -> int:
+        """News to wait for until the next search: the more, the oftener it was in vain and the dearer it is."""
+        if self.approximate:  # what an approximation leaves is mostly its own tail
+            return search.failures * search.failures
+        return search.failures if wide else search.failures // 6
+
     def _hopeless(self) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""
         if (
@@ -302,7 +307,8 @@ class ModeClusterer:
             or len(self._log) not in APPROXIMATE_AT
         ):
             return False
-        return 2 * self.noise_examples > len(self._log)
+        # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
+        return 2 * self.noise_examples > len(self._log) or self._spread > 0.0
 
     def _approximate(self, table: ExampleTable) -> None:
         recent = np.arange(max(0, len(self._log) - MOST_ROWS), len(self._log))
@@ -317,7 +323,8 @@ class ModeClusterer:
         stds = self.scale.inlier_stds
         present = slots.present(table.x[self.rows[recent]], self.target)
         found = approximate(x, y, present, floor=self.floor, terms=terms, stds=stds, left=left)
-        if found is None:
+        explained = 2 * self.noise_examples <= len(self._log)
+        if found is None or (explained and found.sigma > 0.5 * self.scale.sigma):
             return
         self._spread, self.approximate = found.sigma, True
         self.scale = replace(self.scale, sigma=max(self.floor, found.sigma))

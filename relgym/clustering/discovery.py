@@ -23,6 +23,9 @@ NEAR, MOST_NEAR = 16.0, 0.5
 QUIET, MOST_LIKE = 0.25, 0.5
 """Residuals below so many sigma are rounding; above, those of neighbours may be alike by so much."""
 
+WIDE = 40
+"""Searches of more columns than this draw fewer and larger samples."""
+
 CHANGES = 0.2
 """A column that changes between so large a share of successive rows is no constant of a scene."""
 
@@ -94,10 +97,11 @@ def find_mode(
             tolerance=scale.tolerance,
             terms=terms,
             size=size,
-            draws=max(32, config.draws // (1 if columns == stages[0] else 3)),
+            draws=max(32, config.draws // (1 if columns == stages[0] else 3 if columns <= WIDE else 12)),
             rng=rng,
             strata=strata[rows],
             anchors=np.flatnonzero(rows >= len(y) - fresh),
+            limit=48 if columns <= WIDE else 6,
         )
         if found is None or found.size < min(needed, 6):
             continue
@@ -160,6 +164,9 @@ def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, 
     found = []
     most = config.max_terms
     for width in stages[:1] if config.own_only else stages:
+        if width > WIDE:  # among so many columns a small sample finds some that fit it by chance
+            found += [(width, min(t, most), 4 * min(t, most) + 8) for t in (3, most)]
+            continue
         if width <= 6:  # few enough to fit them all and drop what is needless
             found.append((width, min(width, most), min(width, most) + 3))
         else:

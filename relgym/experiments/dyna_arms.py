@@ -149,7 +149,8 @@ def make_agent(arm: Arm, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -
         ) from None
     mixing = replay_options(env.observation_space, gamma=AGENT["gamma"])
     env.action_space.seed(seed)
-    return SAC("MlpPolicy", env, seed=seed, gradient_steps=arm.updates, **{**AGENT, **mixing, **changes})
+    updates = arm.updates if arm.model == "none" else 1  # until the model is trusted
+    return SAC("MlpPolicy", env, seed=seed, gradient_steps=updates, **{**AGENT, **mixing, **changes})
 
 
 def make_dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -> Any:

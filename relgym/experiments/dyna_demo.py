@@ -68,9 +68,9 @@ def demonstrate(out: Path, *, steps: int, seed: int, learned: bool, bar: Progres
     """
     course = COURSES["truck"]
     testing = Examination(course)
-    runs = []
+    runs: list[Run] = []
     for arm in (ARMS["relgym" if learned else "relgym-given"], ARMS["sac"]):
-        task = bar.add_task("dyna" if runs == [] else "SAC", total=steps)
+        task = bar.add_task("SAC" if runs else "dyna", total=steps)
         found = run(
             course,
             arm,

@@ -30,7 +30,8 @@ GOOD, BETTER, EQUAL = 0.01, 0.3, 3.0
 LEAST, ROWS, UNEXPLAINED = 100, 1000, 0.1
 """Fewer examples than this say nothing; the newest so many are looked at; so large a share of noise needs advice."""
 
-_EXACT = 1e-5
+_EXACT, FINE = 1e-5, 1e-3
+"""Shares of the change that count as nothing, and as nothing to be mended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +96,12 @@ def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
         return None
     recent = np.arange(max(0, len(clusterer.y) - ROWS), len(clusterer.y))
     noise = float((clusterer.labels[recent] == NOISE).mean())
-    if noise <= UNEXPLAINED and not clusterer.approximate:
-        return None
     change = clusterer.y[recent] - _present(model, table, recent)
     left = (
         min(1.0, clusterer.scale.sigma / max(float(change.std()), 1e-300)) if clusterer.approximate else 1.0
     )
+    if left <= FINE or (noise <= UNEXPLAINED and not clusterer.approximate):
+        return None
     known = frozenset(model.config.features)
     trials = [_try(model, table, recent, kinds) for kinds in LIBRARIES if not known.issuperset(kinds)]
     if min((t.left for t in trials if t is not None), default=1.0) > GOOD:

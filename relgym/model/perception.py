@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import library_of
-from relgym.model.grouping import distinct, members
+from relgym.model.grouping import distinct
 from relgym.scene.context import canonical_order, signature, slots
 from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, poses
 from relgym.scene.relations import Extractor, Relations
@@ -82,7 +82,9 @@ class Situation:
     @cached_property
     def _numbers(self) -> NDArray[np.intp]:
         percept = self._percept
-        return canonical_order(percept.relations, self._body, poses(percept.layout, percept.vectors))
+        return canonical_order(
+            percept.relations, self._body, lambda rows: poses(percept.layout, percept.vectors[rows])
+        )
 
 
 class Perception:
@@ -245,12 +247,10 @@ class Percept:
         if not ordered or len(self) == 1:
             order = place.order[0] if ordered else place.plain
             return both[:, self.perception.gather(self.layout, place.signature, tuple(order.tolist()))]
-        rows = np.empty((len(self), len(place.signature.columns)))
         first, which = distinct(place.order)
-        for order, part in zip(place.order[first], members(which), strict=True):
-            columns = self.perception.gather(self.layout, place.signature, tuple(order.tolist()))
-            rows[part] = both[part][:, columns]
-        return rows
+        orders = [tuple(order) for order in place.order[first].tolist()]
+        columns = [self.perception.gather(self.layout, place.signature, order) for order in orders]
+        return np.take_along_axis(both, np.array(columns)[which], axis=1)
 
     def examples(self, target: int, body: int, relations: Collection[str] | None) -> ExampleBatch:
         """What classifiers are shown of an object; `Situation` says more."""

@@ -113,3 +113,15 @@ def test_finished_runs_are_not_run_again(tmp_path: Path, capsys: pytest.CaptureF
     assert path.stat().st_mtime_ns == before
     assert "SAC" in capsys.readouterr().out
     assert (tmp_path / "truck.png").is_file()
+
+
+@pytest.mark.sb3
+@pytest.mark.slow
+def test_dreaming_pays_in_truck_push() -> None:
+    """Issue "Dream", row 1 in small: one seed, given reward; SAC alone is nowhere near at these steps."""
+    course, tests = COURSES["truck"], Examination(COURSES["truck"])
+    dreaming = run(course, ARMS["relgym-given"], seed=100, steps=3_000, testing=tests)
+    assert dreaming.solved_at is not None
+    alone = run(course, ARMS["sac"], seed=100, steps=dreaming.solved_at, testing=tests)
+    assert max(good for _, good in alone.curve) < 20
+    assert "a limit to what the others predict" in dreaming.laws
