@@ -23,6 +23,7 @@ _HOMES = {
     "TransitionRecorder": "relgym.wrappers.sb3.recorder",
     "TrustGate": "relgym.wrappers.sb3.gate",
     "explore": "relgym.wrappers.sb3.dreaming",
+    "VectorAsVecEnv": "relgym.wrappers.sb3.vec_env",
     "replay_options": "relgym.wrappers.sb3.replay",
 }
 """Where each public name lives; loaded on first use."""
@@ -43,6 +44,7 @@ __all__ = [
     "SceneStock",
     "TransitionRecorder",
     "TrustGate",
+    "VectorAsVecEnv",
     "explore",
     "replay_options",
 ]

@@ -14,7 +14,7 @@ from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, make_classifier,
 from relgym.baselines.features import Features, columns, features
 from relgym.baselines.tuned import setting_of
 from relgym.experiments.blocks import Block
-from relgym.experiments.chapter4.lesson import taught_blocks, test_blocks
+from relgym.experiments.chapter4.lesson import fresh_blocks, taught_blocks
 from relgym.experiments.chapter4.scores import target_score
 from relgym.experiments.chapter4.testing import TARGETS
 from relgym.experiments.data import BALL_EXPERIMENTS
@@ -56,7 +56,7 @@ def regress(
     known = REGRESSORS[baseline]
     number = setting_of(baseline, shown) if setting is None else setting
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
-    fresh = test_blocks(experiment, tests)
+    fresh = fresh_blocks(experiment, tests)
     seen = features(shown, blocks[0].schema, "ball")
     velocity = columns(seen, _VELOCITY)
     rng = np.random.default_rng([seed, order])
@@ -134,7 +134,7 @@ def classify(
     """
     number = setting_of(baseline, shown) if setting is None else setting
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
-    fresh = test_blocks(experiment, tests)
+    fresh = fresh_blocks(experiment, tests)
     seen = features(shown, blocks[0].schema, "ball")
     settings = CLASSIFIERS[baseline].settings[number]
     models = {

@@ -37,7 +37,7 @@ def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown
     heading = ["target", "learner", "blocks", "p50", "p95", "p99.9", "mean change", "wrong %"]
     found = {t: {name: scores_by_blocks(runs, t) for name, runs in values.items()} for t in targets}
     lines: list[list[Cell]] = [
-        [target, learner, blocks, *_figures(score)]
+        [target, TITLES[learner], blocks, *_figures(score)]
         for target, learners in found.items()
         for learner, scores in learners.items()
         for blocks, score in scores.items()
@@ -86,7 +86,7 @@ def by_mode_shown(_: Protocol, values: Values, target: str) -> Shown:
             for blocks, score in modes.get(name, {}).items():
                 boxes = [f"{quantile(score['errors'], q):.0e}" for q in _QUANTILES]
                 wrong = round(100 * score["wrong"] / max(score["examples"], 1), 2)
-                lines.append([name, learner, blocks, score["examples"], *boxes, wrong])
+                lines.append([name, TITLES[learner], blocks, score["examples"], *boxes, wrong])
 
     def draw(path: Path) -> None:
         columns = min(3, len(names))
@@ -156,7 +156,7 @@ def rates_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown:
     heading = ["target", "learner", "blocks", "wrong %", "not learned %", "misclassified %"]
     found = {t: {n: scores_by_blocks(runs, t, "counted") for n, runs in values.items()} for t in targets}
     lines: list[list[Cell]] = [
-        [target, learner, blocks, *_split(score)]
+        [target, TITLES[learner], blocks, *_split(score)]
         for target, learners in found.items()
         for learner, scores in learners.items()
         for blocks, score in scores.items()
@@ -219,7 +219,7 @@ def perfect_shown(_: Protocol, values: Values, target: str, mode: str) -> Shown:
         for blocks, score in scores.items():
             chosen = [f"{quantile(score['errors'], q):.0e}" for q in (0.5, 0.75)]
             best = [f"{quantile(score['best'], q):.0e}" for q in (0.5, 0.75, 0.95)]
-            lines.append([learner, blocks, *chosen, *best])
+            lines.append([TITLES[learner], blocks, *chosen, *best])
 
     def draw(path: Path) -> None:
         figure, panels = canvas(9.0, 3.8, 1, 2, sharey=True)

@@ -29,7 +29,11 @@ def lwr_shown(_: Protocol, values: Values, number: str) -> Shown:
     found = {group: scores_by_blocks(runs, target) for group, runs in values.items()}
     heading = ["learner", "blocks", "p50", "p75", "p95"]
     lines: list[list[Cell]] = [
-        [group, blocks, *(f"{quantile(score['errors'], q):.1e}" for q in (0.5, 0.75, 0.95))]
+        [
+            TITLES.get(group, group),
+            blocks,
+            *(f"{quantile(score['errors'], q):.1e}" for q in (0.5, 0.75, 0.95)),
+        ]
         for group, scores in found.items()
         for blocks, score in scores.items()
     ]
@@ -61,13 +65,13 @@ def lwr_shown(_: Protocol, values: Values, number: str) -> Shown:
         panel.legend(fontsize=7, ncols=2)
         save(figure, path)
 
-    return Shown(f"{table(heading, lines)}\n\nthesis: {LWR[number]}", [heading, *lines], draw)
+    return Shown(f"{table(heading, lines)}\n\nprinted: {LWR[number]}", [heading, *lines], draw)
 
 
 # ------------------------------------------------------------------ figure 4.21
 def classifiers_shown(protocol: Protocol, values: Values) -> Shown:
     """Shares of misclassified examples of experiment 2; our learners' are those of wrong predictions."""
-    heading = ["target", "classifier", "features", "blocks", "wrong %", "thesis %"]
+    heading = ["target", "classifier", "features", "blocks", "wrong %", "printed %"]
     rates = {group: _rates(runs) for group, runs in values.items()}
     lines: list[list[Cell]] = []
     for target in ("ball.vx", "ball.vy"):
@@ -77,7 +81,9 @@ def classifiers_shown(protocol: Protocol, values: Values) -> Shown:
             for blocks, rate in found[target].items():
                 shown = printed.get(blocks) if target == "ball.vx" and seen != "contact" else None
                 percent = "" if shown is None else f"{100 * shown:g}"
-                lines.append([target, name, seen or "-", blocks, round(100 * rate, 3), percent])
+                lines.append(
+                    [target, TITLES.get(name, name), seen or "-", blocks, round(100 * rate, 3), percent]
+                )
 
     def draw(path: Path) -> None:
         figure, panels = canvas(13.0, 4.6, 1, 2, sharey=True)
@@ -144,7 +150,7 @@ def noise_shown(protocol: Protocol, values: Values) -> Shown:
         figure, panels = canvas(7.5, 4.4)
         panel = panels[0][0]
         for expected, by_true in found.items():
-            words = {"auto": "estimated, modes", "default": "relgym as it comes"}
+            words = {"auto": "estimated, modes", "default": "default"}
             label = words.get(expected, f"σ² = {expected}")
             width = 2.5 if expected in words else 1.2
             panel.loglog(variances, [above(mean(e)) for e in by_true], "o-", lw=width, label=label)

@@ -78,7 +78,7 @@ _VALUES: Final = (
 def parameters_shown(_: Protocol, __: Values) -> Shown:
     """Table 4.1 and the env's reset options."""
     every = configurations()
-    heading = ["parameter", "thesis", "values of the env"]
+    heading = ["parameter", "printed", "values of the env"]
     lines: list[list[Cell]] = [
         [name, printed, ", ".join(dict.fromkeys(str(c[option]) for c in every))]
         for name, option, printed in _VALUES
@@ -119,7 +119,7 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
     run = best_run(values["world"])
     learned = next(t for t in run["report"]["targets"] if t["target"] == "ball.vy")
     heading = ["source", "mode", "relations", "function"]
-    lines: list[list[Cell]] = [["thesis", *row] for row in _PUBLISHED]
+    lines: list[list[Cell]] = [["printed", *row] for row in _PUBLISHED]
     clauses = {
         mode["mode"]: [p["rows"][0]["clause"] for p in learned["pairs"] if p["mode"] == mode["mode"]]
         for mode in learned["modes"]

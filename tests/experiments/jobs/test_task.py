@@ -29,12 +29,12 @@ def test_results_are_what_json_makes_of_them() -> None:
 
 @pytest.mark.parametrize("function", ["fmean", "statistics:", ":fmean"])
 def test_a_function_needs_module_and_name(function: str) -> None:
-    with pytest.raises(ConfigError, match="expected 'package.module:name'"):
+    with pytest.raises(ConfigError, match=r"expected 'package.module:name'"):
         _ = Task(function).key
 
 
 def test_no_such_module() -> None:
-    with pytest.raises(ConfigError, match="no module 'relgym.nowhere'"):
+    with pytest.raises(ConfigError, match=r"no module 'relgym\.nowhere'"):
         _ = Task("relgym.nowhere:thing").key
 
 
