@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
@@ -26,6 +27,7 @@ __all__ = [
     "REGRESSORS",
     "Baseline",
     "Setting",
+    "installed",
     "make_classifier",
     "make_regressor",
 ]
@@ -57,6 +59,8 @@ class Baseline(Generic[_T]):
     change
         Whether it is taught the change of a value rather than the value: today's habit, and kind to all that don't
         extrapolate. Linear ones don't care.
+    library
+        Import name of what it needs.
     """
 
     name: str
@@ -64,6 +68,12 @@ class Baseline(Generic[_T]):
     make: Callable[[Setting, tuple[int, ...], np.random.Generator], _T]
     settings: tuple[Setting, ...] = ({},)
     change: bool = False
+    library: str = "sklearn"
+
+
+def installed(among: Mapping[str, Baseline[Any]]) -> tuple[str, ...]:
+    """Names of those whose library is installed."""
+    return tuple(name for name, known in among.items() if find_spec(known.library) is not None)
 
 
 def make_regressor(
@@ -162,6 +172,12 @@ def _perceptron(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) 
         return MLPRegressor(max_iter=30, tol=0.0, n_iter_no_change=30, random_state=seed, **setting)
 
     return FittedRegressor(make, rng=rng)
+
+
+def _ensemble(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+    from relgym.baselines.ensemble import MLPEnsemble
+
+    return MLPEnsemble(train_every=200, seed=_seed(rng), **setting)
 
 
 def _rules(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
@@ -282,11 +298,25 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
             change=True,
         ),
         Baseline[Regressor](
+            "ensemble",
+            "MLP ensemble (torch)",
+            _ensemble,
+            (
+                {"hidden": 64, "train_steps": 100},
+                {"hidden": 128, "train_steps": 100},
+                {"hidden": 64, "train_steps": 100, "learning_rate": 3e-3},
+                {"hidden": 128, "train_steps": 100, "learning_rate": 3e-3},
+            ),
+            change=True,
+            library="torch",
+        ),
+        Baseline[Regressor](
             "amrules",
             "AMRules (river)",
             _rules,
             _grid("n_min", 200, 50, 100, 500),
             change=True,
+            library="river",
         ),
         Baseline[Regressor](
             "hoeffding",
@@ -294,6 +324,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
             _hoeffding,
             _grid("grace_period", 200, 50, 100, 500),
             change=True,
+            library="river",
         ),
     )
 }
@@ -393,6 +424,7 @@ CLASSIFIERS: Final[Mapping[str, Baseline[Classifier]]] = {
             "Hoeffding tree (river)",
             _hoeffding_classifier,
             _grid("grace_period", 200, 50, 100, 500),
+            library="river",
         ),
     )
 }

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from relgym.baselines.base import Memory
-from relgym.baselines.catalogue import BUDGET, CLASSIFIERS, REGRESSORS, make_classifier, make_regressor
+from relgym.baselines.catalogue import (
+    BUDGET,
+    CLASSIFIERS,
+    REGRESSORS,
+    installed,
+    make_classifier,
+    make_regressor,
+)
 from relgym.baselines.lwr import LocallyWeightedRegression
 from relgym.baselines.model_tree import LinearModelTree
 from relgym.baselines.motion import ConstantVelocity, Persistence
@@ -25,12 +32,16 @@ def _taught(model: object, x: np.ndarray, y: np.ndarray) -> None:
         model.learn_one(row, values)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("name", sorted(REGRESSORS))
+LIGHT = sorted(name for name, known in REGRESSORS.items() if known.library != "torch")
+
+
+@pytest.mark.parametrize("name", [*LIGHT, pytest.param("ensemble", marks=pytest.mark.sb3)])
 def test_one_by_one_and_in_a_batch(name: str) -> None:
     model = make_regressor(name, velocity=(0, 1), rng=np.random.default_rng(0))
     kept = X.copy()
     _taught(model, X[:200], LINEAR[:200])
     batch = model.predict_batch(X[200:])
+    assert name in installed(REGRESSORS)
     assert batch.shape == (40, 2) and np.isfinite(batch).all()
     one = np.stack([model.predict_one(row) for row in X[200:210]])
     np.testing.assert_allclose(one, batch[:10], rtol=1e-6, atol=1e-9)
@@ -38,7 +49,7 @@ def test_one_by_one_and_in_a_batch(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", sorted(set(REGRESSORS) - {"persistence", "constant-velocity", "amrules", "hoeffding"})
+    "name", sorted(set(LIGHT) - {"persistence", "constant-velocity", "amrules", "hoeffding"})
 )
 def test_better_than_the_mean(name: str) -> None:
     model = make_regressor(name, velocity=(0, 1), rng=np.random.default_rng(0))

@@ -16,7 +16,7 @@ from relgym.baselines.tuned import setting_of
 from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.lesson import fresh_blocks, taught_blocks
 from relgym.experiments.chapter4.scores import target_score
-from relgym.experiments.chapter4.testing import TARGETS
+from relgym.experiments.chapter4.testing import TARGETS, true_modes
 from relgym.experiments.data import BALL_EXPERIMENTS
 from relgym.experiments.evaluate import TOLERANCE, explicable, mode_labels
 
@@ -100,7 +100,7 @@ def _scores(
     for k, target in enumerate(TARGETS):
         found[target] = target_score(
             names[target],
-            np.concatenate([b.truth.mode[target] for b in blocks]),
+            np.concatenate([true_modes(b, target, laws) for b in blocks]),
             np.concatenate([c[target] for c in counted]),
             np.abs(predicted[:, k] - actual[:, k]),
             np.zeros(len(actual), dtype=np.bool_),
@@ -165,7 +165,7 @@ def _labelled(
     """Features, true modes and which modes explain each example; of those with a true mode."""
     laws = BALL_EXPERIMENTS[experiment].modes()
     x, _ = _examples(blocks, seen)
-    labels = np.concatenate([b.truth.mode[target] for b in blocks])
+    labels = np.concatenate([true_modes(b, target, laws) for b in blocks])
     before = np.concatenate([b.columns("ball", *_VELOCITY)[:-1] for b in blocks])
     after = np.concatenate([b.columns("ball", *_VELOCITY)[1:] for b in blocks])
     explaining = laws.explaining(target[-1], before, after, TOLERANCE)

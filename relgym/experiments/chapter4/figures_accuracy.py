@@ -46,13 +46,16 @@ def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown
     def draw(path: Path) -> None:
         figure, panels = canvas(5.5 * len(targets), 4.2, 1, len(targets), sharey=True)
         for panel, (target, learners) in zip(panels[0], found.items(), strict=True):
-            for learner, scores in learners.items():
+            for k, (learner, scores) in enumerate(learners.items()):
                 colour = COLOURS[learner]
                 at = list(scores)
+                thick = max(1.2, 6.0 - 1.6 * k)  # later lines are thinner: where two agree, both can be seen
                 p95 = [above(quantile(s["errors"], 0.95)) for s in scores.values()]
                 p999 = [above(quantile(s["errors"], 0.999)) for s in scores.values()]
-                panel.plot(at, p95, "o-", color=colour, lw=2.5, ms=4, label=f"{TITLES[learner]}, 95 %")
-                panel.plot(at, p999, "o:", color=colour, lw=1, ms=3, label=f"{TITLES[learner]}, 99.9 %")
+                panel.plot(at, p95, "o-", color=colour, lw=thick, ms=4, label=f"{TITLES[learner]}, 95 %")
+                panel.plot(
+                    at, p999, "o:", color=colour, lw=0.4 * thick, ms=3, label=f"{TITLES[learner]}, 99.9 %"
+                )
             _dash(panel, next(iter(learners.values())))
             error_axis(panel, label=panel is panels[0][0])
             panel.set(title=f"{_axis(target)} velocity", xlabel="training blocks")
@@ -99,7 +102,7 @@ def by_mode_shown(_: Protocol, values: Values, target: str) -> Shown:
             panel.set_axis_off()
         figure.supxlabel("training blocks", fontsize=9)
         handles, labels = panels.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
+        figure.legend(handles, labels, loc="outside upper center", ncols=4, fontsize=8)
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)

@@ -129,8 +129,10 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
         lines.append(["learned", f"{mode['mode']}, {mode['examples']} examples", said, mode["function"]])
 
     def draw(path: Path) -> None:
-        figure, panels = canvas(13.0, 4.2, 1, 2, width_ratios=(2, 3))
-        block = next(iter(ball_blocks(1, seed=TRAINING_SEEDS[0], blocks=13, order=0)))
+        figure, panels = canvas(13.0, 4.0, 1, 2, width_ratios=(2, 3))
+        *_, block = ball_blocks(
+            1, seed=TRAINING_SEEDS[0], blocks=8, order=None
+        )  # the ball begins above an object
         _picture(panels[0][0], block, 0, "path, coloured by time", path=True)
         panels[0][1].set_axis_off()
         text = "\n".join(

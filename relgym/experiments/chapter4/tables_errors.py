@@ -40,10 +40,13 @@ def confusion_shown(_: Protocol, values: Values, number: str) -> Shown:
                 f"{TITLES[learner]}: laws, no modes; wrong {score['wrong']} of {score['examples']:,}"
             )
             continue
-        names = [_name(mode, run["modes"][target], published) for mode in found["modes"]]
-        texts.append(f"{TITLES[learner]}: {_confusion(found['table'], names)}")
+        named = [_name(mode, run["modes"][target], published) for mode in found["modes"]]
+        order = sorted(range(len(named)), key=lambda k: (len(named[k]), named[k]))  # rows of the table first
+        names = [named[k] for k in order]
+        counts = [[found["table"][i][j] for j in order] for i in (*order, len(order))]
+        texts.append(f"{TITLES[learner]}: {_confusion(counts, names)}")
         data += [
-            [learner, row, column, found["table"][i][j]]
+            [learner, row, column, counts[i][j]]
             for i, row in enumerate([*names, "none"])
             for j, column in enumerate(names)
         ]

@@ -105,9 +105,15 @@ def _counts(run: Mapping[str, Any], target: str, published: Sequence[PublishedMo
 def _function(axis: str, row: PublishedMode) -> str:
     if row.weights is None:
         return "-"
-    terms = [f"{w:+g} v{name}" for w, name in zip(row.weights, "xy", strict=True) if w]
-    terms += [f"{row.intercept:+g}"] if row.intercept else []
-    return f"v{axis}' = " + (" ".join(terms).lstrip("+") or "0")
+    terms = [
+        ("" if abs(w) == 1.0 else f"{abs(w):g} ") + f"v{n}"
+        for w, n in zip(row.weights, "xy", strict=True)
+        if w
+    ]
+    signs = [w for w in (*row.weights, row.intercept) if w]
+    terms += [f"{abs(row.intercept):g}"] if row.intercept else []
+    text = " ".join(f"{'-' if w < 0 else '+'} {term}" for w, term in zip(signs, terms, strict=True))
+    return f"v{axis}' = " + (text.removeprefix("+ ") or "0")
 
 
 # ------------------------------------------------------------------ box pushing
