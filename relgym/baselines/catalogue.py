@@ -5,7 +5,7 @@ Every baseline has the same tuning budget: `BUDGET` settings, all tried on the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final, Generic, TypeAlias, TypeVar
@@ -26,6 +26,7 @@ __all__ = [
     "CLASSIFIERS",
     "REGRESSORS",
     "Baseline",
+    "Columns",
     "Setting",
     "installed",
     "make_classifier",
@@ -41,6 +42,25 @@ Setting: TypeAlias = Mapping[str, Any]
 """Values of a baseline's parameters."""
 
 
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """What a baseline may know of the columns of its features.
+
+    Attributes
+    ----------
+    velocity
+        Those that hold the present values of what is predicted.
+    own
+        How many at the beginning are the target's own.
+    objects
+        How many objects follow, with equally many columns each.
+    """
+
+    velocity: tuple[int, ...]
+    own: int = 1
+    objects: int = 1
+
+
 @dataclass(frozen=True)
 class Baseline(Generic[_T]):
     """One alternative.
@@ -52,7 +72,7 @@ class Baseline(Generic[_T]):
     title
         For people.
     make
-        Gives a new learner from a setting, the columns of the velocity and a source of randomness.
+        Gives a new learner from a setting, what the columns mean and a source of randomness.
     settings
         What tuning may choose from, the library's or the literature's default first; `BUDGET` of them, or a single
         one where there is nothing to choose.
@@ -65,7 +85,7 @@ class Baseline(Generic[_T]):
 
     name: str
     title: str
-    make: Callable[[Setting, tuple[int, ...], np.random.Generator], _T]
+    make: Callable[[Setting, Columns, np.random.Generator], _T]
     settings: tuple[Setting, ...] = ({},)
     change: bool = False
     library: str = "sklearn"
@@ -77,7 +97,7 @@ def installed(among: Mapping[str, Baseline[Any]]) -> tuple[str, ...]:
 
 
 def make_regressor(
-    name: str, setting: Setting | None = None, *, velocity: Sequence[int], rng: np.random.Generator
+    name: str, setting: Setting | None = None, *, columns: Columns, rng: np.random.Generator
 ) -> Regressor:
     """A new regressor of that name.
 
@@ -87,19 +107,19 @@ def make_regressor(
         One of `REGRESSORS`.
     setting
         Its parameters; default: the first of its settings.
-    velocity
-        Columns of the features that hold the present values of what is predicted.
+    columns
+        What the columns of its features mean.
     rng
         Source of everything random.
     """
     known = _known(REGRESSORS, name)
-    return known.make(known.settings[0] if setting is None else setting, tuple(velocity), rng)
+    return known.make(known.settings[0] if setting is None else setting, columns, rng)
 
 
 def make_classifier(name: str, setting: Setting | None = None, *, rng: np.random.Generator) -> Classifier:
     """A new classifier of that name, one of `CLASSIFIERS`; see `make_regressor`."""
     known = _known(CLASSIFIERS, name)
-    return known.make(known.settings[0] if setting is None else setting, (), rng)
+    return known.make(known.settings[0] if setting is None else setting, Columns(()), rng)
 
 
 def _known(among: Mapping[str, Baseline[_T]], name: str) -> Baseline[_T]:
@@ -113,7 +133,7 @@ def _seed(rng: np.random.Generator) -> int:
 
 
 # ------------------------------------------------------------------ regressors
-def _gaussian_process(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _gaussian_process(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     def make() -> Any:
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
@@ -126,7 +146,7 @@ def _gaussian_process(setting: Setting, _: tuple[int, ...], rng: np.random.Gener
     return FittedRegressor(make, rng=rng, limit=setting["limit"])
 
 
-def _nearest(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _nearest(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     def make() -> Any:
         from sklearn.neighbors import KNeighborsRegressor
 
@@ -135,7 +155,7 @@ def _nearest(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> 
     return FittedRegressor(make, rng=rng)
 
 
-def _forest(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _forest(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     seed = _seed(rng)
 
     def make() -> Any:
@@ -146,7 +166,7 @@ def _forest(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> R
     return FittedRegressor(make, rng=rng, scale=False)
 
 
-def _boosting(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _boosting(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     seed = _seed(rng)
 
     def make() -> Any:
@@ -158,12 +178,12 @@ def _boosting(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) ->
     return FittedRegressor(make, rng=rng, scale=False)
 
 
-def _model_tree(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _model_tree(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     seed = _seed(rng)
     return FittedRegressor(lambda: LinearModelTree(**setting, seed=seed), rng=rng)
 
 
-def _perceptron(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _perceptron(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     seed = _seed(rng)
 
     def make() -> Any:
@@ -174,13 +194,19 @@ def _perceptron(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) 
     return FittedRegressor(make, rng=rng)
 
 
-def _ensemble(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _ensemble(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     from relgym.baselines.ensemble import MLPEnsemble
 
     return MLPEnsemble(train_every=200, seed=_seed(rng), **setting)
 
 
-def _rules(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _interactions(setting: Setting, columns: Columns, rng: np.random.Generator) -> Regressor:
+    from relgym.baselines.interaction import InteractionNetwork
+
+    return InteractionNetwork(columns.own, columns.objects, seed=_seed(rng), **setting)
+
+
+def _rules(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     def make() -> Any:
         from river import rules
 
@@ -189,7 +215,7 @@ def _rules(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Re
     return StreamingRegressor(make)
 
 
-def _hoeffding(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Regressor:
+def _hoeffding(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
     def make() -> Any:
         from river import tree
 
@@ -205,8 +231,10 @@ def _grid(name: str, *values: Any, **fixed: Any) -> tuple[Setting, ...]:
 REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
     b.name: b
     for b in (
-        Baseline[Regressor]("persistence", "persistence", lambda _, v, __: Persistence(v)),
-        Baseline[Regressor]("constant-velocity", "constant velocity", lambda _, v, __: ConstantVelocity(v)),
+        Baseline[Regressor]("persistence", "persistence", lambda _, c, __: Persistence(c.velocity)),
+        Baseline[Regressor](
+            "constant-velocity", "constant velocity", lambda _, c, __: ConstantVelocity(c.velocity)
+        ),
         Baseline[Regressor](
             "lwr-50",
             "LWR, k = 50",
@@ -311,6 +339,19 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
             library="torch",
         ),
         Baseline[Regressor](
+            "interactions",
+            "interaction network (torch)",
+            _interactions,
+            (
+                {"hidden": 64, "learning_rate": 1e-3},
+                {"hidden": 128, "learning_rate": 1e-3},
+                {"hidden": 64, "learning_rate": 3e-3},
+                {"hidden": 128, "learning_rate": 3e-3},
+            ),
+            change=True,
+            library="torch",
+        ),
+        Baseline[Regressor](
             "amrules",
             "AMRules (river)",
             _rules,
@@ -332,7 +373,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
 
 
 # ------------------------------------------------------------------ classifiers
-def _svm(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Classifier:
+def _svm(setting: Setting, _: Columns, rng: np.random.Generator) -> Classifier:
     def make() -> Any:
         from sklearn.svm import SVC
 
@@ -341,7 +382,7 @@ def _svm(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Clas
     return FittedClassifier(make, rng=rng, limit=setting["limit"])
 
 
-def _nearest_classifier(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Classifier:
+def _nearest_classifier(setting: Setting, _: Columns, rng: np.random.Generator) -> Classifier:
     def make() -> Any:
         from sklearn.neighbors import KNeighborsClassifier
 
@@ -350,7 +391,7 @@ def _nearest_classifier(setting: Setting, _: tuple[int, ...], rng: np.random.Gen
     return FittedClassifier(make, rng=rng, scale=setting["scale"])
 
 
-def _forest_classifier(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Classifier:
+def _forest_classifier(setting: Setting, _: Columns, rng: np.random.Generator) -> Classifier:
     seed = _seed(rng)
 
     def make() -> Any:
@@ -361,7 +402,7 @@ def _forest_classifier(setting: Setting, _: tuple[int, ...], rng: np.random.Gene
     return FittedClassifier(make, rng=rng, scale=False)
 
 
-def _boosting_classifier(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Classifier:
+def _boosting_classifier(setting: Setting, _: Columns, rng: np.random.Generator) -> Classifier:
     seed = _seed(rng)
 
     def make() -> Any:
@@ -372,7 +413,7 @@ def _boosting_classifier(setting: Setting, _: tuple[int, ...], rng: np.random.Ge
     return FittedClassifier(make, rng=rng, scale=False)
 
 
-def _hoeffding_classifier(setting: Setting, _: tuple[int, ...], rng: np.random.Generator) -> Classifier:
+def _hoeffding_classifier(setting: Setting, _: Columns, rng: np.random.Generator) -> Classifier:
     def make() -> Any:
         from river import tree
 

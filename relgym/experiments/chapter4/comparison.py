@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.baselines.base import Classifier, Regressor
-from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, make_classifier, make_regressor
+from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, Columns, make_classifier, make_regressor
 from relgym.baselines.features import Features, columns, features
 from relgym.baselines.tuned import setting_of
 from relgym.experiments.blocks import Block
@@ -60,7 +60,8 @@ def regress(
     seen = features(shown, blocks[0].schema, "ball")
     velocity = columns(seen, _VELOCITY)
     rng = np.random.default_rng([seed, order])
-    model = make_regressor(baseline, known.settings[number], velocity=velocity, rng=rng)
+    meaning = Columns(velocity, seen.own, seen.objects)
+    model = make_regressor(baseline, known.settings[number], columns=meaning, rng=rng)
     questions, answers = _examples(fresh, seen)
     scores, learning, asking = [], 0.0, 0.0
     for count, block in enumerate(blocks, start=1):
