@@ -29,7 +29,8 @@ class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordCons
         An env whose observations are scenes.
     spec
         What to show. Default: what the env itself declares as ``flat_spec``; and if it declares nothing, all
-        properties as they are. Give a dream the real env's.
+        properties as they are. A dream made `like` a real env shows what that shows; one of a file alone has to be
+        told.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ from relgym.errors import ConfigError
 from relgym.experiments.dyna_arms import ARMS, COURSES, Arm, Course, make_agent, make_dyna, make_env
 from relgym.experiments.seeds import TRAINING_SEEDS
 
-__all__ = ["CHECK_EVERY", "ENOUGH", "EPISODES", "Run", "Testing", "main", "run"]
+__all__ = ["CHECK_EVERY", "ENOUGH", "EPISODES", "Examination", "Run", "main", "run"]
 
 EPISODES: Final = 100
 """Evaluation episodes, always the same."""
@@ -79,7 +79,7 @@ class Run:
         return cls(**{**data, "curve": tuple((int(steps), int(good)) for steps, good in data["curve"])})
 
 
-class Testing:
+class Examination:
     """Fixed evaluation episodes, played side by side.
 
     Parameters
@@ -122,7 +122,7 @@ def run(
     *,
     seed: int,
     steps: int = STEPS,
-    testing: Testing | None = None,
+    testing: Examination | None = None,
     to_the_end: bool = False,
     heard: Callable[[int, int], None] | None = None,
     agent: dict[str, Any] | None = None,
@@ -154,7 +154,7 @@ def run(
     env: gym.Env[Any, Any] = make_env(course)
     algorithm = make_agent(arm, env, seed=seed, **(agent or {}))
     own = make_dyna(arm, course, env, seed=seed, **(dyna or {}))
-    tests = testing or Testing(course)
+    tests = testing or Examination(course)
     curve: list[tuple[int, int]] = []
 
     class Check(BaseCallback):  # type: ignore[misc]

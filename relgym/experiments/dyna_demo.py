@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from relgym.errors import ConfigError
-from relgym.experiments.dyna import ENOUGH, Run, Testing, run
+from relgym.experiments.dyna import ENOUGH, Examination, Run, run
 from relgym.experiments.dyna_arms import ARMS, COURSES
 from relgym.experiments.dyna_report import draw_runs
 
@@ -67,10 +67,10 @@ def demonstrate(out: Path, *, steps: int, seed: int, learned: bool, bar: Progres
         Where progress is shown.
     """
     course = COURSES["truck"]
-    testing = Testing(course)
-    runs = []
+    testing = Examination(course)
+    runs: list[Run] = []
     for arm in (ARMS["relgym" if learned else "relgym-given"], ARMS["sac"]):
-        task = bar.add_task("dyna" if runs == [] else "SAC", total=steps)
+        task = bar.add_task("SAC" if runs else "dyna", total=steps)
         found = run(
             course,
             arm,

@@ -173,8 +173,7 @@ class _Settling:
 
     def result(self, unsettled: NDArray[np.intp]) -> Composed:
         """What has become of it; `unsettled` are the scenes that still changed in the last sweep."""
-        settled = np.ones(self.impulse.shape[1], dtype=bool)
-        settled[unsettled] = False
+        settled = ~np.isin(np.arange(len(self.group.pairs)), unsettled)
         return Composed(self.velocity, self.impulse, settled)
 
     def leap(self, active: NDArray[np.intp], before: FloatArray, step: FloatArray) -> None:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
-from relgym.model.grouping import distinct, members
+from relgym.clustering.features import library_of
+from relgym.model.grouping import distinct
 from relgym.scene.context import canonical_order, signature, slots
 from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, poses
 from relgym.scene.relations import Extractor, Relations
@@ -81,7 +82,9 @@ class Situation:
     @cached_property
     def _numbers(self) -> NDArray[np.intp]:
         percept = self._percept
-        return canonical_order(percept.relations, self._body, poses(percept.layout, percept.vectors))
+        return canonical_order(
+            percept.relations, self._body, lambda rows: poses(percept.layout, percept.vectors[rows])
+        )
 
 
 class Perception:
@@ -95,6 +98,10 @@ class Perception:
         (type, property) pairs whose next values some target may use.
     geometry
         ``"arrays"`` (default) or ``"fcl"``.
+    chained
+        The same for pairs whose causal order is still to be found.
+    features
+        Non-linear features, as in `ModelConfig.features`.
     """
 
     def __init__(
@@ -102,9 +109,14 @@ class Perception:
         schema: SceneSchema,
         given: tuple[tuple[str, str], ...] = (),
         geometry: Literal["arrays", "fcl"] = "arrays",
+        *,
+        chained: tuple[tuple[str, str], ...] = (),
+        features: tuple[str, ...] = (),
     ) -> None:
         self.schema = schema
         self.given = given
+        self.chained = chained
+        self.libraries = {t.name: library_of(features, t.name, t.angles) for t in schema.types}
         self.extractor = Extractor(schema, geometry=geometry)
         self._contact_names = self.extractor.features
         self._pair_names = tuple(sorted({p for t in schema.types if t.has_body for p in _free(t)}))
@@ -149,7 +161,8 @@ class Perception:
     def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:
         """The slot signature of these types."""
         if (known := self._signatures.get(types)) is None:
-            known = self._signatures[types] = SlotSignature(types, self.given)
+            library = self.libraries[types[0].name]
+            known = self._signatures[types] = SlotSignature(types, self.given, self.chained, library)
         return known
 
     def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
@@ -234,12 +247,10 @@ class Percept:
         if not ordered or len(self) == 1:
             order = place.order[0] if ordered else place.plain
             return both[:, self.perception.gather(self.layout, place.signature, tuple(order.tolist()))]
-        rows = np.empty((len(self), len(place.signature.columns)))
         first, which = distinct(place.order)
-        for order, part in zip(place.order[first], members(which), strict=True):
-            columns = self.perception.gather(self.layout, place.signature, tuple(order.tolist()))
-            rows[part] = both[part][:, columns]
-        return rows
+        orders = [tuple(order) for order in place.order[first].tolist()]
+        columns = [self.perception.gather(self.layout, place.signature, order) for order in orders]
+        return np.take_along_axis(both, np.array(columns)[which], axis=1)
 
     def examples(self, target: int, body: int, relations: Collection[str] | None) -> ExampleBatch:
         """What classifiers are shown of an object; `Situation` says more."""

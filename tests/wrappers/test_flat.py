@@ -41,7 +41,7 @@ def test_round_a_learner_and_its_dream() -> None:
     for force in np.linspace(0.2, 1.0, 30):  # enough for a mode or two
         env.step(np.array([force], dtype=np.float32))
     assert learner.model.modes("truck", "vx")
-    dream = FlatView(LearnedModelEnv(learner.model, like=learner), spec=env.get_wrapper_attr("flat_spec"))
+    dream = FlatView(LearnedModelEnv(learner.model, like=learner))
     seen, _ = dream.reset(seed=0)
     np.testing.assert_array_equal(seen, first)
     assert dream.observation_space == env.observation_space
