@@ -59,9 +59,7 @@ class Trial:
 
 
 def _balls(*masses: float, types: Sequence[str] = ()) -> tuple[Ball, ...]:
-    return tuple(
-        Ball(types[k] if types else "ball", 0.08 + 0.02 * k, mass) for k, mass in enumerate(masses)
-    )
+    return tuple(Ball(types[k] if types else "ball", 0.08 + 0.02 * k, mass) for k, mass in enumerate(masses))
 
 
 _MATERIALS: Final[Mapping[str, Material]] = {
@@ -71,7 +69,9 @@ _MATERIALS: Final[Mapping[str, Material]] = {
 }
 
 TRIALS: Final = (
-    Trial("space", World(3, blocks=("block",) * 12, materials={"block": _ROUGH}), frozenset({_BOUNCES, _SLIDES})),
+    Trial(
+        "space", World(3, blocks=("block",) * 12, materials={"block": _ROUGH}), frozenset({_BOUNCES, _SLIDES})
+    ),
     Trial(
         "a spinning ball",
         World(2, (Ball(spins=True),), materials={"block": _ROUGH}),
@@ -91,9 +91,7 @@ TRIALS: Final = (
     ),
     Trial(
         "five rough balls",
-        World(
-            2, _balls(1.0, 1.5, 2.0, 2.5, 3.0), materials={"block": _ROUGH}, between=_ROUGH, weighed=True
-        ),
+        World(2, _balls(1.0, 1.5, 2.0, 2.5, 3.0), materials={"block": _ROUGH}, between=_ROUGH, weighed=True),
         frozenset({_BOUNCES, _SLIDES}),
     ),
     Trial(
