@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.experiments.bar import Measure, measured, report
+from relgym.experiments.bar import measured, report
 from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_blocks, truck_blocks
 from relgym.experiments.law_classic import CLASSICS, Classic, classic_transitions
 from relgym.experiments.law_score import SEEDS, TESTS, Part, Rows, score, taught

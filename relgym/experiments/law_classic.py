@@ -59,9 +59,7 @@ class Classic:
 
 
 CLASSICS: Final = (
-    Classic(
-        "CartPole-v1", ("x", "speed", "angle", "turning"), ("x", "angle"), ("speed", "turning")
-    ),
+    Classic("CartPole-v1", ("x", "speed", "angle", "turning"), ("x", "angle"), ("speed", "turning")),
     Classic("MountainCar-v0", ("x", "speed"), ("x", "x"), ("speed", "x")),
     Classic("Pendulum-v1", ("across", "along", "turning"), ("across", "along"), ("turning", "across")),
 )

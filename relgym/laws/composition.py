@@ -106,9 +106,7 @@ def respond(
     return change
 
 
-def compose(
-    engaged: Engaged, group: Group, joints: Joints, now: FloatArray, free: FloatArray
-) -> Composed:
+def compose(engaged: Engaged, group: Group, joints: Joints, now: FloatArray, free: FloatArray) -> Composed:
     """Next velocities of all bodies in scenes with equally many contacts.
 
     Parameters
@@ -227,6 +225,8 @@ def within(
         for j, axis in enumerate(axes_of(engaged.law.frame, there, free)):
             value, without = dot(after, axis), dot(free, axis)
             back, forth = (value < -slack) & (without >= -slack), (value > slack) & (without <= slack)
-            below, above = np.array([law.signs for law in engaged.law.axes[j]]).T[:, engaged.chosen[j][group.pairs[:, k]]]
+            below, above = np.array([law.signs for law in engaged.law.axes[j]]).T[
+                :, engaged.chosen[j][group.pairs[:, k]]
+            ]
             seen[:, k] &= ~(back & ~below) & ~(forth & ~above)
     return seen
