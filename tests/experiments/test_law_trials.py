@@ -11,12 +11,14 @@ from relgym.config import ModelConfig
 from relgym.experiments.data import ball_blocks
 from relgym.experiments.law_bars import ROWS
 from relgym.experiments.law_classic import CLASSICS, Classic, classic_transitions
+from relgym.experiments.law_scaling import on_the_floor
 from relgym.experiments.law_score import Score, score, score_laws, taught
 from relgym.experiments.law_trials import TRIALS, constants, noisy, trial_rooms
 from relgym.experiments.rooms import Room
 from relgym.laws.book import LawBook
 from relgym.laws.records import ZERO, AxisLaw, PairLaw, Piece
 from relgym.model.world_model import WorldModel
+from relgym.scene.relations import Extractor
 
 SPIN = next(trial for trial in TRIALS if trial.frame == "point").world
 
@@ -63,6 +65,14 @@ def test_constants_are_the_weights_other_than_one() -> None:
     axes = (AxisLaw((free, bounce), "max", ()),), (AxisLaw((ZERO, drag), "max", ()),)
     book.pair = PairLaw("contact", axes, 0.0)
     assert constants(book) == {"v_n": -0.95, "J_n": -0.2}
+
+
+def test_scenes_of_the_scaling_bar_touch_as_often_as_they_say() -> None:
+    for touching, objects in ((2, 12), (8, 12), (2, 60)):
+        world, layout, vectors = on_the_floor(touching, objects)
+        assert len(layout.bodies) == objects
+        touch = Extractor(world.schema()).extract(layout, vectors).relation("intersect")[0, :touching]
+        assert touch.sum(axis=1).tolist() == [1] * touching
 
 
 @pytest.mark.parametrize("classic", CLASSICS, ids=[c.env for c in CLASSICS])
