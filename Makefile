@@ -11,9 +11,11 @@ PYTEST := $(BIN)/python -m pytest
 VIZ := $(VENV)/.installed-viz
 DEV := $(VENV)/.installed-dev
 SB3 := $(VENV)/.installed-sb3
+DYNA := $(VENV)/.installed-dyna
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-sb3 slow bench coverage lint format types check wheel clean
+.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow bench coverage lint format types check
+.PHONY: wheel clean
 
 help:            ## show this list
 	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
@@ -21,14 +23,27 @@ help:            ## show this list
 demo: $(VIZ)     ## learn the laws of both worlds and print them
 	$(BIN)/relgym demo
 
+dyna: $(DYNA)    ## agents that train in what they have learned, beside SAC (installs torch)
+	$(BIN)/relgym dyna
+
+dyna-full: $(DYNA) ## the whole comparison, hours; resumes where it was stopped
+	$(BIN)/python -m relgym.experiments.dyna --jobs 2
+
+reproduce: $(DEV) ## the thesis' tables and figures again, the fast way; writes docs/results.md
+	$(BIN)/relgym reproduce all --batches 2 --fast --page docs/results.md
+
 test: $(DEV)     ## all tests but the slow ones
 	$(PYTEST) -n 2
 
 test-sb3: $(SB3) ## the tests that need Stable-Baselines3 (installs torch)
 	$(PYTEST) -m "sb3 and not slow"
 
+test-cluster: $(DEV) ## the tests that start clusters (installs dask and ray)
+	$(PIP) -e '.[viz,dev,baselines,dask,ray]'
+	$(PYTEST) -m cluster
+
 slow: $(DEV)     ## the tests that take minutes
-	$(PYTEST) -m "slow and not sb3"
+	$(PYTEST) -m "slow and not sb3 and not cluster"
 
 bench: $(DEV)    ## the benchmarks
 	$(PYTEST) tests/bench -m bench --benchmark-enable --benchmark-only
@@ -68,10 +83,14 @@ $(VIZ): $(VENV)/pyvenv.cfg pyproject.toml constraints.txt
 	$(PIP) -e '.[viz]'
 	@touch $@
 
+$(DYNA): $(VIZ)
+	$(PIP) -e '.[viz,sb3]'
+	@touch $@
+
 $(DEV): $(VIZ)
-	$(PIP) -e '.[viz,dev]'
+	$(PIP) -e '.[viz,dev,baselines]'
 	@touch $@
 
 $(SB3): $(DEV)
-	$(PIP) -e '.[viz,dev,sb3]'
+	$(PIP) -e '.[viz,dev,baselines,sb3]'
 	@touch $@

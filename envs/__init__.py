@@ -11,20 +11,34 @@ if __name__ != "relgym.envs":
 
 _HOMES = {
     "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
+    "BallGoalEnv": "relgym.envs.ball_goal",
     "EnvState": "relgym.envs.base",
+    "FlatSpec": "relgym.envs.flat",
+    "Flattener": "relgym.envs.flat",
     "LearnedModelEnv": "relgym.envs.learned_model",
+    "LearnedModelVectorEnv": "relgym.envs.learned_model_vector",
     "SceneEnv": "relgym.envs.base",
+    "Task": "relgym.envs.tasks",
     "TruckPushEnv": "relgym.envs.truck_push",
+    "drawn_from": "relgym.envs.learned_model_judges",
+    "in_batches": "relgym.envs.learned_model_judges",
     "render_scene": "relgym.envs.rendering",
 }
 """Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""
 
 __all__ = [
     "BallBoxRampEnv",
+    "BallGoalEnv",
     "EnvState",
+    "FlatSpec",
+    "Flattener",
     "LearnedModelEnv",
+    "LearnedModelVectorEnv",
     "SceneEnv",
+    "Task",
     "TruckPushEnv",
+    "drawn_from",
+    "in_batches",
     "render_scene",
 ]
 

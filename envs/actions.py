@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import physical_action
+from relgym.envs.arguments import checked_actions, physical_action
 from relgym.errors import ConfigError
-from relgym.scene.objects import ACTION, Float1D, Scene, SceneSchema
+from relgym.scene.objects import ACTION, Float1D, Float2D, Scene, SceneLayout, SceneSchema
 
-__all__ = ["acting", "action_values", "check_action_space", "without_action"]
+__all__ = ["BatchActions", "acting", "action_values", "check_action_space", "without_action"]
 
 
 def acting(scene: Scene, action: Any) -> Scene:
@@ -50,6 +50,58 @@ def action_values(schema: SceneSchema, action: Any) -> Float1D:
         return np.asarray(action, dtype=np.float64).ravel()
     scaled = dict(zip(_scaled(schema), physical_action(schema, action).tolist(), strict=True))
     return np.array([scaled[prop] for prop in schema.type_of(ACTION).properties])
+
+
+class BatchActions:
+    """`acting` and `without_action` for n scenes with the same objects; the same bits.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    layout
+        Layout of the scenes without an action.
+    space
+        Action space of one scene.
+
+    Attributes
+    ----------
+    layout : SceneLayout
+        Layout of the scenes with what is done in them.
+    """
+
+    def __init__(self, schema: SceneSchema, layout: SceneLayout, space: spaces.Space[Any]) -> None:
+        self._space = space
+        self._acts = ACTION in schema.order
+        self.layout = schema.layout((*layout.names, ACTION)) if self._acts else layout
+        columns = np.arange(self.layout.width)
+        cut = self.layout.slice(self.layout.index(ACTION)) if self._acts else slice(0, 0)
+        self._own, self._rest = columns[cut], np.delete(columns, cut)
+        scaled = {prop: (k, low, high) for k, (prop, low, high) in enumerate(schema.action_scale)}
+        properties = schema.type_of(ACTION).properties if self._acts else ()
+        self._scale = [scaled[prop] for prop in properties] if scaled else []
+
+    def checked(self, actions: Any, count: int) -> Any:
+        """Actions as an array of shape ``(count, …)``; `ActionError` unless all lie in the space."""
+        return checked_actions(self._space, actions, count)
+
+    def joined(self, vectors: Float2D, actions: Any) -> Float2D:
+        """State vectors with the actions in them, in physical units, shape ``(n, layout.width)``."""
+        if not self._acts:
+            return vectors
+        both = np.empty((len(vectors), self.layout.width))
+        both[:, self._rest] = vectors
+        flat = np.asarray(actions, dtype=np.float64).reshape(len(vectors), -1)
+        for place, (k, low, high) in zip(self._own.tolist(), self._scale, strict=False):
+            both[:, place] = low + (flat[:, k] + 1.0) / 2.0 * (high - low)
+        if not self._scale:
+            both[:, self._own] = flat
+        return both
+
+    def parted(self, vectors: Float2D) -> Float2D:
+        """State vectors without the actions."""
+        rest: Float2D = vectors[:, self._rest] if self._acts else vectors
+        return rest
 
 
 def check_action_space(schema: SceneSchema, space: spaces.Space[Any]) -> None:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeAlias
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
 
 from relgym.errors import ActionError, ConfigError
 from relgym.scene.objects import Float1D, SceneSchema
@@ -15,11 +19,16 @@ __all__ = [
     "Coefficient",
     "check_options",
     "checked_action",
+    "checked_actions",
     "checked_count",
+    "checked_least",
+    "checked_mask",
+    "checked_range",
     "counted",
     "numbered",
     "per_object",
     "physical_action",
+    "refuse_vector_env",
 ]
 
 Coefficient: TypeAlias = float | Mapping[str, float]
@@ -31,6 +40,21 @@ def checked_count(what: str, count: Any, least: int, most: int) -> int:
     if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or not least <= count <= most:
         raise ConfigError(f"{what}={count!r}: expected a whole number from {least} to {most}")
     return int(count)
+
+
+def checked_least(what: str, value: Any, least: float) -> float:
+    """`value` as a float; `ConfigError` unless it is a finite number of at least `least`."""
+    if not _is_number(value) or not least <= value < np.inf:
+        raise ConfigError(f"{what}={value!r}: expected a finite number of at least {least:g}")
+    return float(value)
+
+
+def checked_range(what: str, span: tuple[float, float]) -> tuple[float, float]:
+    """`span` as two floats; `ConfigError` unless they are finite with 0 <= low <= high."""
+    low, high = (float(x) for x in span) if len(tuple(span)) == 2 else (math.nan, math.nan)
+    if not 0.0 <= low <= high < math.inf:
+        raise ConfigError(f"{what}={span!r}: expected two finite numbers with 0 <= low <= high")
+    return low, high
 
 
 def numbered(kind: str, count: int) -> tuple[str, ...]:
@@ -112,6 +136,50 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
             "clip or rescale it"
         )
     return np.clip(array, space.low, space.high)
+
+
+def refuse_vector_env(env: Any) -> None:
+    """Raise `ConfigError` where a wrapper of single envs is put round a vector env."""
+    if isinstance(env, gym.vector.VectorEnv):
+        raise ConfigError(
+            "expected a single env, got a vector env: let make_vec wrap each of its envs, "
+            "gym.make_vec(id, num_envs=n, vectorization_mode='sync', wrappers=[...])"
+        )
+
+
+def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:
+    """`checked_action` for `count` actions at once, first axis first; they come back as one array."""
+    if not isinstance(space, spaces.Box):
+        legal, array = batch_space(space, count), np.asarray(actions)
+        if not legal.contains(array):
+            raise ActionError(f"expected {count} actions of {space}, got {actions!r}")
+        return array
+    try:
+        array = np.asarray(actions, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ActionError(f"expected numbers of shape {(count, *space.shape)}, got {actions!r}") from None
+    if array.shape != (count, *space.shape):
+        raise ActionError(f"expected actions of shape {(count, *space.shape)}, got shape {array.shape}")
+    slack = 1e-6 * np.maximum(1.0, np.abs(space.high))
+    legal_ones = (array >= space.low - slack) & (array <= space.high + slack)
+    if not legal_ones.all():
+        row = int(np.argwhere(~legal_ones)[0][0])
+        raise ActionError(
+            f"action {row} of {count} lies outside [{space.low}, {space.high}]: {array[row]}; clip or rescale it"
+        )
+    return np.clip(array, space.low, space.high)
+
+
+def checked_mask(mask: Any, count: int) -> NDArray[np.bool_]:
+    """Which of `count` envs to reset, all if `mask` is None; `ConfigError` unless it is a mask that marks some."""
+    if mask is None:
+        return np.ones(count, dtype=np.bool_)
+    if not isinstance(mask, np.ndarray) or mask.shape != (count,) or mask.dtype != np.bool_ or not mask.any():
+        raise ConfigError(
+            f"options['reset_mask']: expected an array of booleans of shape {(count,)} that marks at least one env, "
+            f"got {mask!r}"
+        )
+    return mask
 
 
 def physical_action(schema: SceneSchema, action: Any) -> Float1D:

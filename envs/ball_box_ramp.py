@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import Coefficient, check_options, checked_count, counted, numbered, per_object
-from relgym.envs.ball_scenes import BALL_PLACES, Placed, draw_room, option_names
-from relgym.envs.base import SceneEnv
-from relgym.envs.physics import BallWorld, Contact, Obstacle, Point
-from relgym.errors import ConfigError
-from relgym.scene.objects import POSE, Float1D, Kinematics, ObjectType, SceneSchema, Target
-from relgym.scene.shapes import Box, Sphere, Wedge, outline
+from relgym.envs.arguments import Coefficient, check_options, checked_count, numbered
+from relgym.envs.ball_env import BallEnv, body_values
+from relgym.envs.ball_scenes import BALL_PLACES, draw_room, option_names
+from relgym.scene.objects import Float1D
 
 __all__ = ["BallBoxRampEnv", "configurations"]
-
-_SHELL = {"floor": "floor", "ceiling": "ceiling", "left_wall": "wall", "right_wall": "wall"}
-_KINDS = ("box", "ramp")
-_X, _Y, _SX, _SY, _RZ = (POSE.index(name) for name in ("px", "py", "sx", "sy", "rz"))
-_VX = len(POSE)  # a ball's velocity follows its pose
 
 
 def configurations() -> tuple[dict[str, Any], ...]:
@@ -36,7 +27,7 @@ def configurations() -> tuple[dict[str, Any], ...]:
     )
 
 
-class BallBoxRampEnv(SceneEnv):
+class BallBoxRampEnv(BallEnv):
     """A ball flies, bounces and slides in a room with a box and a ramp; nobody acts.
 
     Description
@@ -124,8 +115,6 @@ class BallBoxRampEnv(SceneEnv):
     * v0: initial version.
     """
 
-    _transient = ("_viewer", "_world")
-
     def __init__(
         self,
         incline: Coefficient = 30.0,
@@ -136,72 +125,35 @@ class BallBoxRampEnv(SceneEnv):
         type_names: str = "shape",
         render_mode: str | None = None,
     ) -> None:
-        self._standing = counted(objects, _KINDS)
-        self._balls = numbered("ball", checked_count("balls", balls, 1, 100))
-        kinds = {**dict.fromkeys(self._balls, "ball"), **self._standing, **_SHELL}
-        ramps = {name: kind for name, kind in self._standing.items() if kind == "ramp"}
-        self._incline = per_object("incline", incline, ramps, 30.0, (1e-3, 90.0 - 1e-3))
-        self._elasticity = per_object("elasticity", elasticity, kinds, 0.9, (0.0, 1.0))
-        self._friction = per_object("friction", friction, kinds, 0.0, (0.0, math.inf))
-        types = self._types(kinds, type_names)
         super().__init__(
-            _schema(kinds, types), spaces.Discrete(1), {"vx": (-1.0, 1.0), "vy": (-1.0, 1.0)}, render_mode
+            balls=numbered("ball", checked_count("balls", balls, 1, 100)),
+            incline=incline,
+            elasticity=elasticity,
+            friction=friction,
+            objects=objects,
+            type_names=type_names,
+            action_space=spaces.Discrete(1),
+            render_mode=render_mode,
         )
-        self._offsets = [self._layout.offsets[self._layout.index(ball)] for ball in self._balls]
-        self._world: BallWorld | None = None
-        self._configuration: Mapping[str, Any] = {}
 
     @property
     def reset_options(self) -> tuple[str, ...]:
         """Names of all options of `reset`."""
         return tuple(option_names(self._standing, self._balls))
 
-    @property
-    def contacts(self) -> tuple[Contact, ...]:
-        """What the balls touch in the current state, by the engine's own record."""
-        self._required_state()
-        return self._engine.contacts()
-
-    @property
-    def _engine(self) -> BallWorld:
-        assert self._world is not None, "made at reset"
-        return self._world
-
     def _begin(self, options: Mapping[str, Any], *, rng: np.random.Generator) -> Float1D:
         check_options(options, self.reset_options)
-        inclines = {name: math.radians(degrees) for name, degrees in self._incline.items()}
-        room = draw_room(self._standing, self._balls, inclines, options=options, rng=rng)
+        room = draw_room(self._standing, self._balls, self._inclines, options=options, rng=rng)
         self._configuration = room.configuration
         state = np.concatenate(
-            [_properties(name, room.objects[name], self._balls) for name in self._layout.names]
+            [body_values(name, room.objects[name], self._balls) for name in self._layout.names]
         )
         return self._landed(state)
 
-    def _landed(self, state: Float1D) -> Float1D:
-        """Build the engine for `state` and let the last displacement happen in it."""
-        self._world = self._build(state)
-        centres = [(float(state[o + _X]), float(state[o + _Y])) for o in self._offsets]
-        moves = [(float(state[o + _VX]), float(state[o + _VX + 1])) for o in self._offsets]
-        self._world.land(centres, moves)
-        before = [(x - dx, y - dy) for (x, y), (dx, dy) in zip(centres, moves, strict=True)]
-        return self._read(state.copy(), before)
-
     def _advance(self, state: Float1D, action: Any) -> Float1D:
+        before, _ = self._motion(state)
         self._engine.step()
-        return self._read(state.copy(), [(state[o + _X], state[o + _Y]) for o in self._offsets])
-
-    def _read(self, state: Float1D, before: Sequence[tuple[float, float]]) -> Float1D:
-        """Write positions and displacements into `state`, the state vector to be."""
-        for o, (x, y), (old_x, old_y) in zip(self._offsets, self._engine.positions(), before, strict=True):
-            state[o + _X], state[o + _Y] = x, y
-            state[o + _VX], state[o + _VX + 1] = x - old_x, y - old_y
-        return state
-
-    def _info(self) -> dict[str, Any]:
-        return {"contacts": self._engine.contacts()}
-
-    def _reset_info(self) -> dict[str, Any]:
-        return {"configuration": dict(self._configuration)}
+        return self._read(state.copy(), before)
 
     def _hidden(self) -> Any:
         return tuple(self._engine.velocities())
@@ -211,67 +163,4 @@ class BallBoxRampEnv(SceneEnv):
         if hidden is not None:
             # The landing made the contacts known; now remove its rounding.
             self._state = vector.copy()
-            self._engine.resume([(vector[o + _X], vector[o + _Y]) for o in self._offsets], hidden)
-
-    def _build(self, state: Float1D) -> BallWorld:
-        scene = self._scene_of(state)
-        obstacles = [
-            Obstacle(o.name, _vertices(o.type, o.values), self._elasticity[o.name], self._friction[o.name])
-            for o in scene
-            if o.name not in self._balls
-        ]
-        radii = {ball: scene[ball]["sx"] / 2 for ball in self._balls}
-        first = self._balls[0]
-        return BallWorld(
-            obstacles, radii, ball_elasticity=self._elasticity[first], ball_friction=self._friction[first]
-        )
-
-    def _types(self, kinds: Mapping[str, str], type_names: str) -> dict[str, ObjectType]:
-        """Type of each object, by name."""
-        if type_names not in ("shape", "thesis"):
-            raise ConfigError(f"type_names={type_names!r}: expected 'shape' or 'thesis'")
-        return {name: self._type(name, kind, type_names == "thesis") for name, kind in kinds.items()}
-
-    def _type(self, name: str, kind: str, thesis: bool) -> ObjectType:
-        if kind == "ball":
-            return ObjectType("ball", (*POSE, "vx", "vy"), Sphere(), velocity=("vx", "vy", None))
-        shape = Wedge() if kind == "ramp" else Box()
-        if not thesis:
-            return ObjectType(kind, POSE, shape)
-        numbers = [
-            self._friction[name],
-            self._elasticity[name],
-            *([self._incline[name]] if kind == "ramp" else []),
-        ]
-        return ObjectType("_".join([kind, *(f"{number:g}" for number in numbers)]), POSE, shape, parent=kind)
-
-
-def _schema(kinds: Mapping[str, str], types: Mapping[str, ObjectType]) -> SceneSchema:
-    return SceneSchema(
-        types=tuple({t.name: t for t in types.values()}.values()),
-        objects=tuple((name, types[name].name) for name in kinds),
-        up="y",
-        planar=True,
-        kinematics=(Kinematics("ball", "px", "vx"), Kinematics("ball", "py", "vy")),
-        targets=(Target("ball", "vx"), Target("ball", "vy")),
-    )
-
-
-def _properties(name: str, placed: Placed, balls: Sequence[str]) -> Float1D:
-    values = np.zeros(len(POSE) + (2 if name in balls else 0))
-    values[[_X, _Y, _SX, _SY]] = placed.x, placed.y, placed.width, placed.height
-    values[_SY + 1] = placed.width if name in balls else 1.0
-    if name in balls:
-        values[_VX:] = placed.dx, placed.dy
-    return values
-
-
-def _vertices(t: ObjectType, values: Float1D) -> tuple[Point, ...]:
-    """Corners of an obstacle in the plane, counter-clockwise."""
-    assert t.shape is not None, "obstacles have bodies"
-    x, y, width, height, angle = (float(values[i]) for i in (_X, _Y, _SX, _SY, _RZ))
-    corners = [(u * width, w * height) for u, w in outline(t.shape).tolist()]
-    if angle != 0.0:  # an unrotated corner must not be rounded
-        cos, sin = math.cos(angle), math.sin(angle)
-        corners = [(cos * u - sin * w, sin * u + cos * w) for u, w in corners]
-    return tuple((x + u, y + w) for u, w in corners)
+            self._engine.resume(self._motion(vector)[0], hidden)

@@ -13,8 +13,10 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from relgym.envs.arguments import checked_action
+from relgym.envs.flat import FlatSpec
+from relgym.envs.tasks import Judgement, Task
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import POSE, Float1D, Scene, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, POSE, Float1D, Scene, SceneLayout, SceneSchema
 
 __all__ = [
     "DEFAULT_BOUNDS",
@@ -49,11 +51,14 @@ class EnvState:
         What the env keeps beside it: an engine's velocities, say. Opaque, immutable, picklable.
     random
         State of the env's random generator.
+    steps
+        How many steps the episode has lasted: the task's time limit depends on it.
     """
 
     vector: Float1D
     hidden: Any
     random: Mapping[str, Any]
+    steps: int = 0
 
 
 class SceneEnv(gym.Env[Observation, Any]):
@@ -65,24 +70,41 @@ class SceneEnv(gym.Env[Observation, Any]):
     Parameters
     ----------
     schema
-        What the scenes are made of. Bodiless objects (the action) are no part of the observation.
+        What the scenes are made of. All but the action is part of the observation.
     action_space
         The space of actions.
     bounds
         Smallest and largest value of each property; pose components default to `DEFAULT_BOUNDS`.
     render_mode
         ``None``, ``"rgb_array"`` or ``"human"``.
+    task
+        What the agent is asked to do; without one the reward is 0 and no episode ends.
+    time_limit
+        After how many steps the task's time is up and an episode is truncated; none: never.
 
     Attributes
     ----------
     schema : SceneSchema
         Constant for the env's life; wrapped envs give it with ``env.get_wrapper_attr("schema")``.
+    task : Task or None
+        Reward and termination as pure functions, by which dreams can be judged too.
+    flat_spec : FlatSpec
+        What flat views of the env show unless told otherwise.
     """
+
+    flat_spec = FlatSpec()
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
 
     def __init__(
-        self, schema: SceneSchema, action_space: spaces.Space[Any], bounds: Bounds, render_mode: str | None
+        self,
+        schema: SceneSchema,
+        action_space: spaces.Space[Any],
+        bounds: Bounds,
+        render_mode: str | None,
+        *,
+        task: Task | None = None,
+        time_limit: int | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ConfigError(
@@ -91,7 +113,10 @@ class SceneEnv(gym.Env[Observation, Any]):
         self.schema = schema
         self.render_mode = render_mode
         self.action_space = action_space
-        self._layout = schema.layout(name for name in schema.order if schema.type_of(name).has_body)
+        self.task = task
+        self._time_limit = time_limit
+        self._steps = 0
+        self._layout = schema.layout(name for name in schema.order if name != ACTION)
         self.observation_space: spaces.Space[Any] = _observation_space(
             self._layout, {**DEFAULT_BOUNDS, **bounds}
         )
@@ -113,6 +138,7 @@ class SceneEnv(gym.Env[Observation, Any]):
         """
         super().reset(seed=seed)
         self._state = self._begin(options or {}, rng=self.np_random)
+        self._steps = 0
         if self.render_mode == "human":
             self.render()
         return self._observation(), {"scene": self.scene, **self._info(), **self._reset_info()}
@@ -121,11 +147,14 @@ class SceneEnv(gym.Env[Observation, Any]):
         """Advance by one step; `ActionError` when `action` lies outside the action space."""
         before = self._required_state()
         checked = checked_action(self.action_space, action)
-        self._state = self._advance(before, checked)
-        reward, terminated = self._judge(before, checked, self._state)
+        self._state = after = self._advance(before, checked)
+        self._steps += 1
         if self.render_mode == "human":
             self.render()
-        return self._observation(), reward, terminated, False, self._info()
+        if self.task is None:
+            return self._observation(), 0.0, False, self._late(), self._info()
+        verdict = self.task.judge(self._layout, before[None], np.asarray(checked)[None], after[None])
+        return self._judged(verdict)
 
     def render(self) -> Any:
         """Draw the scene: as an array of shape (height, width, 3), or in a window for ``"human"``."""
@@ -135,7 +164,8 @@ class SceneEnv(gym.Env[Observation, Any]):
             raise ConfigError("nothing to render to: make the env with render_mode='rgb_array' or 'human'")
         if self._viewer is None:
             self._viewer = SceneViewer(self.render_mode, fps=self.metadata["render_fps"])
-        return self._viewer.show(self.scene, self._view())
+        marks = () if self.task is None else self.task.regions(self.scene)
+        return self._viewer.show(self.scene, self._view(), marks)
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -159,7 +189,7 @@ class SceneEnv(gym.Env[Observation, Any]):
         """Everything that the future depends on; `set_state` continues from it exactly."""
         vector = self.vector
         vector.flags.writeable = False
-        return EnvState(vector, self._hidden(), self.np_random.bit_generator.state)
+        return EnvState(vector, self._hidden(), self.np_random.bit_generator.state, self._steps)
 
     def set_state(self, state: EnvState | Scene) -> Observation:
         """Continue from `state`: of this env or of another one with the same schema.
@@ -168,7 +198,8 @@ class SceneEnv(gym.Env[Observation, Any]):
         ----------
         state
             What `get_state` returned, or any scene with this env's objects (an action in it is ignored).
-            After a scene, the hidden rest is inferred from it, and the random generator goes on as it was.
+            After a scene, the hidden rest is inferred from it, the random generator goes on as it was, and the
+            time limit counts from 0.
 
         Raises
         ------
@@ -176,7 +207,7 @@ class SceneEnv(gym.Env[Observation, Any]):
             The state or scene has other objects than this env.
         """
         if isinstance(state, Scene):
-            self._state = self._vector_of(state)
+            self._state, self._steps = self._vector_of(state), 0
             self._restore(self._state, None)
         else:
             if state.vector.shape != (self._layout.width,):
@@ -184,7 +215,7 @@ class SceneEnv(gym.Env[Observation, Any]):
                     f"expected a state of shape {(self._layout.width,)} for {list(self._layout.names)}, "
                     f"got {state.vector.shape}; make the env with the arguments of the one it came from"
                 )
-            self._state = state.vector.copy()
+            self._state, self._steps = state.vector.copy(), state.steps
             self._restore(self._state, state.hidden)
             self.np_random.bit_generator.state = state.random
         return self._observation()
@@ -214,10 +245,6 @@ class SceneEnv(gym.Env[Observation, Any]):
         """Return the next state vector: a new array."""
         raise NotImplementedError
 
-    def _judge(self, before: Float1D, action: Any, after: Float1D) -> tuple[float, bool]:
-        """Reward of a step, and whether it ends the episode."""
-        return 0.0, False
-
     def _info(self) -> dict[str, Any]:
         """What `reset` and `step` report about the current state."""
         return {}
@@ -238,6 +265,15 @@ class SceneEnv(gym.Env[Observation, Any]):
         """Take over a state; `hidden` is ``None`` when only the scene is known."""
 
     # --- helpers --------------------------------------------------------------------------------------------
+
+    def _judged(self, verdict: Judgement) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        success = bool(verdict.succeeded[0])
+        info = {**self._info(), "is_success": success}  # the name that SB3's evaluation looks for
+        terminated = bool(verdict.terminated[0])
+        return self._observation(), float(verdict.rewards[0]), terminated, self._late(), info
+
+    def _late(self) -> bool:
+        return self._time_limit is not None and self._steps >= self._time_limit
 
     def _observation(self) -> Observation:
         # One fresh array per call, cut into views: callers may keep and change what they get.

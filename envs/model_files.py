@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import gymnasium as gym
@@ -15,7 +15,7 @@ from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.errors import ConfigError, ModelFileError, ObservationError
 from relgym.scene.objects import Scene, SceneSchema
 
-__all__ = ["EnvRecord", "world_like"]
+__all__ = ["EnvRecord", "copied", "schema_like", "world_like"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,33 +80,66 @@ def world_like(like: gym.Env[Any, Any], schema: SceneSchema) -> gym.Env[Any, Any
     Raises
     ------
     ConfigError
-        Its scenes aren't of this schema, or it can't be copied.
+        The model can't speak of its scenes (`schema_like`), or it can't be copied.
     """
     inner = like.unwrapped
-    if not _alike(getattr(inner, "schema", None), schema):
-        raise ConfigError(
-            f"like={like}: expected an env whose scenes have the objects, properties and action ranges of the "
-            f"model's (objects {list(schema.order)}); make it with the arguments that the model's env had"
-        )
+    schema_like(getattr(inner, "schema", None), schema, f"like={like}")
+    return copied(inner)
+
+
+def copied(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
+    """A copy that draws nothing, so that its resets disturb nobody; `ConfigError` where there can't be one."""
     try:
-        world = copy.deepcopy(inner)
+        world = copy.deepcopy(env)
     except (TypeError, NotImplementedError, copy.Error) as error:
         raise ConfigError(
-            f"like={like} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
+            f"like={env} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
             "that a ModelLearner taught holds spaces and first scenes of its own: leave out like"
         ) from error
-    world.render_mode = None  # its resets are no one's to see
+    world.unwrapped.render_mode = None  # its resets are no one's to see
     return world
 
 
-def _alike(schema: SceneSchema | None, other: SceneSchema) -> bool:
-    """Whether scenes of one schema are scenes of the other; what is to be learned of them may differ."""
-    return schema is not None and _signature(schema) == _signature(other)
+def schema_like(other: SceneSchema | None, schema: SceneSchema, what: str) -> SceneSchema:
+    """The model's schema with the objects of another one: number and names may differ, types may not.
+
+    Parameters
+    ----------
+    other
+        Schema of an env or of a scene.
+    schema
+        The model's.
+    what
+        How to call the other one in errors.
+
+    Raises
+    ------
+    ConfigError
+        Types, properties, axes or action ranges aren't those of the model; what is to be learned may differ.
+    """
+    difference = "it has no schema" if other is None else _difference(other, schema)
+    if other is None or difference:
+        raise ConfigError(
+            f"{what}: expected scenes with the types, properties and action ranges of the model's (types "
+            f"{sorted(t.name for t in schema.types)}), but {difference}; make it with the arguments that the model's "
+            "env had (only numbers and names of objects may differ)"
+        )
+    return schema if other.objects == schema.objects else replace(schema, objects=other.objects)
 
 
-def _signature(schema: SceneSchema) -> tuple[Any, ...]:
-    types = {t.name: (t.properties, t.shape, dict(t.pose)) for t in schema.types}
-    return schema.objects, types, schema.up, schema.planar, schema.action_scale
+def _difference(other: SceneSchema, schema: SceneSchema) -> str:
+    """What keeps a model of one schema from speaking of the other's scenes; empty if nothing does."""
+    if (other.up, other.planar) != (schema.up, schema.planar):
+        return f"it has up={other.up!r}, planar={other.planar}"
+    known = {t.name: (t.properties, t.shape, dict(t.pose)) for t in schema.types}
+    present = {name for _, name in other.objects}
+    for t in other.types:
+        if t.name in present and (t.properties, t.shape, dict(t.pose)) != known.get(t.name):
+            seen = f"not with the properties {t.properties}" if t.name in known else "not at all"
+            return f"it has objects of type {t.name!r}, which the model knows {seen}"
+    if other.action_scale != schema.action_scale:
+        return f"its actions range over {other.action_scale}, not {schema.action_scale}"
+    return ""
 
 
 def _scene(schema: SceneSchema, data: Mapping[str, Any]) -> Scene:

@@ -142,11 +142,19 @@ class BallWorld:
         self._names[shape] = name
         return body
 
-    def land(self, positions: Sequence[Point], displacements: Sequence[Point]) -> None:
+    def land(
+        self,
+        positions: Sequence[Point],
+        displacements: Sequence[Point],
+        thrusts: Sequence[Point] | None = None,
+    ) -> None:
         """Put the balls where their last displacement, made by the engine, takes them to `positions`.
 
-        Contacts there are then known and solved for, just as if the episode had always been running.
+        Contacts there are then known and solved for, just as if the episode had always been running; and so are
+        `thrusts`, accelerations of the balls in units / s^2 for the displacement that follows.
         """
+        for body, thrust in zip(self._bodies, thrusts or (), strict=thrusts is not None):
+            body.force = thrust  # the mass is 1; the engine forgets forces after a step
         for body, (px, py), (dx, dy) in zip(self._bodies, positions, displacements, strict=True):
             body.position = px - dx, py - dy
             body.velocity = dx / TIME_STEP, dy / TIME_STEP

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.envs.tasks import Region
 from relgym.errors import ConfigError
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.vectors import rotation
@@ -27,6 +28,7 @@ Colour = tuple[int, int, int]
 _BACKGROUND: Colour = (250, 250, 247)
 _GRID: Colour = (230, 231, 228)
 _INK: Colour = (45, 52, 60)
+_GOAL: Colour = (255, 214, 92)
 _COLOURS: dict[str, Colour] = {
     "ball": (230, 126, 34),
     "box": (93, 142, 190),
@@ -79,6 +81,7 @@ def render_scene(
     view: View | None = None,
     labels: bool = False,
     velocities: bool = False,
+    marks: Sequence[Region] = (),
 ) -> Image:
     """Draw a scene.
 
@@ -94,6 +97,8 @@ def render_scene(
         Whether to write the objects' names on them.
     velocities
         Whether to draw how far each object would move in 12 steps.
+    marks
+        Regions to mark behind the bodies, such as a goal (`Task.regions`).
 
     Returns
     -------
@@ -105,7 +110,9 @@ def render_scene(
         pygame isn't installed.
     """
     pygame = _pygame()
-    surface = _draw(pygame, scene, size, view or scene_view(scene), labels=labels, velocities=velocities)
+    surface = _draw(
+        pygame, scene, size, view or scene_view(scene), marks, labels=labels, velocities=velocities
+    )
     return np.ascontiguousarray(np.transpose(pygame.surfarray.array3d(surface), (1, 0, 2)), dtype=np.uint8)
 
 
@@ -129,17 +136,17 @@ class SceneViewer:
         self._window: Any = None
         self._clock: Any = None
 
-    def show(self, scene: Scene, view: View | None = None) -> Image | None:
+    def show(self, scene: Scene, view: View | None = None, marks: Sequence[Region] = ()) -> Image | None:
         """Draw a scene; the picture for ``"rgb_array"``, ``None`` when it went to the window."""
         if self._mode == "rgb_array":
-            return render_scene(scene, size=self._size, view=view)
+            return render_scene(scene, size=self._size, view=view, marks=marks)
         pygame = _pygame()
         if self._window is None:
             pygame.display.init()
             self._window = pygame.display.set_mode(self._size)
             pygame.display.set_caption("relgym")
             self._clock = pygame.time.Clock()
-        self._window.blit(_draw(pygame, scene, self._size, view or scene_view(scene)), (0, 0))
+        self._window.blit(_draw(pygame, scene, self._size, view or scene_view(scene), marks), (0, 0))
         pygame.event.pump()
         pygame.display.flip()
         self._clock.tick(self._fps)
@@ -166,6 +173,7 @@ def _draw(
     scene: Scene,
     size: tuple[int, int],
     view: View,
+    marks: Sequence[Region] = (),
     *,
     labels: bool = False,
     velocities: bool = False,
@@ -176,6 +184,8 @@ def _draw(
     canvas.fill(_BACKGROUND)
     pen = _Pen(pygame, canvas, view, large)
     pen.grid(view)
+    for mark in marks:
+        pen.mark(mark)
     drawn = sorted(_bodies(scene), key=lambda d: d.depth)  # what is behind comes first
     for body in drawn:
         pen.body(body)
@@ -213,6 +223,14 @@ class _Pen:
         for k in range(first, last + 1):
             x = self._pixel(np.array([k * step, 0.0]))[0]
             self._pygame.draw.line(self._canvas, _GRID, (x, 0), (x, self._size[1]), self._line)
+
+    def mark(self, region: Region) -> None:
+        """Fill a rectangle of the world."""
+        low = self._pixel(np.array([region.left, region.bottom]))
+        high = self._pixel(np.array([region.left + region.width, region.bottom + region.height]))
+        corners = [low, (low[0], high[1]), high, (high[0], low[1])]
+        self._pygame.draw.polygon(self._canvas, _GOAL, corners)
+        self._pygame.draw.polygon(self._canvas, _INK, corners, self._line)
 
     def body(self, drawn: _Drawn) -> None:
         """Fill and outline a body."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,24 @@ __all__ = ["space_from_json", "space_to_json"]
 
 
 def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
-    """Plain data that `space_from_json` reads back; `ConfigError` for spaces other than Box, Discrete and Dict."""
+    """Plain data that `space_from_json` reads back.
+
+    Raises
+    ------
+    ConfigError
+        A space other than Box, Discrete, MultiDiscrete, MultiBinary, Dict and Tuple.
+    """
     if isinstance(space, spaces.Dict):
         return {
             "kind": "dict",
             "spaces": [[name, space_to_json(part)] for name, part in space.spaces.items()],
         }
+    if isinstance(space, spaces.Tuple):
+        return {"kind": "tuple", "spaces": [space_to_json(part) for part in space.spaces]}
+    if isinstance(space, spaces.MultiDiscrete):
+        return {"kind": "multi-discrete", "nvec": space.nvec.tolist(), "start": space.start.tolist()}
+    if isinstance(space, spaces.MultiBinary):
+        return {"kind": "multi-binary", "n": space.n if isinstance(space.n, int) else list(space.n)}
     if isinstance(space, spaces.Discrete):
         return {"kind": "discrete", "n": int(space.n), "start": int(space.start)}
     if isinstance(space, spaces.Box):
@@ -28,20 +41,50 @@ def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
             "high": space.high.astype(np.float64).tolist(),
             "dtype": str(space.dtype),
         }
-    raise ConfigError(f"a model file can hold Box, Discrete and Dict spaces, got {space}")
+    raise ConfigError(
+        f"a model file can hold Box, Discrete, MultiDiscrete, MultiBinary, Dict and Tuple spaces, got {space}"
+    )
 
 
 def space_from_json(data: dict[str, Any]) -> spaces.Space[Any]:
     """Read what `space_to_json` wrote."""
-    if data["kind"] == "dict":
-        return spaces.Dict({name: space_from_json(part) for name, part in data["spaces"]})
-    if data["kind"] == "discrete":
-        return spaces.Discrete(int(data["n"]), start=int(data["start"]))
-    if data["kind"] == "box":
-        dtype = np.dtype(data["dtype"])
-        return spaces.Box(
-            np.array(data["low"], dtype=dtype), np.array(data["high"], dtype=dtype), dtype=dtype.type
-        )
-    raise ModelFileError(
-        f"unknown kind of space {data['kind']!r}; load the model with the relgym that wrote it"
-    )
+    kind = data["kind"]
+    if kind not in _READERS:
+        raise ModelFileError(f"unknown kind of space {kind!r}; load the model with the relgym that wrote it")
+    return _READERS[kind](data)
+
+
+def _dict(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Dict({name: space_from_json(part) for name, part in data["spaces"]})
+
+
+def _tuple(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Tuple([space_from_json(part) for part in data["spaces"]])
+
+
+def _discrete(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Discrete(int(data["n"]), start=int(data["start"]))
+
+
+def _multi_discrete(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.MultiDiscrete(np.array(data["nvec"]), start=np.array(data["start"]))
+
+
+def _multi_binary(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.MultiBinary(data["n"])
+
+
+def _box(data: dict[str, Any]) -> spaces.Space[Any]:
+    dtype = np.dtype(data["dtype"])
+    low, high = (np.array(data[end], dtype=dtype) for end in ("low", "high"))
+    return spaces.Box(low, high, dtype=dtype.type)
+
+
+_READERS: dict[str, Callable[[dict[str, Any]], spaces.Space[Any]]] = {
+    "box": _box,
+    "dict": _dict,
+    "discrete": _discrete,
+    "multi-binary": _multi_binary,
+    "multi-discrete": _multi_discrete,
+    "tuple": _tuple,
+}

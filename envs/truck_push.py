@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import check_options, checked_count, physical_action
+from relgym.envs.arguments import check_options, checked_count, checked_range, physical_action
 from relgym.envs.base import SceneEnv
 from relgym.envs.draws import Draws, Range
-from relgym.envs.truck_scenes import Placed, Stacks, draw_row, layouts, loads, option_names, stacks_of
-from relgym.errors import ConfigError
-from relgym.scene.objects import (
-    ACTION,
-    POSE,
-    Float1D,
-    Kinematics,
-    ObjectType,
-    Scene,
-    SceneSchema,
-    Target,
+from relgym.envs.truck_goal import (
+    FLAT,
+    FORCES,
+    STEPS,
+    PushTask,
+    draw_distance,
+    draw_frictions,
+    friction_options,
 )
-from relgym.scene.shapes import Box
+from relgym.envs.truck_scenes import Stacks, draw_row, layouts, loads, option_names, stacks_of
+from relgym.envs.truck_schema import body_values, truck_schema
+from relgym.errors import ConfigError
+from relgym.scene.objects import POSE, Float1D
 
 __all__ = ["BOX_MASS", "GRAVITY", "TRUCK_MASS", "TruckPushEnv"]
 
@@ -35,17 +34,20 @@ GRAVITY = 10.0
 
 _PX, _SX = POSE.index("px"), POSE.index("sx")
 _OWN = len(POSE)  # a truck's velocity and a box's friction follow the pose
+_BOUNDS = {
+    "vx": (0.0, 1e5),
+    "friction": (0.0, 1e3),
+    "ahead": (-1e5, 1e5),
+    **dict.fromkeys(POSE[:3], (-1e6, 1e6)),
+}
 
-Task = Callable[[Scene, Scene], tuple[float, bool]]
-"""From the scenes before and after a step to its reward and whether the episode ends."""
+_TASKS = (None, "push")
+"""What an agent may be asked to do."""
 
+_WATCHED_FORCES = (0.0, 500.0)
 
-def _no_task(before: Scene, after: Scene) -> tuple[float, bool]:
-    return 0.0, False
-
-
-_TASKS: Mapping[str | None, Task] = {None: _no_task}
-"""What an agent may be asked to do, by name."""
+_APPROACH, _BELOW, _PICTURE_WIDTH, _PICTURE_HEIGHT = 48.0, 12.0, 68.0, 32.0
+"""The picture of the goal pad, in units: what it shows on the left of it, below it, and in all."""
 
 
 class TruckPushEnv(SceneEnv):
@@ -77,13 +79,17 @@ class TruckPushEnv(SceneEnv):
     sx, sy, sz            full extents                              unit     0         1e3
     vx (truck)            last displacement, px_t - px_{t-1}        unit     0         1e5
     friction (boxes)      friction constant                         1        0         1e3
+    ahead (goal)          how far the pad's middle lies before      unit     -1e5      1e5
+                          the truck's nose
     ====================  ========================================  =======  ========  =======
 
-    Objects: ``truck``, ``box1`` … ``boxN``, and ``bystander1`` … on request, which are boxes too.
+    Objects: ``truck``, ``box1`` … ``boxN``, and ``bystander1`` … on request, which are boxes too. With the task
+    ``push`` also ``goal``, which has no body. The observation is Markov.
 
     Rewards
     -------
-    0 without a task.
+    0 without a task. With ``push``, d for ``goal.ahead`` and a prime for the next scene,
+    ``0.1 (|d| - |d'|) - 0.02``, and 2 more when the truck stands (v' = 0) with ``|d'| <= 1``: `PushTask`.
 
     Starting State
     --------------
@@ -92,23 +98,27 @@ class TruckPushEnv(SceneEnv):
     truck, then a stack of two; 4: three boxes in a row. Which box is where is drawn too. Boxes are 3–5
     wide, high and deep, a box on another one no wider than that; the truck 4–6 wide and 2–3 high: no higher
     than a box. Everything touches exactly. The truck is at rest, at x within 50 and the ground at y within
-    5 of the origin. Bystanders stand beside the track, 8 or more off it. All uniform.
+    5 of the origin. Bystanders stand beside the track, 8 or more off it. All uniform. With ``push`` the goal is
+    20–40 away, and in random order one box is slippery (friction constant 0.05–0.12), one middling (0.2–0.3) and
+    one rough (0.4–0.5); further boxes begin anew.
 
     Reset options, all optional: ``layout`` (1, 2, …), ``order`` (names of the boxes by position: stack by
     stack from the truck on, each from bottom to top), ``speed``, ``shift_x``, ``shift_y``, ``truck_width``,
     ``truck_height``, ``box1_width``, ``box1_height``, ``box1_depth``, ``box1_friction``, …,
-    ``bystander1_x``, …; `reset_options` lists them. ``info["configuration"]`` holds what was drawn: passed as
-    options, it gives the same scene again.
+    ``bystander1_x``, …, with ``push`` also ``goal_distance`` and ``friction_order`` (names of the pushed boxes,
+    the slippery one first); `reset_options` lists them. ``info["configuration"]`` holds what was drawn: passed
+    as options, it gives the same scene again.
 
     Episode End
     -----------
-    Without a task never; truncated after 40 steps by the registered time limit.
+    Without a task never; truncated after 40 steps by the registered time limit. With ``push`` the first stop
+    counts: terminated when v' = 0 after v > 0, and when d' < -1; truncated after 20 steps.
 
     Info
     ----
     ``info["layout"]`` (its number) and ``info["stacks"]`` (names, each stack from bottom to top, from the
-    truck on): the truth about what pushes what. At reset also ``info["scene"]`` and
-    ``info["configuration"]``.
+    truck on): the truth about what pushes what. After steps with a task ``info["is_success"]``. At reset also
+    ``info["scene"]`` and ``info["configuration"]``.
 
     Arguments
     ---------
@@ -118,13 +128,13 @@ class TruckPushEnv(SceneEnv):
         When the frictions are drawn: ``"block"`` at reset, ``"step"`` before every step; then the schema
         declares them exogenous.
     friction_range
-        From where they're drawn.
+        From where they're drawn; with ``push`` only those of bystanders.
     force_range
-        Forces (>= 0) that -1 and 1 stand for.
+        Forces (>= 0) that -1 and 1 stand for; by default 0 to 500, with ``push`` 0 to 250.
     bystanders
         How many boxes stand beside the track.
     task
-        ``None``: watch what pushing does.
+        ``None``: watch what pushing does. ``"push"``: bring the stacks to the goal and stop there.
 
     Version History
     ---------------
@@ -136,7 +146,7 @@ class TruckPushEnv(SceneEnv):
         n_boxes: int = 3,
         redraw: str = "block",
         friction_range: tuple[float, float] = (0.05, 0.5),
-        force_range: tuple[float, float] = (0.0, 500.0),
+        force_range: tuple[float, float] | None = None,
         bystanders: int = 0,
         task: str | None = None,
         render_mode: str | None = None,
@@ -145,16 +155,29 @@ class TruckPushEnv(SceneEnv):
             raise ConfigError(f"redraw={redraw!r}: expected 'block' or 'step'")
         if task not in _TASKS:
             raise ConfigError(f"task={task!r}: expected one of {list(_TASKS)}")
+        if task is not None and redraw != "block":
+            raise ConfigError(
+                f"task={task!r} with redraw={redraw!r}: nobody can plan for frictions yet to be drawn"
+            )
         self._boxes = tuple(f"box{k + 1}" for k in range(checked_count("n_boxes", n_boxes, 1, 12)))
         count = checked_count("bystanders", bystanders, 0, 100)
         self._bystanders = tuple(f"bystander{k + 1}" for k in range(count))
-        self._frictions = Range(*_checked_range("friction_range", friction_range), 0.0, 1e3)
-        self._redraw, self._task = redraw, _TASKS[task]
+        self._frictions = Range(*checked_range("friction_range", friction_range), 0.0, 1e3)
+        self._redraw = redraw
         names = (*self._boxes, *self._bystanders)
-        schema = _schema(names, _checked_range("force_range", force_range), exogenous=redraw == "step")
-        action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
-        bounds = {"vx": (0.0, 1e5), "friction": (0.0, 1e3), **dict.fromkeys(POSE[:3], (-1e6, 1e6))}
-        super().__init__(schema, action_space, bounds, render_mode)
+        forces = force_range or (FORCES if task else _WATCHED_FORCES)
+        forces = checked_range("force_range", forces)
+        schema = truck_schema(names, forces, exogenous=redraw == "step", goal=task is not None)
+        super().__init__(
+            schema,
+            spaces.Box(-1.0, 1.0, (1,), np.float32),
+            _BOUNDS,
+            render_mode,
+            task=PushTask() if task else None,
+            time_limit=STEPS if task else None,
+        )
+        if task:
+            self.flat_spec = FLAT
         self._columns = {name: cut.start for name, cut in self._cuts}
         self._friction_columns = [self._columns[name] + _OWN for name in names]
         self._stacks: Stacks = ()
@@ -163,7 +186,7 @@ class TruckPushEnv(SceneEnv):
     @property
     def reset_options(self) -> tuple[str, ...]:
         """Names of all options of `reset`."""
-        return tuple(option_names(self._boxes, self._bystanders))
+        return (*option_names(self._boxes, self._bystanders), *(friction_options() if self.task else ()))
 
     @property
     def stacks(self) -> Stacks:
@@ -174,13 +197,18 @@ class TruckPushEnv(SceneEnv):
         check_options(options, self.reset_options)
         draws = Draws(options, rng)
         placed, stacks, speed = draw_row(self._boxes, self._bystanders, draws)
-        own = {
-            name: draws.number(f"{name}_friction", self._frictions)
-            for name in (*self._boxes, *self._bystanders)
-        }
-        own["truck"] = speed
+        own = self._draw_frictions(draws) | {"truck": speed}
+        parts = [body_values(placed[name], own[name]) for name in self._layout.names if name in placed]
+        if self.task is not None:
+            parts.append(np.array([draw_distance(draws)]))
         self._stacks, self._configuration = stacks, draws.taken
-        return np.concatenate([_properties(placed[name], own[name]) for name in self._layout.names])
+        return np.concatenate(parts)
+
+    def _draw_frictions(self, draws: Draws) -> dict[str, float]:
+        """Friction constant of every box, by name."""
+        pushed = draw_frictions(self._boxes, draws) if self.task else {}
+        rest = (name for name in (*self._boxes, *self._bystanders) if name not in pushed)
+        return pushed | {name: draws.number(f"{name}_friction", self._frictions) for name in rest}
 
     def _advance(self, state: Float1D, action: Any) -> Float1D:
         force = float(physical_action(self.schema, action)[0])
@@ -190,6 +218,8 @@ class TruckPushEnv(SceneEnv):
         after[truck + _OWN] = velocity
         after[truck + _PX] = state[truck + _PX] + velocity
         self._push(after)
+        if self.task is not None:
+            after[self._columns["goal"]] = state[self._columns["goal"]] - velocity
         if self._redraw == "step":
             after[self._friction_columns] = self.np_random.uniform(
                 self._frictions.low, self._frictions.high, len(self._friction_columns)
@@ -216,9 +246,6 @@ class TruckPushEnv(SceneEnv):
                 state[self._columns[name] + _PX] = edge + width / 2
             edge += width
 
-    def _judge(self, before: Float1D, action: Any, after: Float1D) -> tuple[float, bool]:
-        return self._task(self._scene_of(before), self._scene_of(after))
-
     def _info(self) -> dict[str, Any]:
         heights = tuple(len(stack) for stack in self._stacks)
         return {"layout": layouts(len(self._boxes)).index(heights) + 1, "stacks": self._stacks}
@@ -227,38 +254,15 @@ class TruckPushEnv(SceneEnv):
         return {"configuration": dict(self._configuration)}
 
     def _view(self) -> Any:
-        from relgym.envs.rendering import scene_view
+        from relgym.envs.rendering import View, scene_view
 
-        return scene_view(self.scene, ("truck", *self._boxes), margin=0.3)
+        if self.task is None:
+            return scene_view(self.scene, ("truck", *self._boxes), margin=0.3)
+        (pad,) = self.task.regions(self.scene)  # it stands still, and so does the picture
+        return View(pad.left - _APPROACH, pad.bottom - _BELOW, _PICTURE_WIDTH, _PICTURE_HEIGHT)
 
     def _hidden(self) -> Any:
         return self._stacks
 
     def _restore(self, vector: Float1D, hidden: Any) -> None:
         self._stacks = stacks_of(self._scene_of(vector)) if hidden is None else hidden
-
-
-def _schema(boxes: tuple[str, ...], force_range: tuple[float, float], *, exogenous: bool) -> SceneSchema:
-    truck = ObjectType("truck", (*POSE, "vx"), Box(), velocity=("vx", None, None))
-    box = ObjectType("box", (*POSE, "friction"), Box(), exogenous=("friction",) if exogenous else ())
-    return SceneSchema(
-        types=(truck, box, ObjectType(ACTION, ("force",))),
-        objects=(("truck", "truck"), *((name, "box") for name in boxes), (ACTION, ACTION)),
-        up="y",
-        planar=False,
-        kinematics=(Kinematics("truck", "px", "vx"),),
-        targets=(Target("truck", "vx"), Target("box", "px", given=(("truck", "vx"),))),
-        action_scale=(("force", *force_range),),
-    )
-
-
-def _properties(placed: Placed, own: float) -> Float1D:
-    p = placed
-    return np.array([p.x, p.y, p.z, 0.0, 0.0, 0.0, p.width, p.height, p.depth, own])
-
-
-def _checked_range(what: str, span: tuple[float, float]) -> tuple[float, float]:
-    low, high = (float(x) for x in span) if len(tuple(span)) == 2 else (math.nan, math.nan)
-    if not 0.0 <= low <= high < math.inf:
-        raise ConfigError(f"{what}={span!r}: expected two finite numbers with 0 <= low <= high")
-    return low, high

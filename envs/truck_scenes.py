@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from relgym.envs.draws import Draws, Range
 from relgym.errors import ObservationError
@@ -37,6 +38,7 @@ class Placed:
     depth: float
 
 
+@cache
 def layouts(n_boxes: int) -> tuple[tuple[int, ...], ...]:
     """Heights of the stacks in every layout; layout k (from 1) is the k-th entry.
 

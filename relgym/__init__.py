@@ -17,7 +17,12 @@ if (_ROOT / "pyproject.toml").is_file() and (_ROOT / "envs" / "__init__.py").is_
 
 # Entry points are strings: importing relgym loads neither pymunk nor the learner.
 gymnasium.register("relgym/BallBoxRamp-v0", "relgym.envs.ball_box_ramp:BallBoxRampEnv", max_episode_steps=200)
-gymnasium.register("relgym/LearnedModel-v0", "relgym.envs.learned_model:LearnedModelEnv")
+gymnasium.register("relgym/BallGoal-v0", "relgym.envs.ball_goal:BallGoalEnv", max_episode_steps=500)
+gymnasium.register(
+    "relgym/LearnedModel-v0",
+    "relgym.envs.learned_model:LearnedModelEnv",
+    vector_entry_point="relgym.envs.learned_model_vector:LearnedModelVectorEnv",
+)
 gymnasium.register("relgym/TruckPush-v0", "relgym.envs.truck_push:TruckPushEnv", max_episode_steps=40)
 
 _LAZY_MODULES = ("envs", "wrappers")

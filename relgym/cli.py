@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 from typer.core import TyperGroup
 
 from relgym.errors import ConfigError, RelgymError
@@ -170,6 +177,39 @@ def rollout(
 
 
 @app.command()
+def reproduce(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="NAME...", help="table-4.2, figure-4.3, experiment-1, ..., all."),
+    ] = None,
+    batches: Annotated[int | None, typer.Option(help="Trainings per learner, of at most 50.")] = None,
+    fast: Annotated[bool, typer.Option(help="A tenth of the tests, fewer checkpoints.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for tables, figures, data and kept results.")] = Path(
+        "out/reproduce"
+    ),
+    page: Annotated[Path | None, typer.Option(help="Also write the page of all results (Markdown).")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; default: one per core.", min=1)] = None,
+    backend: Annotated[str, typer.Option(help="local, dask or ray.")] = "local",
+    address: Annotated[str | None, typer.Option(help="Of the cluster's scheduler.")] = None,
+    listed: Annotated[bool, typer.Option("--list", help="List all names.")] = False,
+) -> None:
+    """Make the thesis' tables and figures again, beside what it printed; picks up where it was interrupted."""
+    from relgym.experiments.chapter4 import command
+    from relgym.experiments.chapter4.reproduce import page as write_page
+
+    if listed:
+        typer.echo(_columns(command.listing()))
+        return
+    if names:
+        request = command.Request(tuple(names), out, batches, fast, workers, backend, address)
+        _show_reproduction(request)
+    elif page is None:
+        raise ConfigError("name what to reproduce (`relgym reproduce --list`), or a --page to write")
+    if page is not None:
+        typer.echo(f"{page}: {', '.join(write_page(out, page))}")
+
+
+@app.command()
 def envs(as_json: Json = False) -> None:
     """List relgym's envs."""
     import gymnasium
@@ -184,6 +224,23 @@ def envs(as_json: Json = False) -> None:
             )
             found[spec.id] = lines[0]
     _echo_json(found) if as_json else typer.echo(_columns(found))
+
+
+@app.command()
+def dyna(
+    out: Annotated[Path, typer.Option(help="Folder for the picture and the runs.")] = Path("out/dyna"),
+    steps: Annotated[int, typer.Option(help="Real steps of each agent.", min=1)] = 1500,
+    seed: Seed = 0,
+    learned: Annotated[bool, typer.Option(help="Learn reward and termination too.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Let SAC learn to push a truck to its goal, with a model to dream in and without one (needs sb3)."""
+    from relgym.experiments.dyna_demo import demonstrate
+
+    out.mkdir(parents=True, exist_ok=True)
+    with _progress() as bar:
+        shown = demonstrate(out, steps=steps, seed=seed, learned=learned, bar=bar)
+    _echo_json(shown) if as_json else typer.echo(shown)
 
 
 @app.command()
@@ -227,6 +284,22 @@ def _demonstrate(shown: Demonstration, out: Path, seed: int) -> tuple[DemoOutcom
     return outcome, trajectories(env.model, shown, seed=figures.seed)
 
 
+def _show_reproduction(request: Any) -> None:
+    """Run jobs under a progress bar; print every table as it is made."""
+    from relgym.experiments.chapter4.command import remaining, reproduce
+    from relgym.experiments.jobs.run import Progress as Standing
+
+    with _progress(TextColumn("{task.fields[left]}")) as bar:
+        task = bar.add_task("tasks", total=None, left="")
+        for event in reproduce(request):
+            if isinstance(event, Standing):
+                bar.update(task, total=event.total, completed=event.done, left=remaining(event))
+            else:
+                head = f"{event.name}: {event.title} ({event.source})"
+                typer.echo(f"{head}\n{'=' * len(head)}\n{event.text}\n")
+    typer.echo(f"Written to {request.out}")
+
+
 def _demonstration(world: str) -> Demonstration:
     from relgym.experiments.demo import demonstrations
 
@@ -263,8 +336,9 @@ def _report(model: Any, digits: int = 7) -> Any:
     return report(model, digits=digits)
 
 
-def _progress() -> Progress:
-    columns = (TextColumn("{task.description:>6}"), BarColumn(40), MofNCompleteColumn(), TimeElapsedColumn())
+def _progress(*more: ProgressColumn) -> Progress:
+    basic = (TextColumn("{task.description:>6}"), BarColumn(40), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (*basic, *more)
     return Progress(*columns, console=Console(stderr=True), transient=not sys.stderr.isatty())
 
 

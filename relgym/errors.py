@@ -2,6 +2,7 @@
 
 __all__ = [
     "ActionError",
+    "ClusterError",
     "ConfigError",
     "ModelFileError",
     "ObservationError",
@@ -9,6 +10,7 @@ __all__ = [
     "RelgymError",
     "SchemaError",
     "ShapeError",
+    "StoreError",
 ]
 
 
@@ -42,3 +44,11 @@ class ModelFileError(RelgymError, ValueError):
 
 class QueryError(RelgymError, LookupError):
     """Raised when a model is asked about a target, object or type that it doesn't know."""
+
+
+class ClusterError(RelgymError, ConnectionError):
+    """Raised when no cluster answers at the given address."""
+
+
+class StoreError(RelgymError, OSError):
+    """Raised when a kept result is damaged or missing, or can't be written (no space left, no permission)."""

@@ -10,20 +10,40 @@ if __name__ != "relgym.wrappers":
     )
 
 _HOMES = {
+    "ActionRepeat": "relgym.wrappers.action_repeat",
+    "Angle": "relgym.envs.views",
+    "FlatView": "relgym.wrappers.flat",
+    "FunctionView": "relgym.envs.views",
     "ModelLearner": "relgym.wrappers.model_learner",
+    "NumbersView": "relgym.envs.views",
+    "Part": "relgym.envs.views",
     "Prequential": "relgym.wrappers.prequential",
-    "SceneView": "relgym.wrappers.views",
+    "Rows": "relgym.envs.views",
+    "SceneView": "relgym.envs.views",
+    "Static": "relgym.envs.views",
     "StepReport": "relgym.wrappers.prequential",
-    "View": "relgym.wrappers.views",
+    "TableView": "relgym.envs.views",
+    "VectorModelLearner": "relgym.wrappers.vector_model_learner",
+    "View": "relgym.envs.views",
     "view_of": "relgym.wrappers.views",
 }
 """Where each public name lives; loaded on first use."""
 
 __all__ = [
+    "ActionRepeat",
+    "Angle",
+    "FlatView",
+    "FunctionView",
     "ModelLearner",
+    "NumbersView",
+    "Part",
     "Prequential",
+    "Rows",
     "SceneView",
+    "Static",
     "StepReport",
+    "TableView",
+    "VectorModelLearner",
     "View",
     "view_of",
 ]

@@ -4,30 +4,26 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import gymnasium as gym
-from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 
-from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
+from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_action
 from relgym.envs.model_files import EnvRecord
-from relgym.errors import ConfigError, ObservationError
-from relgym.model.prediction import ScenePrediction
-from relgym.model.storage import target_from_json, target_to_json
+from relgym.envs.views import View
+from relgym.errors import ConfigError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Scene, SceneSchema, Target, Transition
-from relgym.wrappers.prequential import Prequential, StepReport, compared
-from relgym.wrappers.views import view_of
+from relgym.scene.objects import Scene
+from relgym.wrappers.follower import BadObservations
+from relgym.wrappers.observer import STARTS, Observer
+from relgym.wrappers.prequential import Prequential
+from relgym.wrappers.settings import PlainTarget
+from relgym.wrappers.study import NOTHING
+from relgym.wrappers.views import ViewLike, view_of
 
 __all__ = ["STARTS", "ModelLearner"]
-
-STARTS = 16
-"""How many first scenes of episodes a model file keeps, for dreams to start from."""
-
-PlainTarget: TypeAlias = Target | str | Sequence[Any]
-"""A target, its name (``"ball.vx"``), or ``(type, property)``."""
 
 
 class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -41,8 +37,11 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     Parameters
     ----------
     env
-        An env whose observations are scenes (`relgym.envs.SceneEnv`), possibly in wrappers that leave its
-        observations and actions as they are.
+        Any env with flat spaces, or whose observations are scenes (`relgym.envs.SceneEnv`), possibly in wrappers.
+    view
+        How its observations and actions become scenes: a view (`relgym.envs.views`), or a function of
+        (observation space, action space) that makes one. Default: the env's own objects if it has a schema, else
+        its numbers as one object, or one per key of a Dict.
     targets
         What to learn, in causal order: `Target`, or its name ``"ball.vx"``. Default: the schema's targets, and
         if it names none, every property that changes.
@@ -53,24 +52,24 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         Whether to learn from the start on; see `learning`.
     predict
         Whether to predict before each step. Default true; false saves the time, and then nothing is counted.
+    learn_reward, learn_termination
+        Whether these are learned too, as properties of a bodiless object `task`.
+    bad_observations
+        What to do with NaN, infinity, wrong lengths, unknown objects, objects that changed their type:
+        ``"raise"`` (default) `ObservationError`, or ``"skip"`` them, counted in `skipped`.
+    background
+        Learn in a process of its own, behind a queue of at most this many transitions; steps then report nothing,
+        and `model` and `prequential` are those of the last `catch_up`. What finds the queue full is left out, and
+        counted in `dropped`. Default ``None``: learn in `step`.
     model
         A model file to go on from, instead of an empty model; it keeps its targets and config.
     window
         How many steps count as the latest in `prequential`.
 
-    Attributes
-    ----------
-    model : WorldModel
-        What was learned; through other wrappers: ``env.get_wrapper_attr("model")``.
-    view : View
-        How observations and actions become scenes.
-    prequential : Prequential
-        How many predictions were wrong, in total and lately.
-
     Raises
     ------
     ConfigError
-        A vector env, an env without a schema, changed spaces, unknown parameters, or a model of another world.
+        A vector env, spaces that need a view of the user's, unknown parameters, or a model of another world.
 
     Notes
     -----
@@ -92,44 +91,59 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         self,
         env: gym.Env[Any, Any],
         *,
+        view: ViewLike = None,
         targets: Sequence[PlainTarget] | None = None,
         config: ModelConfig | Mapping[str, Any] | None = None,
         learn: bool = True,
         predict: bool = True,
+        learn_reward: bool = False,
+        learn_termination: bool = False,
+        bad_observations: BadObservations = "raise",
+        background: int | None = None,
         model: str | os.PathLike[str] | None = None,
         window: int = 1000,
     ) -> None:
         _refuse_vector_env(env)
-        chosen = None if targets is None else [_target(t) for t in targets]
-        settings = None if config is None else _config(config)
+        self._observer = Observer(
+            view_of(env, view, reward=learn_reward, terminated=learn_termination),
+            env.observation_space,
+            env.action_space,
+            targets=targets,
+            config=config,
+            model=model,
+            learn=learn,
+            predict=predict,
+            window=window,
+            background=background,
+            bad_observations=bad_observations,
+            metadata={
+                "env": None if env.spec is None else env.spec.id,
+                "render_fps": env.metadata.get("render_fps"),
+            },
+        )
         # Plain data only: recorded arguments are deep-copied, and a learner among them would be forked.
         RecordConstructorArgs.__init__(
             self,
-            targets=None if chosen is None else [target_to_json(t) for t in chosen],
-            config=None if settings is None else settings.to_json(),
+            **self._observer.arguments,
+            view=view,
             learn=learn,
             predict=predict,
-            model=None if model is None else os.fspath(model),
+            learn_reward=learn_reward,
+            learn_termination=learn_termination,
+            bad_observations=bad_observations,
+            background=background,
             window=window,
         )
         gym.Wrapper.__init__(self, env)
-        self.view = view_of(env)
-        self.prequential = Prequential(window)
-        self.model = _model(self.view.schema, settings, chosen, model)
-        self.learning = learn
-        self._predict = predict
-        self._scene: Scene | None = None
-        self._over = False
-        self._starts: list[Scene] = []
 
     # ------------------------------------------------------------------ the Gymnasium contract
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; `ObservationError` when its first observation is no scene (the model is unchanged)."""
-        self._scene, self._over = None, False
+        self._observer.followers[0].forget()
         observation, info = self.env.reset(seed=seed, options=options)
-        self._begin(observation)
+        self._observer.begin({0: (observation, info)})
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -140,58 +154,92 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         ActionError
             An action outside the action space; model and env are unchanged.
         ObservationError
-            The next observation is no scene of this world. The env has stepped, the model is unchanged;
-            `reset` begins anew.
+            The next observation is no scene of this world, and such aren't skipped. The env has stepped, the model
+            is unchanged; `reset` begins anew.
         """
         checked = checked_action(self.env.action_space, action)
-        if self._over:
+        observer, follower = self._observer, self._observer.followers[0]
+        if follower.over:
             return self._step_over(action)
-        before = self.view.with_action(self.scene, checked)
-        prediction = self.model.predict_one(before) if self._predict else None
+        before = follower.act(checked)
+        prediction = observer.expect(before)
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self._scene = None  # until the next observation proves sound
-        after = self._seen(observation)
-        report = self._take_up(before, prediction, after)
-        self._scene, self._over = after, bool(terminated or truncated)
+        follower.over = bool(terminated or truncated)
+        report = observer.follow(
+            0, before, prediction, observation, info, reward=reward, terminated=bool(terminated)
+        )
         return observation, reward, terminated, truncated, {**info, "relgym": report}
+
+    def _step_over(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """A step after an episode's end: an `Autoreset` inside resets, and the action means nothing."""
+        follower = self._observer.followers[0]
+        follower.forget()
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._observer.begin({0: (observation, info)})
+        follower.over = bool(terminated or truncated)
+        return observation, reward, terminated, truncated, {**info, "relgym": NOTHING}
+
+    def close(self) -> None:
+        """Close the env, and end the background process if there is one, once it has learned all."""
+        self._observer.close()
+        super().close()
 
     # ------------------------------------------------------------------ learning
     @property
+    def view(self) -> View:
+        """How observations and actions become scenes; final after the first reset, where angles are open."""
+        return self._observer.view
+
+    @property
+    def model(self) -> WorldModel:
+        """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``."""
+        return self._observer.study.model
+
+    @property
+    def prequential(self) -> Prequential:
+        """How many predictions were wrong, in total and lately."""
+        return self._observer.study.prequential
+
+    @property
     def learning(self) -> bool:
         """Whether transitions are being learned from; `ConfigError` to ask it of a model without history."""
-        return self._learn
+        return self._observer.study.learning
 
     @learning.setter
     def learning(self, learn: bool) -> None:
-        if learn and self.model.frozen:
-            raise ConfigError(
-                "this model was loaded without its history and can only predict: save it with "
-                "save(path, history=True), or pass learn=False"
-            )
-        self._learn = learn
+        self._observer.study.learning = learn
 
     def pause(self) -> None:
         """Stop learning; predictions go on and are counted. ``learning = True`` goes on."""
         self.learning = False
 
     @property
+    def skipped(self) -> int:
+        """How many bad observations were skipped."""
+        return self._observer.skipped
+
+    @property
+    def dropped(self) -> int:
+        """How many transitions found the queue to the background process full."""
+        return self._observer.study.dropped
+
+    def catch_up(self) -> WorldModel:
+        """Wait until the background process has learned all it was sent; the model as it then is."""
+        return self._observer.study.catch_up()
+
+    @property
     def scene(self) -> Scene:
         """The current scene, without an action; `ResetNeeded` before the first reset or after a bad observation."""
-        if self._scene is None:
-            raise ResetNeeded("no current scene: call reset() first")
-        return self._scene
+        return self._observer.followers[0].scene
 
     # ------------------------------------------------------------------ files
     @property
     def record(self) -> EnvRecord:
         """What a model file says of the env: spaces and the first scenes of the first episodes."""
-        spec = self.env.spec
-        known = {"env": None if spec is None else spec.id, "render_fps": self.env.metadata.get("render_fps")}
-        metadata = {name: value for name, value in known.items() if value is not None}
-        return EnvRecord(self.env.observation_space, self.env.action_space, tuple(self._starts), metadata)
+        return self._observer.record
 
     def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
-        """Write the model, the env's spaces and some first scenes to one file, atomically.
+        """Write the model, the env's spaces and view and some first scenes to one file, atomically.
 
         ``gym.make("relgym/LearnedModel-v0", model=path)`` needs nothing else.
 
@@ -207,88 +255,12 @@ class ModelLearner(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         ConfigError
             A space that can't be written.
         """
-        self.model.extra = self.record.to_json()
-        self.model.save(path, history=history)
-
-    # ------------------------------------------------------------------ helpers
-    def _begin(self, observation: Any) -> None:
-        self._scene = self._seen(observation)
-        if len(self._starts) < STARTS:
-            self._starts.append(self._scene)
-            # So that model.save, too, writes a file to dream from.
-            self.model.extra = self.record.to_json()
-
-    def _seen(self, observation: Any) -> Scene:
-        try:
-            return self.view.scene(observation)
-        except ObservationError as error:
-            raise ObservationError(
-                f"{error} (the env has moved on, the model is unchanged: call reset() to begin anew)"
-            ) from error
-
-    def _step_over(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """A step after an episode's end: an `Autoreset` inside resets, and the action means nothing."""
-        self._scene, self._over = None, False
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        self._begin(observation)
-        self._over = bool(terminated or truncated)
-        return observation, reward, terminated, truncated, {**info, "relgym": StepReport(None, {}, (), None)}
-
-    def _take_up(self, before: Scene, prediction: ScenePrediction | None, after: Scene) -> StepReport:
-        residuals, wrong = compared(prediction, after)
-        if prediction is not None:
-            self.prequential.count(residuals, wrong)
-        learned = self.model.learn_one(Transition(before, after)) if self._learn else None
-        return StepReport(prediction, residuals, wrong, learned)
+        self._observer.save(path, history=history)
 
 
 def _refuse_vector_env(env: Any) -> None:
     if isinstance(env, gym.vector.VectorEnv):
         raise ConfigError(
-            "expected a single env, got a vector env, whose envs a single learner can't follow; wrap each of them "
-            "(gym.make_vec(id, num_envs=n, vectorization_mode='sync', wrappers=[ModelLearner])): each then has "
-            "a model of its own"
+            "expected a single env, got a vector env: VectorModelLearner(env) learns one model from all of its envs, "
+            "and gym.make_vec(id, num_envs=n, vectorization_mode='sync', wrappers=[ModelLearner]) one from each"
         )
-
-
-def _target(given: PlainTarget) -> Target:
-    if isinstance(given, Target):
-        return given
-    if not isinstance(given, str):
-        return target_from_json([*given, []] if len(given) == 2 else list(given))
-    type_name, dot, prop = given.rpartition(".")  # type names may hold dots
-    if not (dot and type_name and prop):
-        raise ConfigError(f"target {given!r}: expected 'ball.vx', ('ball', 'vx') or a Target")
-    return Target(type_name, prop)
-
-
-def _config(given: ModelConfig | Mapping[str, Any]) -> ModelConfig:
-    if isinstance(given, ModelConfig):
-        return given
-    try:
-        halves = {
-            "clustering": ClusteringConfig(**given.get("clustering", {})),
-            "classification": ClassificationConfig(**given.get("classification", {})),
-        }
-        return ModelConfig(**{**given, **halves})
-    except TypeError as error:
-        raise ConfigError(f"config={dict(given)!r}: {error}; see relgym.config.ModelConfig") from None
-
-
-def _model(
-    schema: SceneSchema,
-    config: ModelConfig | None,
-    targets: Sequence[Target] | None,
-    path: str | os.PathLike[str] | None,
-) -> WorldModel:
-    if path is None:
-        return WorldModel(schema, config, targets=targets)
-    if config is not None or targets is not None:
-        raise ConfigError("a loaded model keeps its targets and config: pass either model or those")
-    model = WorldModel.load(path)
-    if model.schema != schema:
-        raise ConfigError(
-            f"{path}: the model was learned in another world (objects {list(model.schema.order)}) than the env's "
-            f"(objects {list(schema.order)}); make the env with the arguments it was learned with"
-        )
-    return model

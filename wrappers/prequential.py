@@ -16,7 +16,7 @@ from relgym.scene.objects import Scene
 __all__ = ["WRONG", "Key", "Prequential", "StepReport", "compared"]
 
 WRONG = 1e-9
-"""A prediction off by more than this, in units of the property, counts as wrong."""
+"""A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
 
 Key: TypeAlias = tuple[str, str]
 """An object and one of its properties."""
@@ -34,7 +34,7 @@ class StepReport:
         Observed minus predicted value of every target, by (object, property), in units of the property;
         objects that vanished have none.
     wrong
-        Those that were off by more than 1e-9, or that no mode predicted.
+        Those that were off by more than 1e-9 and what rounding explains, or that no mode predicted.
     learned
         What the transition taught; ``None`` when it wasn't learned from.
     """
@@ -108,8 +108,20 @@ class Prequential:
         return table(["target", "predictions", "wrong", latest], rows)
 
 
-def compared(prediction: ScenePrediction | None, after: Scene) -> tuple[dict[Key, float], tuple[Key, ...]]:
-    """Residuals of a prediction, and which parts of it were wrong: see `StepReport`."""
+def compared(
+    prediction: ScenePrediction | None, after: Scene, precision: float = 0.0
+) -> tuple[dict[Key, float], tuple[Key, ...]]:
+    """Residuals of a prediction, and which parts of it were wrong: see `StepReport`.
+
+    Parameters
+    ----------
+    prediction
+        What was said; ``None``: nothing.
+    after
+        What came.
+    precision
+        Relative precision of what came (`View.precision`); of numbers below 1 it is absolute.
+    """
     residuals: dict[Key, float] = {}
     wrong: list[Key] = []
     layout = after.layout
@@ -118,7 +130,8 @@ def compared(prediction: ScenePrediction | None, after: Scene) -> tuple[dict[Key
             continue
         key = (part.object, part.property)
         column = layout.column(layout.index(part.object), part.property)
-        residuals[key] = float(after.vector[column]) - part.value
-        if not part.ok or not abs(residuals[key]) <= WRONG:
+        came = float(after.vector[column])
+        residuals[key] = came - part.value
+        if not part.ok or not abs(residuals[key]) <= max(WRONG, precision * max(1.0, abs(came))):
             wrong.append(key)
     return residuals, tuple(wrong)

@@ -74,6 +74,12 @@ class ModeClassifier:
         """Pairs that wait to be learned anew, the most contradicted first."""
         return tuple(p.modes for p in sorted(self._pairs.values(), key=lambda p: p.urgency) if p.stale)
 
+    @property
+    def relations(self) -> frozenset[str]:
+        """Names of the binary relations that clauses ask for: `rank_batch` needs no others."""
+        used = self._familiarity().used
+        return frozenset(self.vocabulary.relations[column] for _, columns, _ in used for column in columns)
+
     # ----- asking -----
 
     def rank(self, example: Example, values: Sequence[float]) -> Ranking:
@@ -180,6 +186,23 @@ class ModeClassifier:
         weights = self.exemplars.weights()
         self.counts = {m: float(weights[self.exemplars.assigned == m].sum()) for m in modes}
         self._update_pairs(unchanged)
+        self._reset_caches()
+
+    def widen(self, vocabulary: Vocabulary, own: Floats) -> None:
+        """Other own features from here on; everything is learned again of the examples that are remembered.
+
+        Parameters
+        ----------
+        vocabulary
+            The new names; those of relations and pairs stay.
+        own
+            Values of the own features for every slot of `exemplars`, shape ``(n, len(vocabulary.own))``.
+        """
+        self.vocabulary = vocabulary
+        self.exemplars.widen(vocabulary, own)
+        self._pairs, self._view = {}, None
+        self._reset_caches()
+        self._update_pairs(())
         self._reset_caches()
 
     def refresh(self, budget: float = math.inf) -> int:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.exemplars import Exemplars
 from relgym.classification.learning import foil_config
-from relgym.classification.roles import Places, RoleDescription, RoleKind, fillings
+from relgym.classification.roles import Option, Places, RoleDescription, RoleKind, fillings, stances
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
 from relgym.logic.clause import Definition
@@ -42,6 +42,9 @@ class RoleClassifier:
     Negative examples are the other objects of the role's type in the same example; if there never are any,
     any object of the type will do. Unlike the original, which went through the roles greedily, all roles are
     assigned together, so that none takes an object that only another one could.
+
+    Where descriptions leave a choice, objects that have all that players so far had in common come first. If
+    that leaves a choice too, and examples never did, then the situation is a new one: a caller may want to know.
     """
 
     def __init__(
@@ -61,12 +64,14 @@ class RoleClassifier:
         self.errors = 0.0
         self.contradictions = 0.0
         self.stale = bool(self.kinds)
-        self._answers: dict[tuple[Any, ...], Places | None] = {}
+        self._answers: dict[tuple[Any, ...], tuple[Places | None, bool]] = {}
         self._extensions: dict[tuple[Any, ...], list[set[int]]] = {}
 
     # ----- asking -----
 
-    def assign(self, example: Example, order: Sequence[int] | None = None) -> Places | None:
+    def assign(
+        self, example: Example, order: Sequence[int] | None = None, *, sure: bool = False
+    ) -> Places | None:
         """Object playing each role, or none if some role can't be filled.
 
         Parameters
@@ -75,11 +80,13 @@ class RoleClassifier:
             The example.
         order
             All object indices, the ones to prefer first where nothing else decides; default: ascending.
+        sure
+            Whether to fill no role where nothing but `order` decides, unless that was so in examples too.
 
         Notes
         -----
-        The assignment with the highest sum of log-odds, no object twice. Answers are kept per relational
-        state.
+        The assignment with the highest sum of log-odds, no object twice; of equal ones that with most typical
+        players. Answers are kept per relational state.
         """
         rank = None if order is None else tuple(order)
         key = (example.target, example.table.tobytes(), example.unary.tobytes(), rank)
@@ -87,7 +94,8 @@ class RoleClassifier:
             if len(self._answers) >= _MOST_ANSWERS:
                 self._answers.clear()
             self._answers[key] = self._search(example, rank or tuple(range(example.table.shape[-1])))
-        return self._answers[key]
+        found, single = self._answers[key]
+        return found if single or self.errors > 0 or not sure else None
 
     def describe(self) -> list[str]:
         """One line per kind of role, as in Figure 3.8."""
@@ -104,6 +112,10 @@ class RoleClassifier:
         if not self.kinds:
             return False
         self.seen += 1.0
+        stance = stances(example)
+        for description in self.descriptions:
+            if description.witness(stance[[roles[at] for at in description.places]]):
+                self._answers.clear()
         wrong = any(
             described != {roles[at] for at in description.places}
             for description, described in zip(self.descriptions, self._described(example), strict=True)
@@ -139,6 +151,9 @@ class RoleClassifier:
             **{name: getattr(self, name) for name in names},
             "kinds": [[kind.type, [list(term) for term in kind.weights]] for kind in self.kinds],
             "definitions": [d.definition and d.definition.to_dict() for d in self.descriptions],
+            "common": [
+                None if d.common is None else np.flatnonzero(d.common).tolist() for d in self.descriptions
+            ],
         }
 
     @classmethod
@@ -148,8 +163,11 @@ class RoleClassifier:
         """Inverse of `to_dict`."""
         kinds = [RoleKind(t, tuple((str(p), float(w)) for p, w in weights)) for t, weights in data["kinds"]]
         self = cls(vocabulary, kinds, config)
-        for description, plain in zip(self.descriptions, data["definitions"], strict=True):
-            description.definition = plain and Definition.from_dict(plain)
+        stance = np.arange(2 * len(vocabulary.relations) + len(vocabulary.unary))
+        known = zip(self.descriptions, data["definitions"], data["common"], strict=True)
+        for description, definition, common in known:
+            description.definition = definition and Definition.from_dict(definition)
+            description.common = None if common is None else np.isin(stance, common)
         for name in ("seen", "learned", "errors", "contradictions", "stale"):
             setattr(self, name, data[name])
         return self
@@ -172,10 +190,17 @@ class RoleClassifier:
             for each in np.flatnonzero(type_row[row] & view.exists[row]).tolist():
                 if each != target:
                     (positives if each in players else negatives).append((row, target, each))
+        for_, against = (np.array(some, dtype=np.int64).reshape(-1, 3) for some in (positives, negatives))
+        row, target, player = for_.T
+        parts = (
+            view.table[row, :, player, target],
+            view.table[row, :, target, player],
+            view.unary[row, :, player],
+        )
+        description.witness(np.concatenate(parts, axis=1))
         if not negatives:
             description.definition = None
             return 0
-        for_, against = np.array(positives, dtype=np.int64), np.array(negatives, dtype=np.int64)
         description.definition = learn(
             view.facts("all", self._scope),
             for_,
@@ -186,25 +211,34 @@ class RoleClassifier:
         )
         return description.definition.work
 
-    def _search(self, example: Example, order: Places) -> Places | None:
-        """Joint search over all kinds for the assignment with the highest score."""
-        world = self._world(example)
-        options = []
-        for description in self.descriptions:
-            able = set(self._of_type(description, example))
-            scored = [
-                (score, -at, each)
-                for at, each in enumerate(order)
-                if each in able
-                if (score := description.score(world, example.target, each)) is not None
-            ]
-            # All others together can take no more objects than there are roles: the best few are enough.
-            options.append(sorted(scored, reverse=True)[: len(self.kinds)])
-        best: tuple[float, Places] | None = None
-        for total, chosen in fillings(self.descriptions, options, frozenset()):
-            if best is None or total > best[0] + 1e-12:
-                best = total, tuple(each for _, each in sorted(chosen))
-        return None if best is None else best[1]
+    def _search(self, example: Example, order: Places) -> tuple[Places | None, bool]:
+        """Joint search over all kinds for the assignment with the highest score; whether no other is as good."""
+        options = [self._options(description, example, order) for description in self.descriptions]
+        best: tuple[tuple[float, int], Places] | None = None
+        single = True
+        for (score, typical), chosen in fillings(self.descriptions, options, frozenset()):
+            total = round(score, 9), typical  # the same scores summed in another order are the same score
+            single &= best is None or total != best[0]
+            if best is None or total > best[0]:
+                best, single = (total, tuple(each for _, each in sorted(chosen))), True
+        if best is None:
+            return None, True
+        return best[1], single and best[0][1] == len(self.kinds)
+
+    def _options(self, description: RoleDescription, example: Example, order: Places) -> list[Option]:
+        """The best candidates, best first.
+
+        They are one more than all roles together can take, which is enough to tell whether there is a choice.
+        """
+        world, able = self._world(example), set(self._of_type(description, example))
+        typical = description.typical(stances(example))
+        scored = [
+            (score, bool(typical[each]), -at, each)
+            for at, each in enumerate(order)
+            if each in able
+            if (score := description.score(world, example.target, each)) is not None
+        ]
+        return sorted(scored, reverse=True)[: len(self.kinds) + 1]
 
     def _described(self, example: Example) -> list[set[int]]:
         """Objects of its type for which each description holds; kept per relational state."""

@@ -1,4 +1,9 @@
-"""Kinds of roles, what is known of their players, and the ways to fill all roles at once (§3.5)."""
+"""Kinds of roles, what is known of their players, and the ways to fill all roles at once (§3.5).
+
+References
+----------
+G. D. Plotkin, "A note on inductive generalization", Machine Intelligence 5 (1970).
+"""
 
 from __future__ import annotations
 
@@ -8,16 +13,19 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import TypeAlias
 
+import numpy as np
+
+from relgym.classification.examples import Bools, Example
 from relgym.logic.clause import Coverage, Definition
 from relgym.logic.csp import World, satisfiable
 
-__all__ = ["Option", "Places", "RoleDescription", "RoleKind", "fillings"]
+__all__ = ["Option", "Places", "RoleDescription", "RoleKind", "fillings", "stances"]
 
 Places: TypeAlias = tuple[int, ...]
 """Object index per role, or role numbers."""
 
-Option: TypeAlias = tuple[float, int, int]
-"""(score, minus its place in the order of preference, object index) of a candidate."""
+Option: TypeAlias = tuple[float, bool, int, int]
+"""(score, is it typical, minus its place in the order of preference, object index) of a candidate."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -48,11 +56,31 @@ class RoleDescription:
         Positions of the roles of this kind.
     definition
         ``fulfils(A, B)``: B plays the role for target A; none: any object of the type does.
+    common
+        What all players had in common (see `stances`), shape ``(2 R + U,)``; none: no player was seen.
     """
 
     kind: RoleKind
     places: Places
     definition: Definition | None = None
+    common: Bools | None = None
+
+    def witness(self, players: Bools) -> bool:
+        """Take in how some players stood, shape ``(n, 2 R + U)``; whether less is common to all than before."""
+        before, shared = self.common, np.logical_and.reduce(players, axis=0)
+        self.common = shared if before is None else before & shared
+        return before is None or bool((before & ~shared).any())
+
+    def typical(self, stance: Bools) -> Bools:
+        """Which objects have all that players had in common: shape ``(K, 2 R + U)`` → ``(K,)``.
+
+        The least general description (Plotkin 1970) of players alone, whereas `definition` is the most general one
+        that keeps the others out. It says what is plausible where others of their type were never seen.
+        """
+        if self.common is None:
+            return np.zeros(len(stance), dtype=np.bool_)
+        typical: Bools = np.logical_and.reduce(stance[:, self.common], axis=1)
+        return typical
 
     def score(self, world: World, target: int, candidate: int) -> float | None:
         """Log-odds that a candidate plays the role; none if nothing speaks for it."""
@@ -76,22 +104,33 @@ class RoleDescription:
         return f"{self.kind.type}: {rule}"
 
 
+def stances(example: Example) -> Bools:
+    """How each object stands to the target and the target to it, and what it is: shape ``(K, 2 R + U)``."""
+    towards, back = example.table[:, :, example.target], example.table[:, example.target]
+    return np.concatenate([towards, back, example.unary]).T
+
+
 def fillings(
     descriptions: Sequence[RoleDescription],
     options: Sequence[Sequence[Option]],
     taken: frozenset[int],
-) -> Iterator[tuple[float, list[tuple[int, int]]]]:
-    """(score, [(role, object), ...]) of all ways to fill all roles without using an object twice."""
+) -> Iterator[tuple[tuple[float, int], list[tuple[int, int]]]]:
+    """All ways to fill all roles without using an object twice.
+
+    Yields
+    ------
+    ((score, number of typical players), [(role, object), ...])
+    """
     if not descriptions:
-        yield 0.0, []
+        yield (0.0, 0), []
         return
-    free = [option for option in options[0] if option[2] not in taken]
+    free = [option for option in options[0] if option[3] not in taken]
     for chosen in combinations(free, len(descriptions[0].places)):
-        players = [each for _, _, each in sorted(chosen, key=lambda option: -option[1])]
+        players = [each for *_, each in sorted(chosen, key=lambda option: -option[2])]
         mine = list(zip(descriptions[0].places, players, strict=True))
-        score = sum(score for score, _, _ in chosen)
-        for rest, others in fillings(descriptions[1:], options[1:], taken | set(players)):
-            yield score + rest, mine + others
+        score, typical = sum(option[0] for option in chosen), sum(option[1] for option in chosen)
+        for (rest, more), others in fillings(descriptions[1:], options[1:], taken | set(players)):
+            yield (score + rest, typical + more), mine + others
 
 
 def _log_odds(coverage: Coverage) -> float:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
-from relgym.scene.objects import ObjectType
 
 __all__ = ["ExampleTable"]
 
@@ -99,7 +98,7 @@ class ExampleTable:
 
     def to_json(self) -> dict[str, Any]:
         """Signatures and relational states; the rows are in `to_arrays`."""
-        signatures = [[[t.name for t in s.types], [list(g) for g in s.given]] for s in self.signatures]
+        signatures = [[t.name for t in s.types] for s in self.signatures]
         return {"signatures": signatures, "strata": [key.hex() for key in self._strata]}
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -107,12 +106,14 @@ class ExampleTable:
         return {"x": self.x, "signature": self.signature_ids, "stratum": self.strata, "bodies": self.bodies}
 
     def restore(
-        self, data: dict[str, Any], arrays: dict[str, NDArray[Any]], types: dict[str, ObjectType]
+        self,
+        data: dict[str, Any],
+        arrays: dict[str, NDArray[Any]],
+        signature_of: Callable[[tuple[str, ...]], SlotSignature],
     ) -> None:
-        """Take over what `to_json` and `to_arrays` wrote."""
-        for names, given in data["signatures"]:
-            pairs = tuple((str(t), str(p)) for t, p in given)
-            self.signature_id(SlotSignature(tuple(types[name] for name in names), pairs))
+        """Take over what `to_json` and `to_arrays` wrote; `signature_of` knows the signature of some types' names."""
+        for names in data["signatures"]:
+            self.signature_id(signature_of(tuple(names)))
         self._strata = {bytes.fromhex(key): k for k, key in enumerate(data["strata"])}
         self._x, self._size = arrays["x"].copy(), len(arrays["x"])
         self._signature, self._stratum = arrays["signature"].copy(), arrays["stratum"].copy()

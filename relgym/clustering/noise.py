@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from statistics import NormalDist
+
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.numeric.stepwise import forward_stepwise
+from relgym.numeric.stepwise import forward_stepwise, least_squares
 
 __all__ = ["estimate_noise", "refuted", "rounding_noise"]
+
+WINDOW = 16
+"""Examples in a window."""
+
+TERMS = WINDOW // 3
+"""Most weights of a local function."""
+
+SELECTED = 3.0
+"""Choosing the best of many columns lowers the spread of pure noise by at most about this factor."""
 
 MOST_WINDOWS = 24
 """At most about this many windows are looked at."""
@@ -21,14 +33,24 @@ EXPLAINED = 0.1
 FEW = 128
 """Fewer examples than this can't tell noise as large as the signal from laws not seen yet."""
 
+MANY = 8
+"""So many different fractions that float32 represents exactly are no coincidence."""
+
+SINGLES = 2.0
+"""The same for numbers that were rounded to single precision when they were observed."""
+
 ROUNDINGS = 32.0
 """A function of a few terms on differences of stored numbers carries at most about this many roundings."""
 
 
-def rounding_noise(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+def rounding_noise(
+    x: NDArray[np.float64], y: NDArray[np.float64], recent: NDArray[np.float64] | None = None
+) -> float:
     """Standard deviation that mere rounding leaves, in units of y.
 
-    Numbers that float32 represents exactly are taken to have been rounded to it.
+    Responses that float32 represents exactly are taken to have been rounded to it, as observations are. What counts
+    then is their own size: a law's terms are rarely much larger than its value, and where they cancel, the estimate
+    from the data says so later. In double precision the columns count too, since the room is there.
 
     Parameters
     ----------
@@ -36,11 +58,23 @@ def rounding_noise(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
         The target object's own columns, shape ``(n, d)``.
     y
         Responses, shape ``(n,)``.
+    recent
+        Recent rows of the target object's own columns. Where one that varies was rounded to single precision, so
+        were the responses, even if something was worked out from them since (an angle from its sine and cosine).
     """
-    scale = max(float(np.abs(x).max(initial=0.0)), float(np.abs(y).max(initial=0.0)), 1e-3)
-    single = bool((y.astype(np.float32).astype(np.float64) == y).all()) and bool(np.any(y != np.round(y)))
-    step = float(np.finfo(np.float32).eps) * 0.25 if single else float(np.finfo(np.float64).eps)
-    return (4.0 if single else ROUNDINGS) * step * scale
+    largest = float(np.abs(y).max(initial=0.0))
+    if bool((y.astype(np.float32).astype(np.float64) == y).all()) and bool(np.any(y != np.round(y))):
+        return SINGLES * float(np.finfo(np.float32).eps) * largest
+    if recent is not None and any(_rounded(column) for column in recent.T):
+        return SINGLES * float(np.finfo(np.float32).eps) * max(largest, 1.0)
+    scale = max(float(np.abs(x).max(initial=0.0)), largest, 1e-3)
+    return ROUNDINGS * float(np.finfo(np.float64).eps) * scale
+
+
+def _rounded(column: NDArray[np.float64]) -> bool:
+    """Whether float32 represents all values of a column exactly, and there are enough of them to tell."""
+    exact = bool((column.astype(np.float32).astype(np.float64) == column).all())
+    return exact and len(np.unique(column[column != np.round(column)])) >= MANY
 
 
 def estimate_noise(
@@ -49,13 +83,16 @@ def estimate_noise(
     strata: NDArray[np.integer],
     *,
     floor: float,
-    window: int = 16,
+    own: int = WINDOW,
 ) -> float:
     """Noise of y about a locally linear function: lower quartile over windows of like examples.
 
-    Consecutive examples in the same relational state mostly share a mode; the spread that a sparse linear
-    function leaves in such a window is noise. Windows that straddle a change of mode leave more, hence
-    the lower quartile.
+    Consecutive examples in the same relational state mostly share a mode; the spread that a linear function leaves
+    in such a window is noise. Windows that straddle a change of mode leave more, hence the lower quartile; it is
+    corrected for what a quartile of so many spreads of so few examples falls short by.
+
+    Where the target's own columns leave no more than other objects' could explain away by chance, they make the
+    function. Choosing among many columns finds some that fit the noise, and underrates it.
 
     Parameters
     ----------
@@ -65,19 +102,52 @@ def estimate_noise(
         Responses and relational states, shape ``(n,)``.
     floor
         Rounding noise; the estimate is never smaller, and equals it unless it is clearly larger.
+    own
+        How many of the leading columns are the target's own and bodiless objects'.
     """
-    spreads = []
-    starts = range(0, len(y) - window + 1, max(window // 2, (len(y) - window) // MOST_WINDOWS + 1))
-    for start in starts:
-        part = slice(start, start + window)
-        if (strata[part] != strata[start]).any():
-            continue
-        fit = forward_stepwise(x[part], y[part], sigma=floor, max_terms=window // 3, eliminate=False)
-        spreads.append(np.sqrt(fit.rss / (window - len(fit.columns) - 1)))
-    if not spreads:
+    windows = _windows(strata)
+    if not windows:
         return floor
-    estimate = float(np.quantile(spreads, 0.25))
+    simple = _quartile(
+        [_spread(x[part], y[part], tuple(range(min(own, x.shape[1], TERMS)))) for part in windows]
+    )
+    sparse = _quartile([_least_spread(x[part], y[part], floor) for part in windows])
+    estimate = simple if simple <= SELECTED * sparse else sparse
     return estimate if estimate > 4.0 * floor else floor
+
+
+def _windows(strata: NDArray[np.integer]) -> list[NDArray[np.intp]]:
+    """Runs of consecutive examples of one stratum, other examples in between left out."""
+    found = []
+    for stratum in np.unique(strata):
+        members = np.flatnonzero(strata == stratum)
+        ends = range(WINDOW, len(members) + 1, WINDOW)
+        found += [members[end - WINDOW : end] for end in ends]
+    found.sort(key=lambda window: int(window[0]))
+    return found[:: len(found) // MOST_WINDOWS + 1]
+
+
+def _spread(x: NDArray[np.float64], y: NDArray[np.float64], columns: tuple[int, ...]) -> tuple[float, int]:
+    """Standard deviation about a linear function of given columns, and its degrees of freedom."""
+    fit = least_squares(x, y, columns)
+    freedom = len(y) - len(fit.columns) - 1
+    return float(np.sqrt(fit.rss / freedom)), freedom
+
+
+def _least_spread(x: NDArray[np.float64], y: NDArray[np.float64], floor: float) -> tuple[float, int]:
+    """The same about the best sparse function of any columns."""
+    fit = forward_stepwise(x, y, sigma=floor, max_terms=TERMS, eliminate=False)
+    freedom = len(y) - len(fit.columns) - 1
+    return float(np.sqrt(fit.rss / freedom)), freedom
+
+
+def _quartile(spreads: list[tuple[float, int]]) -> float:
+    """Standard deviation whose estimates from as many windows would have this lower quartile."""
+    values, freedom = [s for s, _ in spreads], float(np.mean([f for _, f in spreads]))
+    share = (0.25 * (len(values) - 1) + 0.5) / len(values)
+    part = 2.0 / (9.0 * freedom)  # Wilson and Hilferty's quantile of chi-square
+    ratio: float = (1.0 - part + NormalDist().inv_cdf(share) * part**0.5) ** 3
+    return float(np.quantile(values, 0.25)) / math.sqrt(ratio)
 
 
 def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.float64]) -> bool:

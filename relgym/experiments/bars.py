@@ -16,6 +16,7 @@ from relgym.experiments.accuracy import AXES, Outcome, accuracy, ball_bars
 from relgym.experiments.bar import Measure, report
 from relgym.experiments.cost import query_bars, query_cost, step_bars, step_cost
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.noise import SIGMAS, VARIANCES, Sigma, best_sigmas, noise_bars, noise_outcomes
 from relgym.experiments.online import follow, last, learned
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.experiments.stream import box_then_ramp, prequential_bars, same_model, stream_bars
@@ -113,6 +114,24 @@ def _bystanders(request: Request) -> Section:
     return "truck-push, bystanders and 2, 3 and 4 boxes", bystander_bars(beside, counted), []
 
 
+def _noise(request: Request) -> Section:
+    # Noise larger than expected is known to teach nothing, at a high price: every step is searched in vain.
+    hand = {variance: [sigma for sigma in SIGMAS if sigma >= variance**0.5] for variance in VARIANCES}
+    best = best_sigmas(noise_outcomes(training=TUNING_SEEDS[:1], test=TUNING_TEST_SEED, sigmas=hand))
+    sigmas: dict[float, list[Sigma]] = {}
+    for (variance, _), sigma in best.items():
+        chosen = sigmas.setdefault(variance, ["auto"])
+        chosen += [sigma] if sigma not in chosen else []
+    outcomes = []
+    for each in noise_outcomes(training=request.training, test=request.tests[0], sigmas=sigmas):
+        outcomes.append(each)
+        print(
+            f"  variance {each.variance:g}, sigma {each.sigma}, seed {each.seed}: {dict(each.errors)}",
+            flush=True,
+        )
+    return "noise, experiment 1", noise_bars(outcomes, best), []
+
+
 ROWS: Final[Mapping[int, Callable[[Request], Section]]] = {
     1: _ball(1),
     2: _ball(2),
@@ -123,6 +142,7 @@ ROWS: Final[Mapping[int, Callable[[Request], Section]]] = {
     8: _queries,
     9: _per_block,
     10: _bystanders,
+    11: _noise,
 }
 """Row 4, roll-outs, is measured with rows 1 and 2."""
 

@@ -86,20 +86,33 @@ def per_block_bars(outcomes: Iterable[PerBlockOutcome]) -> list[Measure]:
 
 @dataclass(frozen=True, slots=True)
 class BystanderOutcome:
-    """Share of wrong predictions on fresh scenes, by number of bystanders."""
+    """What bystanders do to a model.
+
+    Attributes
+    ----------
+    wrong
+        Share of wrong predictions on fresh scenes, by number of bystanders.
+    guessed
+        Share of scenes with bystanders of which a model that never saw any says something wrong, by their number.
+    """
 
     wrong: dict[int, float]
+    guessed: dict[int, float]
 
 
 def bystanders(*, seed: int, test: int, config: ModelConfig | None = None) -> BystanderOutcome:
     """Learn scenes in which 2 to 7 boxes stand beside the track, shuffled; test on fresh ones.
 
-    Without any bystander in the lessons nothing could teach that a box has to be in the row to count.
+    Without any bystander in the lessons nothing teaches that a box has to be in the row to count: a second model,
+    which saw none, should fall silent where it can't tell.
     """
     rng = np.random.default_rng(seed)
     taught = [b for n in BYSTANDERS for b in _beside(islice(_rows(n, seed), n % 2, None, 2))]
     model = learned([taught[k] for k in rng.permutation(len(taught))], config=config)
-    return BystanderOutcome({n: _wrong(model, _beside(_rows(n, test, fresh=True))) for n in BYSTANDERS})
+    alone = learned(_beside(_rows(0, seed)), config=config)
+    fresh = {n: _beside(_rows(n, test, fresh=True)) for n in BYSTANDERS}
+    guessed = {n: _guessed(alone, blocks) for n, blocks in fresh.items()}
+    return BystanderOutcome({n: _wrong(model, blocks) for n, blocks in fresh.items()}, guessed)
 
 
 def _rows(n: int, seed: int, *, fresh: bool = False) -> Iterator[Block]:
@@ -143,6 +156,9 @@ def bystander_bars(beside: Sequence[BystanderOutcome], counted: Sequence[CountOu
     """Row 10, one figure per training seed."""
     return [
         measured("wrong with 2-7 bystanders", 0.001, [max(run.wrong.values()) for run in beside]),
+        measured(
+            "guessed wrongly where bystanders are new", 0.0, [max(run.guessed.values()) for run in beside]
+        ),
         measured("wrong with 2, 3 and 4 boxes", 0.001, [max(run.wrong.values()) for run in counted]),
         measured("guessed where a layout is new", 0.0, [run.guessed for run in counted]),
     ]
@@ -159,3 +175,8 @@ def _in_schema(schema: SceneSchema, blocks: Iterable[Block]) -> list[Block]:
 
 def _wrong(model: WorldModel, blocks: Iterable[Block]) -> float:
     return evaluate(model, blocks)["truck.vx"].total.rate
+
+
+def _guessed(model: WorldModel, blocks: Iterable[Block]) -> float:
+    total = evaluate(model, blocks)["truck.vx"].total
+    return (total.wrong - total.silent) / total.examples

@@ -146,8 +146,8 @@ class Contacts:
     @classmethod
     def of(cls, cast: Cast, relations: Relations, vectors: NDArray[np.float64]) -> Contacts:
         """Find the contacts of n scenes."""
-        touch = relations.relation("intersect")
-        return cls(cast, relations, poses(cast.layout, vectors), touch[:, cast.first, cast.second])
+        hits = relations.touching(cast.first, cast.second)
+        return cls(cast, relations, poses(cast.layout, vectors), hits)
 
     def groups(self) -> Iterator[Group]:
         """Scenes by their number of contacts, those without any left out."""

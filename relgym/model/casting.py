@@ -64,7 +64,9 @@ class Casting:
             spent += self.classifiers[number].refresh(exemplars, number)
         return spent
 
-    def assign(self, mode: Mode, example: Example, order: Sequence[int]) -> tuple[int, ...] | None:
+    def assign(
+        self, mode: Mode, example: Example, order: Sequence[int], *, sure: bool
+    ) -> tuple[int, ...] | None:
         """Bodies that play the mode's embodied roles, or None if some can't be filled.
 
         Parameters
@@ -75,9 +77,11 @@ class Casting:
             The query.
         order
             All bodies, those to prefer where nothing else decides first.
+        sure
+            Whether to fill no role where nothing but `order` decides, unless that was so in examples too.
         """
         known = self.classifiers.get(mode.id)
-        return None if known is None else known.assign(example, order)
+        return None if known is None else known.assign(example, order, sure=sure)
 
     def to_json(self) -> list[Any]:
         """Plain data."""

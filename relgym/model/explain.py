@@ -75,6 +75,8 @@ class Explanation:
     laws
         What laws of motion predicted it, a line each, where they and no mode did: the free law, then every
         contact.
+    limit
+        Whether the mode is a limit, beyond which another mode would have led.
     """
 
     prediction: Prediction
@@ -83,6 +85,7 @@ class Explanation:
     digits: int
     reasons: tuple[Reason, ...]
     laws: tuple[str, ...] = ()
+    limit: bool = False
 
     def __str__(self) -> str:
         p, d = self.prediction, self.digits
@@ -97,6 +100,8 @@ class Explanation:
         examples = amount(self.mode.examples, "training example")
         lines.append(f"  mode      {self.mode.id}: {self.mode.formula(d)}  ({examples})")
         lines.append(f"  roles     {self._roles(self.mode)}")
+        if self.limit:
+            return "\n".join([*lines, "  because   another mode would lead beyond it, and it is a limit"])
         lines += self._because() if self.reasons else ["  because   no other mode is known"]
         return "\n".join(lines)
 
@@ -149,6 +154,9 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
                 found.append(Explanation(one, now, None, digits, (), lines))
                 continue
             mode = next(m for m in part.modes if m.id == one.mode) if one.ok else None
+            if one.mode in part.limits:
+                found.append(Explanation(one, now, mode, digits, (), limit=True))
+                continue
             reasons = () if mode is None else _reasons(model, part, scene, index, prediction.scene, mode.id)
             found.append(Explanation(one, now, mode, digits, reasons))
     return tuple(found)
@@ -158,7 +166,7 @@ def _reasons(
     model: WorldModel, part: PropertyModel, scene: Scene, index: int, following: Scene, chosen: int
 ) -> tuple[Reason, ...]:
     percept = model.percept(scene)
-    example = percept.situation(index).examples[0]
+    example = part.example(percept, index, following.vector)
     values = part.mode_values(percept, index, following.vector)
     names = [scene.layout.names[i] for i in scene.layout.bodies if index in scene.layout.bodies]
     by_mode = dict(zip(part.classifier.modes, values, strict=True))

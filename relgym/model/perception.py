@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -10,33 +12,79 @@ from numpy.typing import NDArray
 
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
-from relgym.scene.context import canonical_order, signature
+from relgym.clustering.features import library_of
+from relgym.model.grouping import distinct
+from relgym.scene.context import canonical_order, signature, slots
 from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, poses
 from relgym.scene.relations import Extractor, Relations
 
 __all__ = ["Percept", "Perception", "Situation"]
 
 
-@dataclass(frozen=True, slots=True)
 class Situation:
-    """A batch of scenes as one object sees them.
+    """A batch of scenes as one object sees them; each part is worked out when it is asked for.
 
-    Attributes
+    Parameters
     ----------
-    examples
-        Relations and numbers for classifiers.
-    order
-        Object index in each slot, shape ``(n, slots)``; slot 0 is the object itself.
-    signature
-        Types of the slots, the same in all scenes.
-    keys
-        Relational state of each scene under that order.
+    percept
+        The scenes.
+    target
+        Index of the object.
     """
 
-    examples: ExampleBatch
-    order: NDArray[np.intp]
-    signature: SlotSignature
-    keys: list[bytes]
+    def __init__(self, percept: Percept, target: int) -> None:
+        layout = percept.layout
+        self._percept, self._target = percept, target
+        self._body = layout.bodies.index(target) if target in layout.bodies else -1
+        self._head = np.array(slot_order(layout, target, ()), dtype=np.intp)
+
+    @cached_property
+    def plain(self) -> NDArray[np.intp]:
+        """Object index in each slot where nobody asks which of several alike comes first, shape ``(slots,)``."""
+        layout = self._percept.layout
+        numbers = [k for _, those in slots(layout, self._body) for k in those.tolist()]
+        others = [layout.bodies[k] for k in numbers] if self._body >= 0 else layout.bodies
+        return np.array([*self._head, *others], dtype=np.intp)
+
+    @cached_property
+    def signature(self) -> SlotSignature:
+        """Types of the slots, the same in all scenes."""
+        layout = self._percept.layout
+        return self._percept.perception.signature_of(tuple(layout.types[i] for i in self.plain))
+
+    @cached_property
+    def order(self) -> NDArray[np.intp]:
+        """Object index in each slot, shape ``(n, slots)``; slot 0 is the object itself."""
+        layout, n = self._percept.layout, len(self._percept)
+        if self._body < 0:
+            return np.broadcast_to(self.plain, (n, len(self.plain)))
+        others = np.array(layout.bodies, dtype=np.intp)[self._numbers]
+        return np.concatenate([np.broadcast_to(self._head, (n, len(self._head))), others], axis=1)
+
+    @cached_property
+    def keys(self) -> list[bytes]:
+        """Relational state of each scene under that order."""
+        if self._body < 0:
+            return [b""] * len(self._percept)
+        return signature(self._percept.relations, self._body, self._numbers)
+
+    @cached_property
+    def examples(self) -> ExampleBatch:
+        """Relations and numbers for classifiers."""
+        return self._percept.examples(self._target, self._body, None)
+
+    def glimpse(self, relations: Collection[str]) -> ExampleBatch:
+        """`examples` in which only these binary relations can be told; the others hold nowhere."""
+        if "examples" in self.__dict__:
+            return self.examples
+        return self._percept.examples(self._target, self._body, relations)
+
+    @cached_property
+    def _numbers(self) -> NDArray[np.intp]:
+        percept = self._percept
+        return canonical_order(
+            percept.relations, self._body, lambda rows: poses(percept.layout, percept.vectors[rows])
+        )
 
 
 class Perception:
@@ -50,6 +98,10 @@ class Perception:
         (type, property) pairs whose next values some target may use.
     geometry
         ``"arrays"`` (default) or ``"fcl"``.
+    chained
+        The same for pairs whose causal order is still to be found.
+    features
+        Non-linear features, as in `ModelConfig.features`.
     """
 
     def __init__(
@@ -57,9 +109,14 @@ class Perception:
         schema: SceneSchema,
         given: tuple[tuple[str, str], ...] = (),
         geometry: Literal["arrays", "fcl"] = "arrays",
+        *,
+        chained: tuple[tuple[str, str], ...] = (),
+        features: tuple[str, ...] = (),
     ) -> None:
         self.schema = schema
         self.given = given
+        self.chained = chained
+        self.libraries = {t.name: library_of(features, t.name, t.angles) for t in schema.types}
         self.extractor = Extractor(schema, geometry=geometry)
         self._contact_names = self.extractor.features
         self._pair_names = tuple(sorted({p for t in schema.types if t.has_body for p in _free(t)}))
@@ -104,7 +161,8 @@ class Perception:
     def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:
         """The slot signature of these types."""
         if (known := self._signatures.get(types)) is None:
-            known = self._signatures[types] = SlotSignature(types, self.given)
+            library = self.libraries[types[0].name]
+            known = self._signatures[types] = SlotSignature(types, self.given, self.chained, library)
         return known
 
     def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
@@ -166,10 +224,12 @@ class Percept:
     def situation(self, target: int) -> Situation:
         """How the object with this index is situated."""
         if (known := self._situations.get(target)) is None:
-            known = self._situations[target] = self._situate(target)
+            known = self._situations[target] = Situation(self, target)
         return known
 
-    def rows(self, target: int, following: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rows(
+        self, target: int, following: NDArray[np.float64], *, ordered: bool = True
+    ) -> NDArray[np.float64]:
         """Regression rows of an object, shape ``(n, columns)``.
 
         Parameters
@@ -179,55 +239,40 @@ class Percept:
         following
             Next state vectors as far as known, shape ``(n, layout.width)``: primed columns are read from
             them.
+        ordered
+            Whether it matters which of several objects of a type comes first.
         """
         place = self.situation(target)
         both = np.concatenate([self.vectors, following], axis=1)
-        if len(self) == 1:
-            return both[
-                :, self.perception.gather(self.layout, place.signature, tuple(place.order[0].tolist()))
-            ]
-        rows = np.empty((len(self), len(place.signature.columns)))
-        orders, which = np.unique(place.order, axis=0, return_inverse=True)
-        for k, order in enumerate(orders):
-            part = np.flatnonzero(which.reshape(-1) == k)
-            columns = self.perception.gather(self.layout, place.signature, tuple(order.tolist()))
-            rows[part] = both[part][:, columns]
-        return rows
+        if not ordered or len(self) == 1:
+            order = place.order[0] if ordered else place.plain
+            return both[:, self.perception.gather(self.layout, place.signature, tuple(order.tolist()))]
+        first, which = distinct(place.order)
+        orders = [tuple(order) for order in place.order[first].tolist()]
+        columns = [self.perception.gather(self.layout, place.signature, order) for order in orders]
+        return np.take_along_axis(both, np.array(columns)[which], axis=1)
 
-    def _situate(self, target: int) -> Situation:
-        layout, perception, n = self.layout, self.perception, len(self)
-        bodies = np.array(layout.bodies, dtype=np.intp)
-        if target in layout.bodies:
-            body = layout.bodies.index(target)
-            numbers = canonical_order(self.relations, body, poses(layout, self.vectors))
-            others = bodies[numbers]
-            keys = signature(self.relations, body, numbers)
-            examples = self._embodied(body, target)
-        else:
-            others = np.broadcast_to(bodies, (n, len(bodies)))
-            keys = [b""] * n
-            examples = self._bodiless(target)
-        head = np.array(slot_order(layout, target, ()), dtype=np.intp)
-        order = np.concatenate([np.broadcast_to(head, (n, len(head))), others], axis=1)
-        types = tuple(layout.types[i] for i in order[0])
-        return Situation(examples, order, perception.signature_of(types), keys)
+    def examples(self, target: int, body: int, relations: Collection[str] | None) -> ExampleBatch:
+        """What classifiers are shown of an object; `Situation` says more."""
+        return self._bodiless(target) if body < 0 else self._embodied(body, target, relations)
 
     def _padded(self) -> NDArray[np.float64]:
         return np.concatenate([self.vectors, np.full((len(self), 1), np.nan)], axis=1)
 
-    def _embodied(self, body: int, target: int) -> ExampleBatch:
+    def _embodied(self, body: int, target: int, names: Collection[str] | None) -> ExampleBatch:
         perception, relations, n = self.perception, self.relations, len(self)
         padded = self._padded()
         own = padded[:, perception.own_columns(self.layout, target)]
         numbers = padded[:, perception.feature_columns(self.layout)]
         contacts = relations.contacts(body)
         # Contact facts are facts of touching pairs (design §4): a normal towards something far says nothing.
-        contacts[~relations.relation("intersect")[:, body]] = np.nan
+        contacts[~relations.touched(body)] = np.nan
         pair = np.concatenate([contacts, numbers], axis=2)
         pair[:, body] = np.nan
         table = perception.unary_table(self.layout)
         every = np.broadcast_to(table, (n, *table.shape))
-        return ExampleBatch(relations.table, every, relations.context(body), pair, own, body)
+        shown = relations.table if names is None else relations.table_of(names)
+        return ExampleBatch(shown, every, relations.context(body), pair, own, body)
 
     def _bodiless(self, target: int) -> ExampleBatch:
         """An object without a body stands alone: no relations, only numbers."""

@@ -23,6 +23,9 @@ class Outcome(enum.Enum):
 
     PREDICTED = "predicted by a mode"
     NO_MODE = "no mode learned yet: learn from more transitions"
+    UNEXPLAINED = (
+        "unexplained: no law of the form that is looked for describes it; the report says what might"
+    )
     NO_ROLES = "no mode's roles could be filled by the objects in the scene"
     OUTSIDE = "outside experience: nothing like this situation was seen in training"
     DEPENDS = "depends on another property that could not be predicted"

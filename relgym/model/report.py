@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 from relgym.classification.binary import BinaryClassifier
 from relgym.classification.role_classifier import RoleKind
+from relgym.clustering.mode import Mode
 from relgym.errors import ConfigError
 from relgym.laws.text import LEGEND, LawRow, WorldRow, law_rows, world_rows
+from relgym.model.advice import Advice
 from relgym.model.text import Cell, amount, indented, table, wrapped
 
 if TYPE_CHECKING:
@@ -137,6 +139,8 @@ class TargetReport:
         Training examples that no mode explains.
     modes, pairs, roles
         The tables' rows. Roles without a body (the action) are left out: there is only one such object.
+    advice
+        What the target lacks, if modes don't explain it.
     """
 
     target: str
@@ -145,6 +149,7 @@ class TargetReport:
     modes: tuple[ModeRow, ...]
     pairs: tuple[PairTable, ...]
     roles: tuple[RoleRow, ...]
+    advice: Advice | None = None
 
     @property
     def examples(self) -> int:
@@ -153,14 +158,20 @@ class TargetReport:
 
     def __str__(self) -> str:
         if not self.modes:
-            return f"{self.target}: no mode learned yet, {amount(self.examples, 'example')}"
+            return f"{self.target}: no mode learned yet, {amount(self.examples, 'example')}{self._advice()}"
         head = f"{self.target}: {amount(len(self.modes), 'mode')}, {amount(self.examples, 'example')}"
         parts = [head, indented(_mode_table(self))]
         if self.pairs:
             parts.append(indented(_clause_table(self.pairs)))
         if self.roles:
             parts.append(indented(_role_table(self.roles)))
-        return "\n\n".join(parts)
+        return "\n\n".join(parts) + self._advice()
+
+    def _advice(self) -> str:
+        if self.advice is None:
+            return ""
+        first, *rest = wrapped(str(self.advice), _FUNCTION_WIDTH, "+-")
+        return "\n\n" + "\n".join([f"  advice: {first}", *(f"          {line}" for line in rest)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,6 +212,7 @@ def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
     digits
         Significant digits of coefficients.
     """
+    advice = {a.target: a for a in model.advice()}
     parts = [
         model.property_model(target.type, target.property)
         for target in model.targets
@@ -209,7 +221,9 @@ def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
     laws: tuple[LawRow, ...] = ()
     if model.laws is not None and model.governed:
         laws = law_rows(model.laws, model.governed, digits)
-    return ModelReport(model.seen, tuple(_target_report(part, digits) for part in parts), laws)
+    return ModelReport(
+        model.seen, tuple(_target_report(part, digits, advice.get(str(part.target))) for part in parts), laws
+    )
 
 
 def describe(
@@ -264,12 +278,25 @@ def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
     return table([f"{name} touching a surface at {incline:g} degrees, along the world's axes"], lines)
 
 
-def _target_report(part: PropertyModel, digits: int) -> TargetReport:
-    modes = tuple(ModeRow(m.id, m.examples, m.formula(digits)) for m in part.modes)
+def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> TargetReport:
+    modes = tuple(ModeRow(m.id, m.examples, _function(part, m, digits)) for m in part.modes)
     pairs = tuple(_pair_table(c) for c in part.classifier.classifiers)
     return TargetReport(
-        str(part.target), part.target.type, part.clusterer.noise_examples, modes, pairs, _role_rows(part)
+        str(part.target),
+        part.target.type,
+        part.clusterer.noise_examples,
+        modes,
+        pairs,
+        _role_rows(part),
+        advice,
     )
+
+
+def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
+    if mode.id not in part.limits:
+        return mode.formula(digits)
+    side = "least" if mode.id == part.limits.low else "most"
+    return f"{mode.formula(digits)} at {side}: a limit to what the others predict"
 
 
 def _pair_table(classifier: BinaryClassifier) -> PairTable:

@@ -21,7 +21,16 @@ from relgym.errors import ModelFileError
 from relgym.scene.objects import Kinematics, ObjectType, SceneSchema, Target
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
 
-__all__ = ["FORMAT", "VERSION", "read_model", "schema_from_json", "schema_to_json", "write_model"]
+__all__ = [
+    "FORMAT",
+    "VERSION",
+    "read_model",
+    "schema_from_json",
+    "schema_to_json",
+    "shape_from_json",
+    "shape_to_json",
+    "write_model",
+]
 
 FORMAT = "relgym-model"
 VERSION = 1
@@ -178,12 +187,13 @@ def _type_to_json(t: ObjectType) -> dict[str, Any]:
     return {
         "name": t.name,
         "properties": list(t.properties),
-        "shape": None if t.shape is None else _shape_to_json(t.shape),
+        "shape": None if t.shape is None else shape_to_json(t.shape),
         "parent": t.parent,
         "pose": dict(t.pose),
         "velocity": list(t.velocity),
         "exogenous": list(t.exogenous),
         "optional": t.optional,
+        "angles": list(t.angles),
     }
 
 
@@ -191,22 +201,25 @@ def _type_from_json(data: dict[str, Any]) -> ObjectType:
     return ObjectType(
         name=data["name"],
         properties=tuple(data["properties"]),
-        shape=None if data["shape"] is None else _shape_from_json(data["shape"]),
+        shape=None if data["shape"] is None else shape_from_json(data["shape"]),
         parent=data["parent"],
         pose=dict(data["pose"]),
         velocity=tuple(data["velocity"]),
         exogenous=tuple(data["exogenous"]),
         optional=data["optional"],
+        angles=tuple(data.get("angles", ())),
     )
 
 
-def _shape_to_json(shape: Shape) -> dict[str, Any]:
+def shape_to_json(shape: Shape) -> dict[str, Any]:
+    """Plain data that `shape_from_json` reads back."""
     kind = next(name for name, cls in _SHAPES.items() if type(shape) is cls)
     corners = getattr(shape, "vertices", None)
     return {"kind": kind} if corners is None else {"kind": kind, "vertices": [list(c) for c in corners]}
 
 
-def _shape_from_json(data: dict[str, Any]) -> Shape:
+def shape_from_json(data: dict[str, Any]) -> Shape:
+    """Read what `shape_to_json` wrote."""
     cls = _SHAPES[data["kind"]]
     if "vertices" not in data:
         plain: Shape = cls()

@@ -1,6 +1,6 @@
 """Spatial relations of all pairs of bodies, extracted from batches of scenes (§3.4; design §4).
 
-Binary relations, for bodies A and B (`box_relations` has the exact definitions of those on bounding boxes):
+Binary relations, for bodies A and B (`BoxRelations` has the exact definitions of those on bounding boxes):
 
 =================== =========================================================================================
 intersect           signed distance <= `TOUCH_EPS`: touching or overlapping
@@ -18,8 +18,8 @@ Beside them, every type name and every ancestor of one is a unary relation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Literal, TypeAlias
+from collections.abc import Collection, Sequence
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +27,12 @@ from numpy.typing import NDArray
 from relgym.errors import ConfigError, ObservationError, SchemaError
 from relgym.scene import contacts
 from relgym.scene.axes import Axes
-from relgym.scene.boxes import box_relations
+from relgym.scene.boxes import axis_relations
 from relgym.scene.context import close_set
-from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Geometry, pairs_of
-from relgym.scene.geometry.vectors import FloatArray, dot
+from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Geometry
+from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.objects import Float2D, SceneLayout, SceneSchema, pose_columns
+from relgym.scene.sight import Pairs, Plan, Sight
 from relgym.scene.unary import unary, unary_names
 
 __all__ = ["TOUCH_EPS", "Extractor", "Relations", "unary"]
@@ -39,31 +40,14 @@ __all__ = ["TOUCH_EPS", "Extractor", "Relations", "unary"]
 TOUCH_EPS = 1e-9
 """Signed distance, in units of length, up to which two bodies touch (the original's threshold)."""
 
-_CHUNK = 16_000
-"""Pairs of bodies measured at a time: keeps intermediate arrays in the processor's cache."""
+_CHUNK = 50_000
+"""Pairs of bodies looked at together: keeps intermediate arrays in the processor's cache."""
 
 _Table: TypeAlias = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
-class _Pairs:
-    """Index arrays of a layout: its P pairs, and where pair (a, b) lies among them (P on the diagonal)."""
-
-    first: NDArray[np.intp]
-    second: NDArray[np.intp]
-    number: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, count: int) -> _Pairs:
-        first, second = pairs_of(count)
-        number = np.full((count, count), len(first), dtype=np.intp)
-        number[first, second] = number[second, first] = np.arange(len(first))
-        return cls(first, second, number)
-
-
-@dataclass(frozen=True, slots=True)
 class Relations:
-    """Binary relations and contacts of n scenes with the same objects.
+    """Binary relations and contacts of n scenes with the same objects, worked out when they are asked for.
 
     Bodies are numbered as in ``layout.bodies`` (K of them): number k is the object ``layout.bodies[k]``.
 
@@ -71,42 +55,103 @@ class Relations:
     ----------
     layout
         The scenes' layout.
+    axes
+        The schema's axes.
     names
         Names of the relations, alphabetical (R of them).
-    table
-        Which relation holds for which ordered pair, shape ``(n, R, K, K)``; False on the diagonal.
-    distance
-        Signed distances, shape ``(n, K, K)``; symmetric, infinite on the diagonal.
+    sights
+        The scenes, in pieces.
     """
 
-    layout: SceneLayout
-    names: tuple[str, ...]
-    table: _Table
-    distance: FloatArray
-    _normal: FloatArray = field(repr=False)  # (d, P, n), from the second body of a pair to the first
-    _velocity: FloatArray = field(repr=False)  # (d, K, n)
-    _pairs: _Pairs = field(repr=False)
+    def __init__(
+        self, layout: SceneLayout, axes: Axes, names: tuple[str, ...], plan: Plan, sights: Sequence[Sight]
+    ) -> None:
+        self.layout, self.names = layout, names
+        self._axes, self._plan = axes, plan
+        self._sights = tuple(sights)
+        self._size: int = sum(sight.pose.shape[2] for sight in self._sights)
+        self._kept: dict[str, _Table] = {}
+        self._of: dict[int, FloatArray] = {}
+        self._table: _Table | None = None
+        self._distance: FloatArray | None = None
 
     def __len__(self) -> int:
-        return len(self.table)
+        return self._size
 
-    def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Relations:
-        """Relations of some of the scenes."""
-        return replace(
-            self,
-            table=self.table[chosen],
-            distance=self.distance[chosen],
-            _normal=self._normal[..., chosen],
-            _velocity=self._velocity[..., chosen],
-        )
+    @property
+    def table(self) -> _Table:
+        """Which relation holds for which ordered pair, shape ``(n, R, K, K)``; False on the diagonal."""
+        if self._table is None:
+            for sight in self._sights:
+                sight.boxes.prepare()
+            self._table = self._filled(self.names)
+        return self._table
+
+    def table_of(self, names: Collection[str]) -> _Table:
+        """`table`, of which only the relations with these names are filled in; the others are False throughout."""
+        return self._filled(names) if self._table is None else self._table
+
+    def _filled(self, names: Collection[str]) -> _Table:
+        count = len(self._plan.pairs.number)
+        table = np.zeros((len(self), len(self.names), count, count), dtype=np.bool_)
+        at = 0
+        for sight in self._sights:
+            rows = slice(at, at + sight.pose.shape[2])
+            at = rows.stop
+            for r, name in enumerate(self.names):
+                if name in names:
+                    table[rows, r] = _found(self._axes, sight, name).transpose(2, 0, 1)
+        table &= self._plan.pairs.others
+        return table
 
     def relation(self, name: str) -> _Table:
         """One relation's table, shape ``(n, K, K)``."""
-        return self.table[:, self.names.index(name)]
+        if self._table is not None:
+            return self._table[:, self.names.index(name)]
+        if (known := self._kept.get(name)) is None:
+            parts = [_found(self._axes, sight, name) for sight in self._sights]
+            known = self._kept[name] = _joined(parts).transpose(2, 0, 1) & self._plan.pairs.others
+        return known
+
+    @property
+    def distance(self) -> FloatArray:
+        """Signed distances, shape ``(n, K, K)``; symmetric, infinite on the diagonal."""
+        if self._distance is None:
+            parts = [sight.every().distance for sight in self._sights]
+            both = np.concatenate([np.concatenate(parts, axis=1), np.full((1, len(self)), np.inf)])
+            self._distance = np.ascontiguousarray(
+                both.take(self._plan.pairs.number, axis=0).transpose(2, 0, 1)
+            )
+        return self._distance
+
+    def distances(self, body: int) -> FloatArray:
+        """Signed distances of one body, shape ``(n, K)``; infinite for itself."""
+        if (known := self._of.get(body)) is None:
+            parts = [sight.of(body).distance for sight in self._sights]
+            both = np.concatenate([_joined(parts), np.full((1, len(self)), np.inf)])
+            known = self._of[body] = np.ascontiguousarray(both.take(self._plan.pairs.number[body], axis=0).T)
+        return known
+
+    def touching(self, first: NDArray[np.intp], second: NDArray[np.intp]) -> _Table:
+        """Whether the bodies of some pairs touch, shape ``(n, len(first))``; a pair is of two bodies."""
+        pairs = self._plan.pairs
+        mask, numbers = pairs.among(first, second), pairs.number[first, second]
+        parts = [sight.touches(mask).take(numbers, axis=0) for sight in self._sights]
+        return np.ascontiguousarray(_joined(parts).T)
+
+    def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Relations:
+        """Relations of some of the scenes."""
+        vectors = np.concatenate([sight.vectors for sight in self._sights])[chosen]
+        sights = [Sight(self._plan, vectors, self._sights[0].eps)]
+        return Relations(self.layout, self._axes, self.names, self._plan, sights)
+
+    def touched(self, body: int) -> _Table:
+        """Which bodies touch one, shape ``(n, K)``; it doesn't touch itself."""
+        return self.distances(body) <= self._sights[0].eps
 
     def context(self, body: int) -> _Table:
         """Return the target's close set (`close_set`), shape ``(n, K)``."""
-        return close_set(self.relation("intersect")[:, body], self.distance[:, body], body)
+        return close_set(self.touched(body), self.distances(body), body)
 
     def normals(self, body: int) -> FloatArray:
         """Return the unit normals from each other body to this one, shape ``(n, K, d)``; NaN for itself."""
@@ -118,10 +163,10 @@ class Relations:
         NaN for the body itself. Velocities are the scenes', in length per step.
         """
         normal = self._normals(body)
-        relative = self._velocity[:, body, None] - self._velocity
-        approach, slip = contacts.motion(relative, normal)
-        out = np.empty((len(self), len(self._pairs.number), len(normal) + 3))
-        out[..., 0] = self.distance[:, body]
+        velocity = _joined([sight.velocity for sight in self._sights])
+        approach, slip = contacts.motion(velocity[:, body, None] - velocity, normal)
+        out = np.empty((len(self), len(self._plan.pairs.number), len(normal) + 3))
+        out[..., 0] = self.distances(body)
         out[..., 1:-2] = normal.transpose(2, 1, 0)
         out[..., -2], out[..., -1] = approach.T, slip.T
         out[:, body] = np.nan
@@ -129,25 +174,38 @@ class Relations:
 
     def _normals(self, body: int) -> FloatArray:
         """Normals of the body's pairs, shape ``(d, K, n)``."""
-        count = len(self._pairs.number)
+        pairs = self._plan.pairs
+        count = len(pairs.number)
         if count == 1:
-            return np.full((len(self._normal), 1, len(self)), np.nan)
-        numbers = np.minimum(self._pairs.number[body], len(self._pairs.first) - 1)
+            return np.full((len(self._axes.used), 1, len(self)), np.nan)
+        numbers = np.minimum(pairs.number[body], len(pairs.first) - 1)
         signs = np.where(np.arange(count) > body, 1.0, -1.0)
         signs[body] = np.nan
-        normals: FloatArray = self._normal.take(numbers, axis=1) * signs[:, None]
+        parts = [sight.of(body).normal.take(numbers, axis=1) for sight in self._sights]
+        normals: FloatArray = _joined(parts) * signs[:, None]
         return normals
 
 
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """What extraction needs to know of a layout."""
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """Pieces put together along their last axis."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
 
-    columns: NDArray[np.intp]  # (9, K) of a state vector with (0, 1) appended
-    velocities: NDArray[np.intp]  # (d, K), likewise
-    pairs: _Pairs
-    moving: NDArray[np.intp]  # pairs in which at least one type has a velocity
-    geometry: Geometry
+
+def _found(axes: Axes, sight: Sight, name: str) -> _Table:
+    """One relation's table in a piece of the scenes, shape ``(K, K, n)``; the diagonal means nothing."""
+    if name == "intersect":
+        return sight.touching()
+    if name == "on-top":
+        return sight.boxes.on_top(sight.touching())
+    if name == "smaller-than":
+        return sight.boxes.smaller()
+    if name.startswith("approaching"):
+        closing = sight.closing()
+        found: _Table = closing < np.inf
+        if name == "approaching-fastest":
+            found &= closing <= closing.min(axis=1, initial=np.inf, keepdims=True) + contacts.APPROACH_EPS
+        return found
+    return sight.boxes.along(*axis_relations(axes)[name])
 
 
 class Extractor:
@@ -180,9 +238,7 @@ class Extractor:
             raise ConfigError(f"geometry must be 'arrays' or 'fcl', got {geometry!r}")
         self.schema, self.geometry, self.eps = schema, geometry, eps
         self.axes = Axes.of(schema)
-        per_axis = [
-            f"{axis}-{kind}" for axis in self.axes.names for kind in ("less-than", "greater-than", "aligned")
-        ]
+        per_axis = list(axis_relations(self.axes))
         contact = ["approaching", "approaching-fastest", "intersect"]
         self.names = tuple(sorted([*contact, "on-top", "smaller-than", *per_axis]))
         self.features = contacts.contact_features(schema)
@@ -190,7 +246,7 @@ class Extractor:
         for name in self.unary_names:
             if name in self.names:
                 raise SchemaError(f"type name {name!r} is the name of a spatial relation; rename the type")
-        self._plans: dict[tuple[str, ...], _Plan] = {}
+        self._plans: dict[tuple[str, ...], Plan] = {}
 
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "_plans": {}}
@@ -222,72 +278,27 @@ class Extractor:
             )
         plan = self._plan(layout)
         chunk = max(1, _CHUNK // max(1, plan.pairs.number.size))
-        if len(vectors) <= chunk:
-            return self._extract(layout, plan, vectors)
-        parts = [self._extract(layout, plan, vectors[i : i + chunk]) for i in range(0, len(vectors), chunk)]
-        return Relations(
-            layout,
-            self.names,
-            np.concatenate([p.table for p in parts]),
-            np.concatenate([p.distance for p in parts]),
-            np.concatenate([p._normal for p in parts], axis=-1),
-            np.concatenate([p._velocity for p in parts], axis=-1),
-            plan.pairs,
-        )
+        starts = range(0, max(1, len(vectors)), chunk)
+        sights = [Sight(plan, vectors[i : i + chunk], self.eps) for i in starts]
+        return Relations(layout, self.axes, self.names, plan, sights)
 
     def unary(self, layout: SceneLayout) -> dict[str, _Table]:
         """Return the unary relations of a layout's bodies (`unary`)."""
         return unary(self.schema, layout)
 
-    def _extract(self, layout: SceneLayout, plan: _Plan, vectors: Float2D) -> Relations:
-        padded = np.concatenate([vectors, np.broadcast_to(_CONSTANTS, (len(vectors), 2))], axis=1).T
-        pose, velocity = padded.take(plan.columns, axis=0), padded.take(plan.velocities, axis=0)
-        measured = plan.geometry.measure(pose)
-        beyond = np.full((1, len(vectors)), np.inf)
-        distance = np.concatenate([measured.distance, beyond]).take(plan.pairs.number, axis=0)
-        touching = distance <= self.eps
-        found = box_relations(
-            self.axes, pose.take(self.axes.used, axis=0), measured.low, measured.high, touching
-        )
-        found["intersect"] = touching
-        closing = self._closing(plan, measured.distance, measured.normal, velocity)
-        found["approaching"] = closing < np.inf
-        decisive = closing.min(axis=1, initial=np.inf, keepdims=True) + contacts.APPROACH_EPS
-        found["approaching-fastest"] = found["approaching"] & (closing <= decisive)
-        table = np.empty((len(vectors), len(self.names), *plan.pairs.number.shape), dtype=bool)
-        for r, name in enumerate(self.names):
-            table[:, r] = found[name].transpose(2, 0, 1)
-        table &= ~np.eye(len(plan.pairs.number), dtype=bool)
-        between = np.ascontiguousarray(distance.transpose(2, 0, 1))
-        return Relations(layout, self.names, table, between, measured.normal, velocity, plan.pairs)
-
-    def _closing(
-        self, plan: _Plan, distance: FloatArray, normal: FloatArray, velocity: FloatArray
-    ) -> FloatArray:
-        """Normal velocities of touching pairs that don't separate, infinite for the others, shape ``(K, K, n)``."""
-        closing = np.full((len(distance) + 1, distance.shape[1]), np.inf)
-        pairs, moving = plan.pairs, plan.moving
-        if len(moving):
-            relative = velocity.take(pairs.first[moving], axis=1) - velocity.take(
-                pairs.second[moving], axis=1
-            )
-            speed = dot(relative, normal.take(moving, axis=1))
-            near = (speed <= contacts.APPROACH_EPS) & (distance.take(moving, axis=0) <= self.eps)
-            closing[moving] = np.where(near, speed, np.inf)
-        return closing.take(pairs.number, axis=0)
-
-    def _plan(self, layout: SceneLayout) -> _Plan:
+    def _plan(self, layout: SceneLayout) -> Plan:
         if (plan := self._plans.get(layout.names)) is None:
             plan = self._plans[layout.names] = self._make_plan(layout)
         return plan
 
-    def _make_plan(self, layout: SceneLayout) -> _Plan:
+    def _make_plan(self, layout: SceneLayout) -> Plan:
         names = tuple(layout.names[i] for i in layout.bodies)
         shapes = tuple(shape for i in layout.bodies if (shape := layout.types[i].shape) is not None)
         velocities = contacts.velocity_columns(layout, self.axes)
         moves = np.asarray((velocities >= 0).any(axis=0))
-        pairs = _Pairs.of(len(names))
-        return _Plan(
+        pairs = Pairs.of(len(names))
+        return Plan(
+            self.axes,
             np.ascontiguousarray(pose_columns(layout)[0].T),
             np.where(velocities < 0, layout.width, velocities),
             pairs,
@@ -301,7 +312,3 @@ class Extractor:
         from relgym.scene.geometry.fcl import FclGeometry
 
         return FclGeometry(self.axes, bodies)
-
-
-_CONSTANTS = np.array([0.0, 1.0])
-"""What `pose_columns` appends to a state vector: components that no property supplies."""

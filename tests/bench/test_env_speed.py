@@ -17,13 +17,18 @@ STEPS = 1000
 def roll(env: gym.Env[object, object], action: object) -> None:
     env.reset(seed=0)
     for _ in range(STEPS):
-        *_, truncated, _ = env.step(action)
-        if truncated:
+        *_, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
             env.reset()
 
 
 @pytest.mark.parametrize(
-    ("env_id", "action"), [("relgym/BallBoxRamp-v0", 0), ("relgym/TruckPush-v0", np.zeros(1, np.float32))]
+    ("env_id", "action"),
+    [
+        ("relgym/BallBoxRamp-v0", 0),
+        ("relgym/BallGoal-v0", np.zeros(2, np.float32)),
+        ("relgym/TruckPush-v0", np.zeros(1, np.float32)),
+    ],
 )
 def test_a_thousand_steps(benchmark: BenchmarkFixture, env_id: str, action: object) -> None:
     benchmark(roll, gym.make(env_id), action)

@@ -17,6 +17,7 @@ from relgym.classification.role_classifier import RoleClassifier, RoleKind
 from relgym.config import ClassificationConfig
 
 _CONFIG = ClassificationConfig()
+_TOUCH = Vocabulary(relations=("intersect",), unary=("ball", "red"))
 
 
 def _kinds(mode: int) -> list[RoleKind]:
@@ -87,10 +88,9 @@ def test_an_object_that_only_one_role_could_take_is_left_to_it() -> None:
     # "red" objects play role 0, objects that touch the target play role 1. The only red one touches the
     # target too, and comes first: a greedy assignment in the order of roles 1, 0 would take it away from role
     # 0.
-    vocabulary = Vocabulary(relations=("intersect",), unary=("ball", "red"))
     kinds = [RoleKind("ball", (("v", 1.0),)), RoleKind("ball", (("v", 2.0),))]
-    classifier = RoleClassifier(vocabulary, kinds, _CONFIG)
-    exemplars = Exemplars(vocabulary, _CONFIG)
+    classifier = RoleClassifier(_TOUCH, kinds, _CONFIG)
+    exemplars = Exemplars(_TOUCH, _CONFIG)
     exemplars.set_modes((1,), np.empty(0, int), np.empty((0, 1), bool), np.empty((0, 1)))
     for touching, red in ((1, 2), (2, 1), (3, 1), (1, 3), (2, 3), (3, 2)):
         example = _balls({touching}, {red})
@@ -110,13 +110,58 @@ def _balls(touching: set[int], red: set[int]) -> Example:
     return Example(table, unary, table[0, 0] | (np.arange(4) == 0), np.empty((4, 0)), np.empty(0), key=key)
 
 
-def test_preference_decides_where_nothing_else_does(
+def test_preference_decides_where_nothing_else_does() -> None:
+    classifier, _ = _touched([(1,)] * 4)
+    two = _balls({1, 3}, set())
+    assert classifier.describe() == ["ball: intersect(A, B)"]
+    assert classifier.assign(two) == (1,)
+    assert classifier.assign(two, order=(3, 2, 1, 0)) == (3,)
+
+
+def test_a_choice_that_experience_never_left_is_no_sure_answer() -> None:
+    classifier, exemplars = _touched([(1,)] * 4)
+    two = _balls({1, 3}, set())
+    assert classifier.assign(two, sure=True) is None
+    assert classifier.assign(_balls({3}, set()), sure=True) == (3,)
+    for _ in range(3):  # either ball may play, as these examples show: then preference is all there is
+        classifier.observe(two, (1,))
+        exemplars.add(two, 1, np.ones(1, bool), np.zeros(1), roles=(1,))
+    classifier.refresh(exemplars, 1)
+    assert classifier.errors > 0
+    assert classifier.assign(two, sure=True) == (1,)
+
+
+def _touched(touching: Sequence[tuple[int, ...]]) -> tuple[RoleClassifier, Exemplars]:
+    """A role that was played by the first ball that touched the target."""
+    classifier = RoleClassifier(_TOUCH, [RoleKind("ball", (("v", 1.0),))], _CONFIG)
+    exemplars = Exemplars(_TOUCH, _CONFIG)
+    exemplars.set_modes((1,), np.empty(0, int), np.empty((0, 1), bool), np.empty((0, 1)))
+    for balls in touching:
+        example = _balls(set(balls), set())
+        classifier.observe(example, balls[:1])
+        exemplars.add(example, 1, np.ones(1, bool), np.zeros(1), roles=balls[:1])
+    classifier.refresh(exemplars, 1)
+    return classifier, exemplars
+
+
+def test_who_has_all_that_players_had_in_common_comes_first(
     trucks: tuple[dict[int, RoleClassifier], Exemplars, int],
 ) -> None:
-    classifier = trucks[0][3]
-    item = next(truck_stream(4, rng=np.random.default_rng(1), bystanders=3))
-    assert classifier.assign(item.example) == (1, 2, 3)
-    assert classifier.assign(item.example, order=(6, 4, 2, 0, 1, 3, 5)) == (6, 4, 2)
+    # There never was another ball to tell the player from, so any ball will do; but the player always touched.
+    classifier = RoleClassifier(_TOUCH, [RoleKind("ball", (("v", 1.0),))], _CONFIG)
+    only = _balls({1}, set())
+    only = replace(only, table=only.table[:, :2, :2], unary=only.unary[:, :2], close=only.close[:2])
+    classifier.observe(only, (1,))
+    assert classifier.describe() == ["ball: any ball"]
+    assert classifier.assign(_balls({3}, set()), sure=True) == (3,)
+    assert classifier.assign(_balls({2, 3}, set()), sure=True) is None
+    # Nobody is as every player was: a new situation.
+    assert classifier.assign(_balls(set(), set())) == (1,)
+    assert classifier.assign(_balls(set(), set()), sure=True) is None
+    # Boxes of the lowest rank, and others farther along the row that touch nothing: all as players were.
+    item = next(i for i in truck_stream(4, rng=np.random.default_rng(1), bystanders=3) if i.mode == 3)
+    assert trucks[0][3].assign(item.example) is not None
+    assert trucks[0][3].assign(item.example, sure=True) is None
 
 
 def test_the_order_of_objects_is_irrelevant(
@@ -162,9 +207,8 @@ def _observed(classifier: RoleClassifier, exemplars: Exemplars, item: Labelled) 
 
 
 def test_the_right_objects_coming_first_by_luck_is_a_contradiction_all_the_same() -> None:
-    vocabulary = Vocabulary(relations=("intersect",), unary=("ball", "red"))
-    classifier = RoleClassifier(vocabulary, [RoleKind("ball", (("v", 1.0),))], _CONFIG)
-    exemplars = Exemplars(vocabulary, _CONFIG)
+    classifier = RoleClassifier(_TOUCH, [RoleKind("ball", (("v", 1.0),))], _CONFIG)
+    exemplars = Exemplars(_TOUCH, _CONFIG)
     exemplars.set_modes((1,), np.empty(0, int), np.empty((0, 1), bool), np.empty((0, 1)))
     for player in (1, 2, 3) * 3:
         exemplars.add(_balls({player}, {player}), 1, np.ones(1, bool), np.zeros(1), roles=(player,))

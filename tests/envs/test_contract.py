@@ -17,16 +17,18 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import relgym
-from relgym.envs import BallBoxRampEnv, SceneEnv, TruckPushEnv
+from relgym.envs import BallBoxRampEnv, BallGoalEnv, SceneEnv, TruckPushEnv
 from relgym.errors import ConfigError
 
-IDS = ("relgym/BallBoxRamp-v0", "relgym/TruckPush-v0")
-STEPS = {"relgym/BallBoxRamp-v0": 200, "relgym/TruckPush-v0": 40}
+IDS = ("relgym/BallBoxRamp-v0", "relgym/BallGoal-v0", "relgym/TruckPush-v0")
+STEPS = {"relgym/BallBoxRamp-v0": 200, "relgym/BallGoal-v0": 500, "relgym/TruckPush-v0": 40}
 MADE: list[tuple[str, dict[str, Any]]] = [
     *((env_id, {}) for env_id in IDS),
     ("relgym/BallBoxRamp-v0", {"objects": ("box", "ramp", "ramp"), "balls": 3, "type_names": "thesis"}),
     ("relgym/BallBoxRamp-v0", {"objects": ()}),
+    ("relgym/BallGoal-v0", {"objects": ("box", "box", "ramp"), "type_names": "thesis", "friction": 0.2}),
     ("relgym/TruckPush-v0", {"n_boxes": 5, "redraw": "step", "bystanders": 2}),
+    ("relgym/TruckPush-v0", {"task": "push", "bystanders": 2}),
 ]
 
 ids = pytest.mark.parametrize("env_id", IDS)
@@ -50,11 +52,11 @@ def test_observations_lie_in_their_space(env_id: str, arguments: dict[str, Any])
     env.action_space.seed(0)
     for seed in range(3):
         observation, _ = env.reset(seed=seed)
-        truncated = False
-        while not truncated:
+        terminated = truncated = False
+        while not (terminated or truncated):
             assert env.observation_space.contains(observation)
             observation, _, terminated, truncated, _ = env.step(env.action_space.sample())
-            assert not terminated
+            assert not terminated or scene_env(env_id, **arguments).task is not None
 
 
 @ids
@@ -63,8 +65,7 @@ def test_time_limit_and_schema_through_the_wrappers(env_id: str) -> None:
     observation, info = env.reset(seed=0)
     schema = env.get_wrapper_attr("schema")
     assert info["scene"].schema == schema
-    bodies = tuple(name for name in schema.order if schema.type_of(name).has_body)
-    assert info["scene"].layout.names == bodies
+    assert info["scene"].layout.names == tuple(name for name in schema.order if name != "action")
     for name, values in observation.items():
         np.testing.assert_array_equal(values, info["scene"][name].values)
     steps = 0
@@ -129,7 +130,7 @@ def test_copies_go_on_alike_and_apart(env_id: str, arguments: dict[str, Any], th
     unused.reset(seed=0)
 
 
-@pytest.mark.parametrize("make", [BallBoxRampEnv, TruckPushEnv])
+@pytest.mark.parametrize("make", [BallBoxRampEnv, BallGoalEnv, TruckPushEnv])
 def test_reset_is_needed_first(make: type[SceneEnv]) -> None:
     with pytest.raises(ResetNeeded, match="reset"):
         _ = make().scene
@@ -137,11 +138,15 @@ def test_reset_is_needed_first(make: type[SceneEnv]) -> None:
         make().step(0)
 
 
-@ids
-def test_videos_are_recorded(env_id: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("env_id", "arguments"), [*((name, {}) for name in IDS), ("relgym/TruckPush-v0", {"task": "push"})]
+)
+def test_videos_are_recorded(env_id: str, arguments: dict[str, Any], tmp_path: Path) -> None:
     pytest.importorskip("moviepy", reason="RecordVideo writes through moviepy")
     folder = tmp_path / "videos"
-    env = gym.wrappers.RecordVideo(gym.make(env_id, render_mode="rgb_array"), str(folder), video_length=5)
+    env = gym.wrappers.RecordVideo(
+        gym.make(env_id, render_mode="rgb_array", **arguments), str(folder), video_length=5
+    )
     env.reset(seed=0)
     for _ in range(5):
         env.step(env.action_space.sample())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import json
 import pickle
 from pathlib import Path
@@ -12,16 +13,28 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from carts import CartEnv, run
+from dreams import (
+    CART_SCHEMA,
+    Errand,
+    FlatCart,
+    cart_model,
+    cart_step,
+    flat_model,
+    lost_model,
+    room_model,
+)
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
+from worlds import ROOM_TARGETS, room, scene, schema_of
 
 from relgym.envs import LearnedModelEnv
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.spaces_json import space_from_json, space_to_json
-from relgym.errors import ActionError, ConfigError, ModelFileError, ObservationError
+from relgym.envs.views import NumbersView
+from relgym.errors import ActionError, ConfigError, ModelFileError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Scene
+from relgym.scene.objects import Scene, Target
 from relgym.wrappers import ModelLearner
 
 ID = "relgym/LearnedModel-v0"
@@ -64,6 +77,14 @@ def test_the_checker_has_nothing_to_say(model_file: Path, horizon: int | None) -
 
 def test_the_checker_has_nothing_to_say_of_a_model_in_memory(cart: ModelLearner) -> None:
     check_env(gym.make(ID, model=cart.model, like=CartEnv()).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.sb3
+@pytest.mark.parametrize("horizon", [None, 40])
+def test_sb3s_checker_has_nothing_to_say(model_file: Path, horizon: int | None) -> None:
+    from stable_baselines3.common import env_checker
+
+    env_checker.check_env(gym.make(ID, model=str(model_file), horizon=horizon))  # warnings are errors
 
 
 def test_same_seed_same_dream(model_file: Path) -> None:
@@ -196,13 +217,14 @@ def test_a_dream_begins_as_the_real_env_would(truck: ModelLearner) -> None:
 
 def test_the_real_episode_goes_on_undisturbed(cart: ModelLearner) -> None:
     learner = ModelLearner(CartEnv(), targets=["cart.v"])
+    run(learner, 50)
     learner.reset(seed=0, options={"v": 10.0})
     learner.step(PUSH)
     dream = LearnedModelEnv(learner.model, like=learner)
     dream.reset(seed=1)
     dream.step(PUSH)
     assert learner.scene["cart"]["v"] == 10.0
-    assert (learner.model.seen, learner.get_wrapper_attr("resets")) == (1, 1)
+    assert (learner.model.seen, learner.get_wrapper_attr("resets")) == (51, 3)
 
 
 def test_files_hold_first_scenes(cart: ModelLearner, tmp_path: Path) -> None:
@@ -230,17 +252,146 @@ def test_a_given_scene_must_be_of_this_world(cart: ModelLearner, truck: ModelLea
     schema, dream = cart.model.schema, LearnedModelEnv(cart.model)
     dream.reset(options={"scene": schema.scene({"cart": [5.0], "action": [1.0]})})
     assert dream.scene == schema.scene({"cart": [5.0]})
-    for scene, message in [
-        (truck.scene, "unknown objects"),
+    for first, message in [
+        (truck.scene, "expected the objects"),
         (schema.scene({"action": [1.0]}), r"expected the objects \['cart'\], got \[\]"),
         (schema.scene({"cart": [2000.0]}), r"cart\.v = 2000 left the observation space \[-1000, 1000\]"),
         ({"cart": [1.0]}, "expected a start scene, got dict"),
     ]:
         with pytest.raises(ObservationError, match=message):
-            dream.reset(options={"scene": scene})
+            dream.reset(options={"scene": first})
+
+
+# ---------------------------------------------------------------------- other objects than in training
+def test_a_dream_of_other_objects_is_like_an_env_that_has_them(cart: ModelLearner) -> None:
+    env = ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=2, redraw="step"))
+    env.action_space.seed(0)
+    for episode in range(24):
+        env.reset(seed=episode, options={"layout": 1 + episode % 2})
+        for _ in range(20):
+            env.step(env.action_space.sample())
+    crowd = gym.make("relgym/TruckPush-v0", n_boxes=2, bystanders=3)
+    dream = LearnedModelEnv(env.model, like=crowd)
+    check_env(dream, skip_render_check=True)
+    assert dream.observation_space == crowd.observation_space
+    seen, _ = crowd.reset(seed=1)
+    imagined, _ = dream.reset(seed=1)
+    assert str(seen) == str(imagined)
+    followed = 0
+    for _ in range(10):
+        imagined, _, _, truncated, info = dream.step(PUSH)
+        if truncated:
+            break
+        followed += 1
+        np.testing.assert_allclose(imagined["truck"], crowd.step(PUSH)[0]["truck"], rtol=0, atol=1e-9)
+    assert followed or "outside" in info["cause"] or "roles" in info["cause"]
+
+
+def test_a_dream_of_other_objects_is_like_a_scene_that_has_them() -> None:
+    model = room_model("auto")
+    (step,) = room(5, 1, boxes=5, balls=2)
+    other = scene(schema_of([step], ROOM_TARGETS), step[0])
+    dream = LearnedModelEnv(model, like=other)
+    check_env(dream, skip_render_check=True)
+    assert sorted(dream.observation_space.spaces) == sorted(other.layout.names)
+    dream.reset(seed=0)
+    assert dream.scene == dream.schema.scene(other.values())
+    observation, *_, truncated, info = dream.step(0)
+    assert not truncated, info
+    for ball in ("ball0", "ball1"):
+        np.testing.assert_allclose(observation[ball], list(step[1][ball][1].values()), rtol=0, atol=1e-9)
+    with pytest.raises(ObservationError, match="for scenes with other objects pass like=scene"):
+        LearnedModelEnv(model).reset(options={"scene": dream.scene})
+
+
+def test_objects_of_unknown_bounds_are_refused(truck: ModelLearner) -> None:
+    schema = dataclasses.replace(truck.model.schema, objects=(("box1", "box"), ("action", "action")))
+    boxed = truck.scene
+    model = WorldModel(schema, targets=[Target("box", "px")])
+    model.extra = recorded_extra = {**truck.record.to_json(), "starts": []}
+    recorded_extra["spaces"] = EnvRecord(
+        spaces.Dict({"box1": truck.observation_space["box1"]}), truck.action_space
+    ).to_json()["spaces"]
+    with pytest.raises(ConfigError, match="no bounds are known for object 'truck'"):
+        LearnedModelEnv(model, like=boxed)
+
+
+# ---------------------------------------------------------------------- learned through a view
+def test_a_dream_shows_what_the_real_env_shows(tmp_path: Path) -> None:
+    model, real = flat_model(), FlatCart()
+    model.save(tmp_path / "flat.json")
+    for dream in (LearnedModelEnv(tmp_path / "flat.json"), LearnedModelEnv(model, like=real)):
+        check_env(dream, skip_render_check=True)
+        assert (dream.observation_space, dream.action_space) == (real.observation_space, real.action_space)
+    expected, _ = real.reset(seed=5)
+    seen, _ = dream.reset(seed=5)
+    np.testing.assert_array_equal(seen, expected)
+    for push in (1.0, -0.5, 0.25):
+        action = np.array([push], np.float32)
+        expected, gained, *_ = real.step(action)
+        seen, reward, _, truncated, info = dream.step(action)
+        np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-9)
+        assert not truncated, info
+        assert reward == pytest.approx(gained, abs=1e-9)
+
+
+def test_a_view_must_fit_the_dream() -> None:
+    with pytest.raises(
+        ConfigError, match="expected the action_space of the env that the model was learned in"
+    ):
+        other = FlatCart()
+        other.action_space = spaces.Box(-2.0, 2.0, (1,), np.float32)
+        LearnedModelEnv(flat_model(), like=other)
+    with pytest.raises(ConfigError, match="bounds are known of observations only"):
+        LearnedModelEnv(flat_model(), like=LearnedModelEnv(flat_model()).reset(seed=0)[1]["scene"])
+    with pytest.raises(ConfigError, match="the view's scenes"):
+        LearnedModelEnv(cart_model(), view=NumbersView(FlatCart().observation_space, FlatCart().action_space))
 
 
 # ---------------------------------------------------------------------- reward and end
+def test_reward_and_end_can_be_learned() -> None:
+    dream = LearnedModelEnv(cart_model())
+    check_env(dream, skip_render_check=True)
+    observation, _ = dream.reset(options={"scene": CART_SCHEMA.scene({"cart": [40.0, 5.0]})})
+    assert list(observation) == ["cart"]  # the task is no part of what an agent sees
+    x, v, ends = 40.0, 5.0, []
+    for _ in range(4):
+        observation, reward, terminated, truncated, _ = dream.step(PUSH)
+        x, v, expected, way = cart_step(x, v, 10.0)
+        assert reward == pytest.approx(expected, abs=1e-9) and not truncated
+        assert terminated is (way > 0.5)
+        ends.append(terminated)
+    assert ends == [False, True, True, True]
+
+
+def test_what_is_given_goes_before_what_is_learned() -> None:
+    dream = LearnedModelEnv(cart_model(), reward=lambda *_: 7.0)
+    dream.reset(seed=0)
+    assert dream.step(PUSH)[1] == 7.0
+    judged = LearnedModelEnv(cart_model(), task=Errand(), reward="learned")
+    judged.reset(options={"scene": CART_SCHEMA.scene({"cart": [0.0, 0.0]})})
+    _, reward, terminated, _, info = judged.step(PUSH)
+    assert reward == pytest.approx(1.0) and terminated and info["is_success"] is True
+
+
+def test_what_was_not_learned_cannot_be_read(cart: ModelLearner) -> None:
+    for model in (cart_model(rewarded=False), cart.model):
+        with pytest.raises(QueryError, match=r"has not learned task\.reward.*pass the function itself"):
+            LearnedModelEnv(model, reward="learned")
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
+def test_a_reward_that_is_no_number_is_refused_and_nothing_has_changed(
+    cart: ModelLearner, bad: float
+) -> None:
+    dream = LearnedModelEnv(cart.model, reward=lambda *_: bad, horizon=1)
+    dream.reset(seed=0)
+    was = dream.scene
+    with pytest.raises(ConfigError, match="expected a finite number; mend the reward function"):
+        dream.step(PUSH)
+    assert dream.scene is was
+
+
 def test_reward_and_termination_are_functions_of_both_scenes(truck: ModelLearner) -> None:
     seen: list[Any] = []
 
@@ -265,15 +416,38 @@ def test_reward_and_termination_are_functions_of_both_scenes(truck: ModelLearner
     assert all(action == [1.0] for action in seen)
 
 
-def test_a_dream_ends_where_the_model_knows_nothing(truck: ModelLearner) -> None:
-    ignorant = WorldModel(truck.model.schema)
-    like = gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step")
-    dream = LearnedModelEnv(ignorant, like=like, reward=lambda *_: 1.0, terminated=lambda *_: True)
+def test_a_dream_ends_where_the_model_knows_nothing() -> None:
+    dream = LearnedModelEnv(lost_model(), reward=lambda *_: 1.0, terminated=lambda *_: True)
     before, _ = dream.reset(seed=0)
     after, reward, terminated, truncated, info = dream.step(PUSH)
     assert truncated and not terminated and reward == 0.0
-    assert "truck.vx: no mode learned yet" in info["reason"] and "box1.px" in info["reason"]
+    assert info["reason"].startswith("cart.v: no mode learned yet") and "cart.x: depends on" in info["reason"]
+    assert info["cause"] == "no_mode"
     assert str(before) == str(after)
+
+
+def test_what_knows_nothing_cannot_be_dreamed_of(truck: ModelLearner) -> None:
+    ignorant = WorldModel(truck.model.schema)
+    like = gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step")
+    dream = LearnedModelEnv(ignorant, like=like)  # live: it may learn yet
+    with pytest.raises(
+        QueryError, match=r"knows none of its targets \['truck.vx', 'box.px'\] after 0 transitions"
+    ):
+        dream.reset(seed=0)
+    with pytest.raises(QueryError, match="let a ModelLearner around the real env act"):
+        LearnedModelEnv(ignorant, like=like, snapshot=True)
+
+
+def test_a_prediction_by_a_small_margin_is_not_followed() -> None:
+    wary = {margin: LearnedModelEnv(room_model(), min_margin=margin) for margin in (0.0, 1e6)}
+    for dream in wary.values():
+        dream.reset(seed=0)
+    assert not wary[0.0].step(0)[3]
+    *_, truncated, info = wary[1e6].step(0)
+    assert truncated and info["cause"] == "low_margin"
+    assert "leads its rival by too little" in info["reason"] and "expected at least 1e+06" in info["reason"]
+    with pytest.raises(ConfigError, match="min_margin=-1"):
+        LearnedModelEnv(room_model(), min_margin=-1.0)
 
 
 def test_a_dream_ends_where_it_leaves_the_observation_space(cart: ModelLearner) -> None:
@@ -298,15 +472,14 @@ def test_a_horizon_truncates(cart: ModelLearner) -> None:
         LearnedModelEnv(cart.model, horizon=0)
 
 
-def test_the_model_is_live() -> None:
+def test_the_model_is_live_unless_a_snapshot_is_wanted() -> None:
     env = ModelLearner(CartEnv())
-    env.reset(seed=0)
-    env.step(PUSH)
-    dream, snapshot = LearnedModelEnv(env.model), LearnedModelEnv(copy.deepcopy(env.model))
+    run(env, 50)
+    dream, snapshot = LearnedModelEnv(env.model), LearnedModelEnv(env.model, snapshot=True)
+    was = snapshot.model.seen
     run(env, 100)
-    for known, imagined in ((True, dream), (False, snapshot)):
-        imagined.reset(seed=0)
-        assert imagined.step(PUSH)[3] is not known
+    assert dream.model is env.model and dream.model.seen == env.model.seen
+    assert snapshot.model.seen == was < env.model.seen
 
 
 # ---------------------------------------------------------------------- bad input and files
@@ -315,8 +488,10 @@ def test_bad_input_names_the_remedy(cart: ModelLearner, truck: ModelLearner) -> 
         LearnedModelEnv(WorldModel(truck.model.schema))
     with pytest.raises(ConfigError, match="render_mode"):
         LearnedModelEnv(cart.model, render_mode="ascii")
-    with pytest.raises(ConfigError, match="make it with the arguments"):
-        LearnedModelEnv(truck.model, like=gym.make("relgym/TruckPush-v0", n_boxes=2))
+    with pytest.raises(ConfigError, match="but it has up='y', planar=True"):
+        LearnedModelEnv(truck.model, like=gym.make("relgym/BallBoxRamp-v0"))
+    with pytest.raises(ConfigError, match="reward='learnt': expected a function"):
+        LearnedModelEnv(cart.model, reward="learnt")  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="make it with the arguments"):
         LearnedModelEnv(truck.model, like=gym.make("relgym/TruckPush-v0", n_boxes=1, force_range=(0, 1)))
     with pytest.raises(ConfigError, match="make it with the arguments"):
@@ -375,8 +550,9 @@ def test_spaces_survive_json() -> None:
             "a": spaces.Box(-1.0, np.array([1.0, 2.0], np.float32), dtype=np.float32),
             "b": spaces.Discrete(3, start=1),
             "c": spaces.Box(-np.inf, np.inf, (2, 2), dtype=np.float64),
+            "d": spaces.Tuple([spaces.MultiDiscrete([2, 3], start=[1, 0]), spaces.MultiBinary(2)]),
         }
     )
     assert space_from_json(json.loads(json.dumps(space_to_json(space)))) == space
-    with pytest.raises(ConfigError, match="Box, Discrete and Dict"):
-        space_to_json(spaces.MultiBinary(2))
+    with pytest.raises(ConfigError, match="MultiBinary, Dict and Tuple spaces"):
+        space_to_json(spaces.Text(2))

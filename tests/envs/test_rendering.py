@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from relgym.envs import BallBoxRampEnv, TruckPushEnv, render_scene
+from relgym.envs import BallBoxRampEnv, BallGoalEnv, SceneEnv, TruckPushEnv, render_scene
 from relgym.envs.rendering import View, scene_view
 from relgym.errors import ConfigError
 from relgym.scene.objects import POSE, ObjectType, Scene, SceneSchema
@@ -91,6 +91,25 @@ def test_the_trucks_view_follows_it() -> None:
     for image in (first, env.render()):
         assert (np.abs(image.astype(int) - truck).max(axis=2) < 3).mean() > 0.01
     assert not np.array_equal(first, env.render())  # the ground's lines pass by
+
+
+def yellow_of(env: SceneEnv) -> np.ndarray:
+    return np.asarray(np.abs(env.render().astype(int) - np.array([255, 214, 92])).max(axis=2) < 3)
+
+
+@pytest.mark.parametrize(
+    "env", [TruckPushEnv(task="push", render_mode="rgb_array"), BallGoalEnv(render_mode="rgb_array")]
+)
+def test_goals_are_marked_where_they_are(env: SceneEnv) -> None:
+    env.reset(seed=0)
+    yellow = yellow_of(env)
+    assert 0.0005 < yellow.mean() < 0.02
+    rows, columns = np.nonzero(yellow)
+    assert yellow[rows.min() : rows.max(), columns.min() : columns.max()].mean() > 0.7  # one rectangle
+    action = np.full(env.action_space.shape or (), 1.0)
+    for _ in range(3):
+        env.step(action)
+    np.testing.assert_array_equal(yellow_of(env), yellow)  # goal and camera stand still
 
 
 def test_labels_and_arrows_are_off_by_default() -> None:

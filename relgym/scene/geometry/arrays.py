@@ -16,7 +16,7 @@ from relgym.scene.geometry.solid import Solid
 from relgym.scene.geometry.vectors import FloatArray, dot
 from relgym.scene.shapes import Box, Shape, Sphere
 
-__all__ = ["ArrayGeometry", "Bodies", "Geometry", "Measured", "check_extents", "pairs_of"]
+__all__ = ["ArrayGeometry", "Bodies", "Geometry", "Measured", "Solids", "check_extents", "pairs_of"]
 
 _Indices: TypeAlias = NDArray[np.intp]
 _Found: TypeAlias = tuple[FloatArray, FloatArray]
@@ -108,10 +108,31 @@ class _Work:
     sign: FloatArray
 
 
+class Solids:
+    """The polyhedra of n scenes, placed when they are needed: closed forms do without."""
+
+    def __init__(self, kernel: Planar | Solid, pose: FloatArray, turned: NDArray[np.bool_]) -> None:
+        self._kernel, self._pose, self._turned = kernel, pose, turned
+        self._placed: Any = None
+
+    @property
+    def placed(self) -> Any:
+        """What the kernel made of them."""
+        if self._placed is None:
+            self._placed = self._kernel.place(self._pose)
+        return self._placed
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lows and highs of their bounding boxes relative to the positions, shape ``(d, B, n)`` each."""
+        if self._placed is None and not self._turned.any():
+            return self._kernel.upright(self._pose)
+        return self._kernel.bounds(self.placed)
+
+
 @dataclass(frozen=True, slots=True)
 class _Memo:
     pose: FloatArray
-    solids: Any
+    solids: Solids
     measured: Measured
 
 
@@ -179,15 +200,16 @@ class ArrayGeometry:
         self._memo = _Memo(pose, solids, measured)
         return measured
 
-    def place(self, pose: FloatArray) -> Any:
-        """Check the extents of n scenes and place their polyhedra, for `fill` and `bounds`."""
+    def place(self, pose: FloatArray) -> Solids:
+        """Check the extents of n scenes and take up their polyhedra, for `fill` and `bounds`."""
         check_extents(self._bodies, self._axes, pose, self._spheres)
-        return self._kernel.place(pose.take(self._polyhedra, axis=1))
+        cornered = pose.take(self._polyhedra, axis=1)
+        return Solids(self._kernel, cornered, cornered.take(self._turns, axis=0) != 0.0)
 
     def fill(
         self,
         pose: FloatArray,
-        solids: Any,
+        solids: Solids,
         stale: NDArray[np.bool_],
         distance: FloatArray,
         normal: FloatArray,
@@ -199,7 +221,7 @@ class ArrayGeometry:
             if kind == _SPHERES:
                 found = spheres(offset, radius.take(work.a, axis=0) + radius.take(work.b, axis=0))
             elif kind == _MIXED:
-                solid = solids.take(self._slot.take(work.b))
+                solid = solids.placed.take(self._slot.take(work.b))
                 found = self._kernel.sphere_solid(offset, radius.take(work.a, axis=0), solid)
             elif kind == _BOXES:
                 found = self._boxes(pose, solids, work, offset)
@@ -207,7 +229,7 @@ class ArrayGeometry:
                 found = self._solids(solids, work, offset)
             distance[work.pairs], normal[:, work.pairs] = found[0], found[1] * work.sign
 
-    def _boxes(self, pose: FloatArray, solids: Any, work: _Work, offset: FloatArray) -> _Found:
+    def _boxes(self, pose: FloatArray, solids: Solids, work: _Work, offset: FloatArray) -> _Found:
         """Closed form for those scenes where neither box is rotated: exact, and much cheaper in space."""
         turned = pose.take(self._turns, axis=0).any(axis=0)
         half = 0.5 * pose[6:].take(self._used, axis=0)
@@ -218,11 +240,48 @@ class ArrayGeometry:
         distance, normal = self._solids(solids, work, offset)
         return np.where(skew, distance, simple[0]), np.where(skew, normal, simple[1])
 
-    def _solids(self, solids: Any, work: _Work, offset: FloatArray) -> _Found:
-        a, b = (solids.take(self._slot.take(side)) for side in (work.a, work.b))
+    def _solids(self, solids: Solids, work: _Work, offset: FloatArray) -> _Found:
+        a, b = (solids.placed.take(self._slot.take(side)) for side in (work.a, work.b))
         return self._kernel.solid_solid(offset, a, b)
 
-    def supports(self, solids: Any, directions: FloatArray, bodies: _Indices) -> FloatArray:
+    def unsettled(self, pairs: NDArray[np.bool_]) -> _Indices:
+        """Those of the pairs that `pairs` marks whose distance takes long to find: two polyhedra, not both boxes."""
+        return np.flatnonzero(pairs & (self._kind == _SOLIDS))
+
+    def fill_some(
+        self,
+        pose: FloatArray,
+        solids: Solids,
+        pairs: _Indices,
+        chosen: NDArray[np.bool_],
+        distance: FloatArray,
+        normal: FloatArray,
+    ) -> None:
+        """Measure `unsettled` pairs in some scenes only.
+
+        Parameters
+        ----------
+        pose, solids
+            As for `fill`.
+        pairs
+            Their numbers, shape ``(p,)``.
+        chosen
+            In which scenes each of them is measured, shape ``(p, n)``.
+        distance, normal
+            What is written to, shape ``(P, n)`` and ``(d, P, n)``.
+        """
+        which, scenes = np.nonzero(chosen)
+        if not len(which):
+            return
+        number = pairs[which]
+        sides = self._first[number], self._second[number]
+        position = pose.take(self._used, axis=0)
+        offset = (position[:, sides[0], scenes] - position[:, sides[1], scenes])[:, None]
+        a, b = (solids.placed.pick(self._slot[side], scenes) for side in sides)
+        found = self._kernel.solid_solid(offset, a, b)
+        distance[number, scenes], normal[:, number, scenes] = found[0][0], found[1][:, 0]
+
+    def supports(self, solids: Solids, directions: FloatArray, bodies: _Indices) -> FloatArray:
         """Least component of bodies' points along directions ``(d, P)``, in one scene.
 
         Relative to their positions; a sphere counts as its centre.
@@ -230,7 +289,7 @@ class ArrayGeometry:
         lowest = np.zeros(len(bodies))
         cornered = np.flatnonzero(np.isin(bodies, self._polyhedra))
         if len(cornered):
-            corners = self._kernel.corners(solids).take(self._slot[bodies[cornered]], axis=2)[..., 0]
+            corners = self._kernel.corners(solids.placed).take(self._slot[bodies[cornered]], axis=2)[..., 0]
             lowest[cornered] = dot(directions[:, None, cornered], corners).min(axis=0)
         return lowest
 
@@ -250,7 +309,7 @@ class ArrayGeometry:
         sign = np.where(swap, -1.0, 1.0)[:, None]
         return _Work(pairs, np.where(swap, b, a), np.where(swap, a, b), sign)
 
-    def bounds(self, pose: FloatArray, solids: Any) -> tuple[FloatArray, FloatArray]:
+    def bounds(self, pose: FloatArray, solids: Solids) -> tuple[FloatArray, FloatArray]:
         """Lows and highs of the bounding boxes relative to the positions, shape ``(d, K, n)`` each."""
         shape = (len(self._used), *pose.shape[1:])
         low, high = np.empty(shape), np.empty(shape)
@@ -258,5 +317,5 @@ class ArrayGeometry:
             radius = 0.5 * pose[6 + self._used[0]].take(self._spheres, axis=0)
             low[:, self._spheres], high[:, self._spheres] = -radius, radius
         if len(self._polyhedra):
-            low[:, self._polyhedra], high[:, self._polyhedra] = self._kernel.bounds(solids)
+            low[:, self._polyhedra], high[:, self._polyhedra] = solids.bounds()
         return low, high

@@ -50,6 +50,16 @@ class Polygons:
             self.lengths.take(bodies, axis=1),
         )
 
+    def pick(self, bodies: NDArray[np.intp], scenes: NDArray[np.intp]) -> Polygons:
+        """One polygon of one scene for each of m pairs, as pairs of one scene each: shapes ``(2, V, 1, m)``."""
+        parts = (self.starts, self.normals, self.lengths)
+        return Polygons(*(a[..., bodies, scenes][..., None, :] for a in parts))
+
+    def rows(self, chosen: NDArray[np.bool_]) -> Polygons:
+        """Polygons of the chosen (pair, scene) rows, as one pair: shapes ``(2, V, 1, rows)``."""
+        parts = (self.starts, self.normals, self.lengths)
+        return Polygons(*(a[..., chosen][..., None, :] for a in parts))
+
     @property
     def offsets(self) -> FloatArray:
         """Distance of each edge's line from the polygon's position, shape ``(V, B, n)``."""
@@ -92,6 +102,11 @@ class Planar:
         count = self._corners.shape[1]
         return Polygons(turned[:, :count], turned[:, count:], lengths)
 
+    def upright(self, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what `bounds` says of polygons that aren't turned, without placing them."""
+        extent = pose[6:][self._used]
+        return self._corners.min(axis=1) * extent, self._corners.max(axis=1) * extent
+
     @staticmethod
     def corners(solids: Polygons) -> FloatArray:
         """Corners relative to the positions, shape ``(2, V, B, n)``."""
@@ -132,11 +147,11 @@ class Planar:
         apart = depth > 0.0
         if not apart.any():
             return depth, normal
-        to_b, normal_b = _nearest(offset, a, b)
-        to_a, normal_a = _nearest(-offset, b, a)
-        nearer = to_b <= to_a
-        distance = np.where(apart, np.where(nearer, to_b, to_a), depth)
-        return distance, np.where(apart, np.where(nearer, normal_b, -normal_a), normal)
+        if apart.all():
+            return _between(offset, a, b)
+        near, towards = _between(offset[:, apart][:, None], a.rows(apart), b.rows(apart))
+        depth[apart], normal[:, apart] = near[0], towards[:, 0]
+        return depth, normal
 
 
 def _gaps(offset: FloatArray, a: Polygons, b: Polygons) -> FloatArray:
@@ -145,6 +160,14 @@ def _gaps(offset: FloatArray, a: Polygons, b: Polygons) -> FloatArray:
     support = dot(b.normals[:, None], a.starts[:, :, None]).min(axis=0)
     gaps: FloatArray = (support - b.offsets) + dot(b.normals, offset[:, None])
     return gaps
+
+
+def _between(offset: FloatArray, a: Polygons, b: Polygons) -> tuple[FloatArray, FloatArray]:
+    """Distance and normal of polygons apart."""
+    to_b, normal_b = _nearest(offset, a, b)
+    to_a, normal_a = _nearest(-offset, b, a)
+    nearer = to_b <= to_a
+    return np.where(nearer, to_b, to_a), np.where(nearer, normal_b, -normal_a)
 
 
 def _nearest(offset: FloatArray, a: Polygons, b: Polygons) -> tuple[FloatArray, FloatArray]:

@@ -55,6 +55,10 @@ class Polyhedra:
         """Polyhedra of the bodies with these numbers."""
         return Polyhedra(*(getattr(self, f.name).take(bodies, axis=-2) for f in fields(self)))
 
+    def pick(self, bodies: NDArray[np.intp], scenes: NDArray[np.intp]) -> Polyhedra:
+        """One polyhedron of one scene for each of m pairs, as pairs of one scene each: shapes ``(3, V, 1, m)``."""
+        return Polyhedra(*(getattr(self, f.name)[..., bodies, scenes][..., None, :] for f in fields(self)))
+
     def rows(self, chosen: NDArray[np.bool_]) -> Polyhedra:
         """Polyhedra of the chosen (pair, scene) rows, as one scene each: shapes ``(3, m, 1, rows)``."""
         return Polyhedra(*(getattr(self, f.name)[..., chosen][..., None, :] for f in fields(self)))
@@ -93,6 +97,10 @@ class Solid:
         cuts = np.cumsum([part.shape[1] for part in parts])[:-1]
         corners, normals, starts, edges, directions = np.split(turned, cuts, axis=1)
         return Polyhedra(corners, normals, offsets, starts, edges, directions)
+
+    def upright(self, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what `bounds` says of polyhedra that aren't turned, without placing them."""
+        return self._corners.min(axis=1) * pose[6:], self._corners.max(axis=1) * pose[6:]
 
     @staticmethod
     def corners(solids: Polyhedra) -> FloatArray:

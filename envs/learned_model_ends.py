@@ -1,0 +1,114 @@
+"""Why a dream ends early: the model has left what it knows, or the world has left its space."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, ScenePrediction
+
+__all__ = ["CAUSES", "Cause", "causes", "explained", "horizon_reached", "parts_of", "parts_of_row"]
+
+
+class Cause(enum.Enum):
+    """What ended a dream; the value is the sentence for people, the name is ``info["cause"]`` in lower case.
+
+    All but `HORIZON` say that the prediction was not followed: the dream stays in the last scene that is known.
+    """
+
+    NO_MODE = Outcome.NO_MODE.value
+    UNEXPLAINED = Outcome.UNEXPLAINED.value
+    NO_ROLES = Outcome.NO_ROLES.value
+    OUTSIDE = Outcome.OUTSIDE.value
+    DEPENDS = Outcome.DEPENDS.value
+    LOW_MARGIN = "the winning mode leads its rival by too little"
+    LEFT = "left the observation space"
+    HORIZON = "the horizon is reached"
+
+
+CAUSES = tuple(Cause)
+"""Order in which batches number causes; -1 stands for a step that can be followed."""
+
+_FOLLOWED = OUTCOMES.index(Outcome.PREDICTED)
+_OF_OUTCOME = np.array(
+    [-1 if o is Outcome.PREDICTED else CAUSES.index(Cause[o.name]) for o in OUTCOMES], dtype=np.int8
+)
+
+
+def causes(prediction: BatchPrediction, inside: NDArray[np.bool_], min_margin: float) -> NDArray[np.int8]:
+    """Why each of n predictions can't be followed, as a position in `CAUSES`; -1 where it can.
+
+    Parameters
+    ----------
+    prediction
+        What the model says.
+    inside
+        Whether each next scene lies in the observation space, shape ``(n,)``.
+    min_margin
+        Least margin, in log-odds, of a prediction that is followed.
+
+    Notes
+    -----
+    Of several causes the first in this order counts: a property that no mode predicts (the first one in causal
+    order), a margin too small, a property out of its bounds.
+    """
+    n = len(inside)
+    found = np.where(inside, -1, CAUSES.index(Cause.LEFT)).astype(np.int8)
+    if prediction.margins.shape[1] and min_margin > 0.0:
+        found[(prediction.margins < min_margin).any(axis=1)] = CAUSES.index(Cause.LOW_MARGIN)
+    silent = prediction.outcomes != _FOLLOWED
+    some = silent.any(axis=1)
+    if some.any():
+        first = prediction.outcomes[np.arange(n), silent.argmax(axis=1)]
+        found[some] = _OF_OUTCOME[first[some]]
+    return found
+
+
+def explained(
+    parts: Iterable[tuple[str, str, Outcome, float]], min_margin: float
+) -> tuple[Cause, str] | None:
+    """Why one prediction can't be followed, and the sentence that names objects and properties; None if it can.
+
+    Whether the next scene lies in the observation space is not asked here.
+
+    Parameters
+    ----------
+    parts
+        Object, property, outcome and margin of every part of the prediction, in causal order.
+    min_margin
+        As for `causes`.
+    """
+    parts = tuple(parts)
+    silent = [(name, prop, outcome) for name, prop, outcome, _ in parts if outcome is not Outcome.PREDICTED]
+    if silent:
+        told = "; ".join(f"{name}.{prop}: {outcome.value}" for name, prop, outcome in silent)
+        return Cause[silent[0][2].name], told
+    unsure = [(name, prop, margin) for name, prop, _, margin in parts if margin < min_margin]
+    if unsure:
+        told = "; ".join(
+            f"{name}.{prop}: {Cause.LOW_MARGIN.value} ({margin:.3g}, expected at least {min_margin:.3g})"
+            for name, prop, margin in unsure
+        )
+        return Cause.LOW_MARGIN, told
+    return None
+
+
+def parts_of(prediction: ScenePrediction) -> Iterator[tuple[str, str, Outcome, float]]:
+    """What `explained` asks of a single prediction."""
+    return ((p.object, p.property, p.outcome, p.margin) for p in prediction.parts)
+
+
+def parts_of_row(prediction: BatchPrediction, row: int) -> Iterator[tuple[str, str, Outcome, float]]:
+    """What `explained` asks of one scene of a batch."""
+    told = zip(
+        prediction.parts, prediction.outcomes[row].tolist(), prediction.margins[row].tolist(), strict=True
+    )
+    return ((name, prop, OUTCOMES[outcome], margin) for (name, prop), outcome, margin in told)
+
+
+def horizon_reached(horizon: int | None) -> str:
+    """The sentence for `Cause.HORIZON`."""
+    return f"the horizon of {horizon} steps is reached"

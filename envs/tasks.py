@@ -1,0 +1,118 @@
+"""Tasks: what an agent is asked to do, as pure functions of (scene, action, next scene).
+
+Reward and termination of an env live here and not in the env, so that a dream can be judged by the very same
+functions as the world: one scene at a time, or thousands at once.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.envs.actions import without_action
+from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
+
+__all__ = ["Judgement", "Region", "Task", "column_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What a task says of n steps.
+
+    Attributes
+    ----------
+    rewards
+        Shape ``(n,)``.
+    terminated
+        Whether the step ends the episode, shape ``(n,)``.
+    succeeded
+        Whether it ends it well, shape ``(n,)``.
+    """
+
+    rewards: Float1D
+    terminated: NDArray[np.bool_]
+    succeeded: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A part of the world that a picture marks, in world units along the first and the up axis."""
+
+    left: float
+    bottom: float
+    width: float
+    height: float
+
+
+class Task(ABC):
+    """What an agent is asked to do. Immutable; its methods depend on nothing but their arguments.
+
+    A subclass supplies `judge`. The functions of single scenes and those of arrays go through it, so that they
+    agree to the last bit.
+
+    Notes
+    -----
+    `reward` and `terminated` are what `LearnedModelEnv` takes as functions of (scene, action, next scene);
+    `rewards` and `terminations` are the same for arrays of scenes.
+    """
+
+    @abstractmethod
+    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
+        """Judge n steps.
+
+        Parameters
+        ----------
+        layout
+            The layout that all scenes share; the action object may be part of it or not.
+        before, after
+            State vectors before and after each step, shape ``(n, layout.width)``.
+        actions
+            What was done, in the units of the action space, shape ``(n, …)``.
+        """
+
+    @abstractmethod
+    def regions(self, scene: Scene) -> tuple[Region, ...]:
+        """Where the agent is to go: what a picture marks."""
+
+    def rewards(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float1D:
+        """Rewards of n steps, shape ``(n,)``; see `judge`."""
+        return self.judge(layout, before, actions, after).rewards
+
+    def terminations(
+        self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
+    ) -> NDArray[np.bool_]:
+        """Which of n steps end their episodes, shape ``(n,)``; see `judge`."""
+        return self.judge(layout, before, actions, after).terminated
+
+    def successes(
+        self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
+    ) -> NDArray[np.bool_]:
+        """Which of n steps reach the aim, shape ``(n,)``; see `judge`."""
+        return self.judge(layout, before, actions, after).succeeded
+
+    def reward(self, before: Scene, action: Any, after: Scene) -> float:
+        """Reward of one step; the scenes may hold an action object or not."""
+        return float(self._one(before, action, after).rewards[0])
+
+    def terminated(self, before: Scene, action: Any, after: Scene) -> bool:
+        """Whether a step ends the episode."""
+        return bool(self._one(before, action, after).terminated[0])
+
+    def succeeded(self, before: Scene, action: Any, after: Scene) -> bool:
+        """Whether a step reaches the aim."""
+        return bool(self._one(before, action, after).succeeded[0])
+
+    def _one(self, before: Scene, action: Any, after: Scene) -> Judgement:
+        # A scene with what is done in it is wider than the one that follows.
+        first, last = without_action(before), without_action(after)
+        return self.judge(first.layout, first.vector[None], np.asarray(action)[None], last.vector[None])
+
+
+def column_of(layout: SceneLayout, name: str, prop: str, vectors: Float2D) -> Float1D:
+    """A property of one object in n scenes, shape ``(n,)``."""
+    column: Float1D = vectors[:, layout.column(layout.index(name), prop)]
+    return column

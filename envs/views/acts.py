@@ -1,0 +1,120 @@
+"""Actions of any flat space as properties of the bodiless object `action`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from relgym.envs.actions import without_action
+from relgym.envs.views.records import identifiers
+from relgym.errors import ConfigError
+from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene
+
+__all__ = ["MOST_CHOICES", "Acts"]
+
+MOST_CHOICES = 16
+"""Discrete actions with more choices than this have a number, but no indicators: each would cost a column."""
+
+
+class Acts:
+    """What actions of a space are in a scene.
+
+    Continuous actions are properties in the env's own units. A discrete one is a number, for functions that are
+    linear in it, and from three choices on (up to `MOST_CHOICES`) as many *indicators*, 1 for the choice taken
+    and 0 for the others: clauses test them, and functions use them where the number's order means nothing.
+
+    Parameters
+    ----------
+    space
+        A flat Box, Discrete, MultiDiscrete or MultiBinary.
+    names
+        For a Discrete space the names of its choices (default ``a_is_0``, ``a_is_1``, …); for other spaces those
+        of an action's numbers (default ``a`` if it is one, else ``a0``, ``a1``, …).
+
+    Raises
+    ------
+    ConfigError
+        Another space, or names that are too many, too few or no identifiers.
+
+    Examples
+    --------
+    >>> acts = Acts(spaces.Discrete(3), names=("left", "nothing", "right"))
+    >>> acts.properties
+    ('a', 'left', 'nothing', 'right')
+    >>> acts.values(2)
+    array([2., 0., 0., 1.])
+    """
+
+    def __init__(self, space: spaces.Space[Any], names: Sequence[str] | None = None) -> None:
+        self.space = space
+        self.names = None if names is None else tuple(names)
+        self._starts, self._counts = _choices(space)
+        discrete = isinstance(space, spaces.Discrete)
+        given = self.names if self.names is not None and not discrete else _numbered(len(self._starts))
+        identifiers("names of an action's numbers", given, len(self._starts))
+        labels = [
+            [] if not 3 <= count <= MOST_CHOICES else [f"{name}_is_{k + start:g}" for k in range(count)]
+            for name, start, count in zip(given, self._starts, self._counts, strict=True)
+        ]
+        if discrete and self.names is not None:
+            identifiers("names of the choices", self.names, self._counts[0])
+            labels = [list(self.names)]
+        self.properties = (*given, *(label for part in labels for label in part))
+        self._indicated = [k for k, part in enumerate(labels) if part]
+
+    @cached_property
+    def type(self) -> ObjectType:
+        """The type of the action object."""
+        return ObjectType(ACTION, self.properties)
+
+    def values(self, action: Any) -> Float1D:
+        """Properties of the action object, shape ``(len(properties),)``, for a legal action."""
+        numbers = np.asarray(action, dtype=np.float64).ravel()
+        if not self._indicated:
+            return numbers
+        shown = [numbers]
+        for k in self._indicated:
+            one_hot = np.zeros(self._counts[k])
+            one_hot[int(numbers[k] - self._starts[k])] = 1.0
+            shown.append(one_hot)
+        return np.concatenate(shown)
+
+    def values_batch(self, actions: Any) -> Float2D:
+        """`values` of n actions, shape ``(n, len(properties))``; the same bits."""
+        numbers = np.asarray(actions, dtype=np.float64)
+        numbers = numbers.reshape(len(numbers), -1)
+        choices = [numbers[:, [k]] - self._starts[k] == np.arange(self._counts[k]) for k in self._indicated]
+        return np.concatenate([numbers, *choices], axis=1)
+
+    def acting(self, scene: Scene, action: Any) -> Scene:
+        """The scene with this action in it, in place of another one if there is one."""
+        bare = without_action(scene)
+        schema = scene.schema
+        layout = schema.layout((*bare.layout.names, ACTION))
+        at = layout.offsets[layout.index(ACTION)]  # objects stand in schema order
+        parts = (bare.vector[:at], self.values(action), bare.vector[at:])
+        return Scene(schema, layout, np.concatenate(parts))
+
+
+def _numbered(count: int) -> tuple[str, ...]:
+    return ("a",) if count == 1 else tuple(f"a{k}" for k in range(count))
+
+
+def _choices(space: spaces.Space[Any]) -> tuple[list[float], list[int]]:
+    """Smallest value and number of choices of each of an action's numbers; 0 choices where it is continuous."""
+    if isinstance(space, spaces.Discrete):
+        return [float(space.start)], [int(space.n)]
+    if isinstance(space, spaces.MultiDiscrete):
+        starts = np.broadcast_to(space.start, space.nvec.shape).ravel()
+        return starts.astype(np.float64).tolist(), space.nvec.ravel().tolist()
+    if isinstance(space, (spaces.Box, spaces.MultiBinary)):
+        size = int(np.prod(space.shape))
+        return [0.0] * size, [0] * size
+    raise ConfigError(
+        f"the action space is {space}: expected Box, Discrete, MultiDiscrete or MultiBinary; flatten it "
+        "(gymnasium.wrappers.TransformAction), or pass a view whose schema has an action object of its own"
+    )

@@ -1,0 +1,277 @@
+"""The view of tables: rows are objects, columns their properties."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from relgym.envs.spaces_json import space_from_json, space_to_json
+from relgym.envs.views.acts import Acts
+from relgym.envs.views.base import precision_of
+from relgym.envs.views.matching import matched
+from relgym.envs.views.records import Rows, Static, identifiers, merged
+from relgym.errors import ConfigError, ObservationError
+from relgym.scene.objects import ACTION, Float2D, ObjectType, Scene, SceneSchema
+
+__all__ = ["TableView"]
+
+
+class TableView:
+    """Rows of a table as objects, with bodies where the user says which columns are pose and size.
+
+    Parameters
+    ----------
+    observation_space
+        A Box of shape ``(rows, columns)``.
+    action_space
+        The env's action space.
+    columns
+        Names of the columns.
+    rows
+        What the rows are, from the first to the last: `Rows` records whose counts sum to the table's. Default:
+        all of one type `row`, without bodies.
+    presence
+        The column that says whether a row holds an object (more than 0.5) or is empty; it is no property.
+        Default: every row holds one.
+    match
+        Columns by which a row is recognised from step to step, in a table whose rows are sorted anew: column
+        name -> a distance that is far, in the column's units. Rows and *expected* objects of a kind are paired
+        so that the sum of squared distances is smallest; a row farther than 1 from all is a new object. Default:
+        the k-th row is always the same object.
+    actions, static, up, planar
+        As of `NumbersView`.
+
+    Raises
+    ------
+    ConfigError
+        A space that is no table, or declarations that don't fit it.
+
+    Notes
+    -----
+    Objects may come and go. A matched table has twice as many names as rows, so that one that comes while another
+    goes is never taken for it.
+
+    Examples
+    --------
+    >>> space, push = spaces.Box(-9, 9, (2, 3), np.float64), spaces.Discrete(2)
+    >>> view = TableView(space, push, columns=("here", "x", "v"), presence="here", match={"x": 1.0})
+    >>> first = view.scene(np.array([[1.0, 0.0, 0.1], [1.0, 5.0, -0.1]]))
+    >>> later = view.scene(np.array([[1.0, 4.9, -0.1], [1.0, 0.1, 0.1]]), last=first)
+    >>> later["row1"]["x"], later["row2"]["x"]
+    (0.1, 4.9)
+    """
+
+    def __init__(
+        self,
+        observation_space: spaces.Space[Any],
+        action_space: spaces.Space[Any],
+        *,
+        columns: Sequence[str],
+        rows: Sequence[Rows] | None = None,
+        presence: str | None = None,
+        match: Mapping[str, float] | None = None,
+        actions: Sequence[str] | None = None,
+        static: Sequence[Static] = (),
+        up: str = "y",
+        planar: bool = True,
+    ) -> None:
+        self._space = _table(observation_space)
+        count, width = self._space.shape
+        identifiers("columns", columns, width)
+        self.columns, self._presence = tuple(columns), presence
+        self._match = None if match is None else dict(match)
+        _check_columns(self.columns, [*([presence] if presence else ()), *(match or ())])
+        self.rows = (Rows("row", count),) if rows is None else tuple(rows)
+        if sum(part.count for part in self.rows) != count:
+            raise ConfigError(
+                f"rows={self.rows}: expected counts that sum to the table's {count} rows, got "
+                f"{sum(part.count for part in self.rows)}"
+            )
+        self._acts, self._static, self._axes = Acts(action_space, actions), tuple(static), (up, planar)
+        self._properties = tuple(name for name in self.columns if name != presence)
+        self._shown = np.array([self.columns.index(name) for name in self._properties], np.intp)
+        self._here = None if presence is None else self.columns.index(presence)
+        self._scales = np.array(list((match or {}).values()), dtype=np.float64)
+        if (self._scales <= 0.0).any():
+            raise ConfigError(f"match={dict(match or {})}: expected distances greater than 0")
+        self._names = _names(self.rows, spare=match is not None)
+        self.schema = self._made_schema()
+        self._fixed = {s.name: np.array(list(s.values.values()), dtype=np.float64) for s in self._static}
+
+    def _made_schema(self) -> SceneSchema:
+        kinds = [self._kind(part) for part in self.rows]
+        fixed = [ObjectType(s.type or s.name, tuple(s.values), s.shape) for s in self._static]
+        objects = [
+            *((name, kind.name) for kind, names in zip(kinds, self._names, strict=True) for name in names),
+            *((s.name, kind.name) for s, kind in zip(self._static, fixed, strict=True)),
+        ]
+        identifiers("names of the objects", [name for name, _ in objects], len(objects))
+        types = (*merged([*kinds, *fixed]), self._acts.type)
+        return SceneSchema(types, (*objects, (ACTION, ACTION)), up=self._axes[0], planar=self._axes[1])
+
+    def _kind(self, part: Rows) -> ObjectType:
+        return ObjectType(
+            part.type or part.name,
+            (*self._properties, *part.constants),
+            part.shape,
+            pose=dict(part.pose),
+            velocity=tuple(part.velocity),
+            optional=self._presence is not None or self._match is not None,
+        )
+
+    # ------------------------------------------------------------------ scenes
+    @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return precision_of(self._space.dtype in (np.float16, np.float32))
+
+    def scene(
+        self,
+        observation: Any,
+        info: Mapping[str, Any] | None = None,
+        *,
+        last: Scene | None = None,
+        expected: Scene | None = None,
+    ) -> Scene:
+        """The scene that a table shows; see `View.scene`."""
+        table = self._checked(observation)
+        values: dict[str, NDArray[np.float64]] = {}
+        at = 0
+        for part, names in zip(self.rows, self._names, strict=True):
+            own = table[at : at + part.count]
+            at += part.count
+            here = np.arange(len(own)) if self._here is None else np.flatnonzero(own[:, self._here] > 0.5)
+            constants = np.array(list(part.constants.values()), dtype=np.float64)
+            chosen = self._chosen(own[here], names, here, last, last if expected is None else expected)
+            for name, row in zip(chosen, own[here], strict=True):
+                values[name] = np.concatenate([row[self._shown], constants])
+        return self.schema.scene(values | self._fixed)
+
+    def _chosen(
+        self,
+        rows: Float2D,
+        names: Sequence[str],
+        here: NDArray[np.intp],
+        last: Scene | None,
+        expected: Scene | None,
+    ) -> list[str]:
+        """Name of the object in each row."""
+        if self._match is None or len(names) == 1:
+            return [names[int(k)] for k in here]
+        known = [name for name in names if expected is not None and name in expected]
+        columns = [self.columns.index(name) for name in self._match]
+        places = [self._properties.index(name) for name in self._match]
+        wanted = np.array([expected[name].values[places] for name in known if expected is not None])
+        pairs = matched(
+            rows[:, columns] / self._scales, wanted.reshape(len(known), len(places)) / self._scales, gate=1.0
+        )
+        # A name that was there a step ago would make a leap of two different objects.
+        free = iter(name for name in names if name not in known and (last is None or name not in last))
+        return [known[k] if k >= 0 else next(free) for k in pairs.tolist()]
+
+    def _checked(self, observation: Any) -> Float2D:
+        try:
+            table = np.asarray(observation, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ObservationError(f"expected a table of numbers, got {observation!r}") from None
+        if table.shape != self._space.shape:
+            raise ObservationError(
+                f"expected a table of shape {self._space.shape}, columns {self.columns}, got shape {table.shape}"
+            )
+        if not np.isfinite(table).all():
+            row, column = (int(k) for k in np.argwhere(~np.isfinite(table))[0])
+            raise ObservationError(
+                f"row {row}, column {self.columns[column]!r}: expected a finite number, got {table[row, column]}; "
+                "check the env's observation before it is learned from"
+            )
+        return table
+
+    def with_action(self, scene: Scene, action: Any) -> Scene:
+        """The scene with the action's properties: see `Acts`."""
+        return self._acts.acting(scene, action)
+
+    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
+        """The scene as it is: this view learns of the state alone (`TaskView` of more)."""
+        return scene
+
+    def observation(self, scene: Scene) -> NDArray[Any]:
+        """A table that shows a scene; matched rows stand in the schema's order, empty ones are 0.
+
+        Raises
+        ------
+        ObservationError
+            More objects of a kind than rows.
+        """
+        table = np.zeros(self._space.shape)
+        at = 0
+        for part, names in zip(self.rows, self._names, strict=True):
+            present = [name for name in names if name in scene]
+            if len(present) > part.count:
+                raise ObservationError(f"expected at most {part.count} objects {part.name!r}, got {present}")
+            for k, name in enumerate(present):
+                row = at + (k if self._match is not None else names.index(name))
+                table[row, self._shown] = scene[name].values[: len(self._shown)]
+                if self._here is not None:
+                    table[row, self._here] = 1.0
+            at += part.count
+        return table.astype(self._space.dtype)
+
+    # ------------------------------------------------------------------ files
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back."""
+        return {
+            "kind": "table",
+            "observation": space_to_json(self._space),
+            "action": space_to_json(self._acts.space),
+            "columns": list(self.columns),
+            "rows": [part.to_json() for part in self.rows],
+            "presence": self._presence,
+            "match": None if self._match is None else [[k, v] for k, v in self._match.items()],
+            "actions": None if self._acts.names is None else list(self._acts.names),
+            "static": [s.to_json() for s in self._static],
+            "axes": list(self._axes),
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> TableView:
+        """Read what `to_json` wrote."""
+        return cls(
+            space_from_json(data["observation"]),
+            space_from_json(data["action"]),
+            columns=data["columns"],
+            rows=[Rows.from_json(part) for part in data["rows"]],
+            presence=data["presence"],
+            match=None if data["match"] is None else {str(k): float(v) for k, v in data["match"]},
+            actions=data["actions"],
+            static=[Static.from_json(s) for s in data["static"]],
+            up=data["axes"][0],
+            planar=data["axes"][1],
+        )
+
+
+def _table(space: spaces.Space[Any]) -> spaces.Box:
+    if not isinstance(space, spaces.Box) or len(space.shape) != 2:
+        raise ConfigError(
+            f"expected a table, a Box of shape (rows, columns), got {space}; "
+            "gymnasium.wrappers.ReshapeObservation makes one of a flat Box"
+        )
+    return space
+
+
+def _check_columns(columns: Sequence[str], named: Sequence[str]) -> None:
+    if unknown := sorted(set(named) - set(columns)):
+        raise ConfigError(f"presence or match name columns {unknown}; the table has {tuple(columns)}")
+
+
+def _names(rows: Sequence[Rows], *, spare: bool) -> tuple[tuple[str, ...], ...]:
+    """Names of the objects of each kind; a single one bears the kind's name."""
+    found = []
+    for part in rows:
+        count = part.count * (2 if spare else 1)
+        single = part.count == 1
+        found.append((part.name,) if single else tuple(f"{part.name}{k}" for k in range(1, count + 1)))
+    return tuple(found)

@@ -1,0 +1,126 @@
+"""Reward and termination as properties of the bodiless object `task` (design §4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from relgym.envs.views.base import View
+from relgym.envs.views.numeric import NumbersView
+from relgym.errors import ConfigError, ObservationError
+from relgym.scene.objects import TASK, ObjectType, Scene
+
+__all__ = ["REWARD", "TERMINATED", "TaskView"]
+
+REWARD = "reward"
+"""Property of `task`: the reward of the step, in the env's units."""
+
+TERMINATED = "terminated"
+"""Property of `task`: 1 where the step ended the episode (terminated, not truncated), else 0."""
+
+
+class TaskView:
+    """Another view, whose scenes also say what a step brought.
+
+    Before a step both properties are 0, for what it will bring is not known; after it they are the step's. So
+    they are functions of scene, action and next scene, and of nothing else.
+
+    Parameters
+    ----------
+    view
+        The view of the state.
+    reward, terminated
+        Which of the two are shown.
+
+    Raises
+    ------
+    ConfigError
+        The view's scenes have an object `task` already.
+    """
+
+    def __init__(self, view: View, *, reward: bool = True, terminated: bool = True) -> None:
+        if TASK in view.schema.order:
+            raise ConfigError(
+                f"the env's own scenes have an object {TASK!r}: leave out learn_reward and learn_termination"
+            )
+        self.view = view
+        self._names = tuple(name for name, wanted in ((REWARD, reward), (TERMINATED, terminated)) if wanted)
+        schema = view.schema
+        self.schema = replace(
+            schema,
+            types=(*schema.types, ObjectType(TASK, self._names)),
+            objects=(*schema.objects, (TASK, TASK)),
+        )
+
+    @property
+    def precision(self) -> float:
+        """Relative precision of the numbers that it shows: see `View`."""
+        return self.view.precision
+
+    @property
+    def open(self) -> bool:
+        """Whether the view of the state has pairs of numbers that may yet turn out to be angles."""
+        return bool(getattr(self.view, "open", False))
+
+    def settled(self, observations: Sequence[Any]) -> TaskView:
+        """The view with angles decided from some first observations: see `NumbersView.settled`."""
+        if not isinstance(self.view, NumbersView):
+            return self
+        wanted = {"reward": REWARD in self._names, "terminated": TERMINATED in self._names}
+        return TaskView(self.view.settled(observations), **wanted)
+
+    def scene(
+        self,
+        observation: Any,
+        info: Mapping[str, Any] | None = None,
+        *,
+        last: Scene | None = None,
+        expected: Scene | None = None,
+    ) -> Scene:
+        """The scene that an observation shows, without `task`; see `View.scene`."""
+        return self._own(self.view.scene(observation, info, last=last, expected=expected))
+
+    def with_action(self, scene: Scene, action: Any) -> Scene:
+        """The scene with what the agent does in it, and what that brings: 0, as long as it isn't known."""
+        acting = self._own(self.view.with_action(self._bare(scene), action))
+        return self._with(acting, [0.0] * len(self._names))
+
+    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
+        """The scene together with what the step to it brought; `ObservationError` for a reward that is no number."""
+        if not math.isfinite(reward):
+            raise ObservationError(
+                f"the reward: expected a finite number, got {reward}; mend the env's reward"
+            )
+        brought = {REWARD: float(reward), TERMINATED: float(terminated)}
+        return self._with(self._bare(scene), [brought[name] for name in self._names])
+
+    def observation(self, scene: Scene) -> Any:
+        """The observation that shows a scene."""
+        return self.view.observation(self._bare(scene))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `view_from_json` reads back."""
+        return {
+            "kind": "task",
+            "view": self.view.to_json(),
+            "reward": REWARD in self._names,
+            "terminated": TERMINATED in self._names,
+        }
+
+    # `task` stands last: its properties are the end of the vector.
+    def _own(self, scene: Scene) -> Scene:
+        return Scene(self.schema, self.schema.layout(scene.layout.names), scene.vector)
+
+    def _bare(self, scene: Scene) -> Scene:
+        if TASK not in scene:
+            return scene
+        rest = self.schema.layout(scene.layout.names[:-1])
+        return Scene(self.schema, rest, scene.vector[: rest.width].copy())
+
+    def _with(self, scene: Scene, values: list[float]) -> Scene:
+        layout = self.schema.layout((*scene.layout.names, TASK))
+        return Scene(self.schema, layout, np.concatenate([scene.vector, values]))

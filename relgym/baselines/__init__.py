@@ -1,0 +1,1 @@
+"""What relgym is compared with: today's alternatives, all behind one interface (`relgym.baselines.base`)."""

@@ -1,0 +1,181 @@
+"""Baselines on the ball experiments: trained like our learner, tested on the same examples (§4.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from time import perf_counter
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.baselines.base import Classifier, Regressor
+from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, make_classifier, make_regressor
+from relgym.baselines.features import Features, columns, features
+from relgym.baselines.tuned import setting_of
+from relgym.experiments.blocks import Block
+from relgym.experiments.chapter4.lesson import fresh_blocks, taught_blocks
+from relgym.experiments.chapter4.scores import target_score
+from relgym.experiments.chapter4.testing import TARGETS, true_modes
+from relgym.experiments.data import BALL_EXPERIMENTS
+from relgym.experiments.evaluate import TOLERANCE, explicable, mode_labels
+
+__all__ = ["classify", "regress"]
+
+_VELOCITY: Final = ("vx", "vy")
+
+
+def regress(
+    *,
+    baseline: str,
+    shown: str,
+    experiment: int,
+    seed: int,
+    order: int,
+    checkpoints: Sequence[int],
+    tests: Mapping[str, Any],
+    setting: int | None = None,
+) -> dict[str, Any]:
+    """Train a regressor on one batch; test after some numbers of blocks.
+
+    Parameters
+    ----------
+    baseline
+        One of `relgym.baselines.catalogue.REGRESSORS`.
+    shown
+        Which features it sees, of `relgym.baselines.features.FEATURES`.
+    experiment, seed, order, checkpoints, tests
+        As for our learner (`relgym.experiments.chapter4.lesson.lesson`).
+    setting
+        Number of the setting; default: the tuned one.
+
+    Returns
+    -------
+    Plain data: scores by checkpoint and target; seconds spent on learning and on all tests.
+    """
+    known = REGRESSORS[baseline]
+    number = setting_of(baseline, shown) if setting is None else setting
+    blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
+    fresh = fresh_blocks(experiment, tests)
+    seen = features(shown, blocks[0].schema, "ball")
+    velocity = columns(seen, _VELOCITY)
+    rng = np.random.default_rng([seed, order])
+    model = make_regressor(baseline, known.settings[number], velocity=velocity, rng=rng)
+    questions, answers = _examples(fresh, seen)
+    scores, learning, asking = [], 0.0, 0.0
+    for count, block in enumerate(blocks, start=1):
+        start = perf_counter()
+        _teach(model, *_examples([block], seen), velocity if known.change else ())
+        learning += perf_counter() - start
+        if count in checkpoints:
+            start = perf_counter()
+            predicted = model.predict_batch(questions)
+            predicted += questions[:, list(velocity)] if known.change else 0.0
+            asking += perf_counter() - start
+            scores.append({"blocks": count, "targets": _scores(predicted, answers, fresh, experiment)})
+    return {"scores": scores, "setting": dict(known.settings[number]), "learning": learning, "asking": asking}
+
+
+def _teach(model: Regressor, x: NDArray[np.float64], y: NDArray[np.float64], present: Sequence[int]) -> None:
+    values = y - x[:, list(present)] if present else y
+    for row, value in zip(x, values, strict=True):
+        model.learn_one(row, value)
+
+
+def _examples(blocks: Sequence[Block], seen: Features) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Features and next velocities of all transitions."""
+    x = [seen.rows(block.layout, block.vectors[:-1]) for block in blocks]
+    y = [block.columns("ball", *_VELOCITY)[1:] for block in blocks]
+    return np.concatenate(x), np.concatenate(y)
+
+
+def _scores(
+    predicted: NDArray[np.float64], actual: NDArray[np.float64], blocks: Sequence[Block], experiment: int
+) -> dict[str, Any]:
+    laws = BALL_EXPERIMENTS[experiment].modes()
+    names = mode_labels(laws)
+    before = np.concatenate([b.columns("ball", *_VELOCITY)[:-1] for b in blocks])
+    counted = [explicable(b, laws) for b in blocks]
+    found = {}
+    for k, target in enumerate(TARGETS):
+        found[target] = target_score(
+            names[target],
+            np.concatenate([true_modes(b, target, laws) for b in blocks]),
+            np.concatenate([c[target] for c in counted]),
+            np.abs(predicted[:, k] - actual[:, k]),
+            np.zeros(len(actual), dtype=np.bool_),
+            None,
+            actual[:, k] - before[:, k],
+        )
+    return found
+
+
+def classify(
+    *,
+    baseline: str,
+    shown: str,
+    experiment: int,
+    seed: int,
+    order: int,
+    checkpoints: Sequence[int],
+    tests: Mapping[str, Any],
+    setting: int | None = None,
+) -> dict[str, Any]:
+    """Train a classifier on the true modes of one batch; test after some numbers of blocks (§4.7.2).
+
+    It is taught which mode of the analytic list holds. A prediction is right if the predicted mode explains the
+    example, whichever really held: ties are forgiven. Examples that no mode explains are neither taught nor tested.
+
+    Parameters as of `regress`; `baseline` is one of `relgym.baselines.catalogue.CLASSIFIERS`.
+
+    Returns
+    -------
+    Plain data: examples and errors by checkpoint and target; seconds spent on learning and on all tests.
+    """
+    number = setting_of(baseline, shown) if setting is None else setting
+    blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
+    fresh = fresh_blocks(experiment, tests)
+    seen = features(shown, blocks[0].schema, "ball")
+    settings = CLASSIFIERS[baseline].settings[number]
+    models = {
+        t: make_classifier(baseline, settings, rng=np.random.default_rng([seed, order])) for t in TARGETS
+    }
+    asked = {target: _labelled(fresh, seen, target, experiment) for target in TARGETS}
+    scores, learning, asking = [], 0.0, 0.0
+    for count, block in enumerate(blocks, start=1):
+        start = perf_counter()
+        for target, model in models.items():
+            _tell(model, *_labelled([block], seen, target, experiment)[:2])
+        learning += perf_counter() - start
+        if count in checkpoints:
+            start = perf_counter()
+            scores.append({"blocks": count, "targets": {t: _errors(models[t], *asked[t]) for t in TARGETS}})
+            asking += perf_counter() - start
+    return {"scores": scores, "setting": dict(settings), "learning": learning, "asking": asking}
+
+
+def _tell(model: Classifier, x: NDArray[np.float64], labels: NDArray[np.int64]) -> None:
+    for row, label in zip(x, labels.tolist(), strict=True):
+        model.learn_one(row, label)
+
+
+def _labelled(
+    blocks: Sequence[Block], seen: Features, target: str, experiment: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Features, true modes and which modes explain each example; of those with a true mode."""
+    laws = BALL_EXPERIMENTS[experiment].modes()
+    x, _ = _examples(blocks, seen)
+    labels = np.concatenate([true_modes(b, target, laws) for b in blocks])
+    before = np.concatenate([b.columns("ball", *_VELOCITY)[:-1] for b in blocks])
+    after = np.concatenate([b.columns("ball", *_VELOCITY)[1:] for b in blocks])
+    explaining = laws.explaining(target[-1], before, after, TOLERANCE)
+    known = labels >= 0
+    return x[known], labels[known], explaining[known]
+
+
+def _errors(
+    model: Classifier, x: NDArray[np.float64], labels: NDArray[np.int64], explaining: NDArray[np.bool_]
+) -> dict[str, int]:
+    chosen = model.predict_batch(x)
+    right = explaining[np.arange(len(x)), chosen]
+    return {"examples": len(x), "wrong": int((~right).sum()), "strict": int((chosen != labels).sum())}

@@ -1,0 +1,211 @@
+"""What the thesis printed: the numbers of its tables and, where its text names them, of its figures.
+
+Velocities are in units per step, rates are shares. Clauses (tables 3.2, 4.3-4.6 and 4.10-4.14) lie in
+``published_clauses.txt``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Final
+
+__all__ = [
+    "CLASSIFIER_ERRORS",
+    "CONFUSIONS",
+    "LWR",
+    "MODES",
+    "ROLLOUT_FAILURES",
+    "TRANSFER",
+    "Confusion",
+    "PublishedClause",
+    "PublishedMode",
+    "PublishedPair",
+    "published_pairs",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedMode:
+    """A row of tables 4.2, 4.9 or 4.17: ``v' = weights . (vx, vy) + intercept``; noise has no weights."""
+
+    number: int
+    behaviour: str
+    examples: int
+    weights: tuple[float, float] | None = None
+    intercept: float = 0.0
+
+
+def _noise(examples: int) -> PublishedMode:
+    return PublishedMode(0, "Noise", examples)
+
+
+MODES: Final[Mapping[tuple[str, str], tuple[PublishedMode, ...]]] = {
+    ("4.2", "x"): (
+        _noise(7),
+        PublishedMode(1, "Slide on horiz. surf./fly", 15574, (1.0, 0.0)),
+        PublishedMode(2, "Bounce on vert. surf.", 295, (-0.9, 0.0)),
+        PublishedMode(3, "Bounce/slide on ramp", 124, (0.525, -0.823), 4.24e-4),
+    ),
+    ("4.2", "y"): (
+        _noise(10),
+        PublishedMode(1, "Fly (in gravity)", 9169, (0.0, 1.0), -9.8e-4),
+        PublishedMode(2, "Slide on horiz. surf.", 6355, (0.0, 0.0)),
+        PublishedMode(3, "Bounce on horiz. surf.", 334, (0.0, -0.9)),
+        PublishedMode(4, "Bounce/slide on ramp", 132, (-0.823, -0.425), -2.45e-4),
+    ),
+    ("4.9", "x"): (
+        _noise(65),
+        PublishedMode(1, "Slide/bounce left on horizontal surface", 6477, (1.0, -0.39), 1.96e-4),
+        PublishedMode(2, "Slide/bounce right on horizontal surface", 6094, (1.0, 0.39), -1.96e-4),
+        PublishedMode(3, "Fly", 18882, (1.0, 0.0)),
+        PublishedMode(4, "Bounce on vert. surf.", 347, (-0.95, 0.0)),
+        PublishedMode(5, "Halt from friction", 93, (0.0, 0.0)),
+        PublishedMode(6, "Bounce/slide on ramp", 42, (-0.17, -1.17), 5.88e-4),
+    ),
+    ("4.9", "y"): (
+        _noise(64),
+        PublishedMode(1, "Fly (in gravity)", 17151, (0.0, 1.0), -9.8e-4),
+        PublishedMode(2, "Slide on horiz. surf.", 13639, (0.0, 0.0)),
+        PublishedMode(3, "Bounce on horiz. surf.", 308, (0.0, -0.95)),
+        PublishedMode(4, "Bounce on vert. surf.", 437, (0.39, 1.0), -9.8e-4),
+        PublishedMode(5, "Bounce on vert. surf.", 359, (-0.39, 1.0), -9.8e-4),
+        PublishedMode(6, "Slide/bounce on ramp", 42, (-0.78, 0.22), -5.88e-4),
+    ),
+    ("4.17", "x"): (
+        _noise(179),
+        PublishedMode(1, "Slide right, 0.1 fric.", 5253, (1.0, 0.0), -9.8e-5),
+        PublishedMode(2, "Slide left, 0.1 fric.", 4766, (1.0, 0.0), 9.8e-5),
+        PublishedMode(3, "Slide right, 0.2 fric.", 6343, (1.0, 0.0), -1.96e-4),
+        PublishedMode(4, "Slide left, 0.2 fric.", 6623, (1.0, 0.0), 1.96e-4),
+        PublishedMode(5, "Fly", 46031, (1.0, 0.0)),
+        PublishedMode(6, "Bounce on vert. surf.", 1191, (-0.95, 0.0)),
+        PublishedMode(7, "Halt from friction", 7892, (0.0, 0.0)),
+        PublishedMode(8, "Bounce right, 0.1 fric.", 4318, (1.0, 0.195), -9.8e-5),
+        PublishedMode(9, "Bounce right, 0.2 fric.", 2656, (1.0, 0.39), -1.96e-4),
+        PublishedMode(10, "Bounce left, 0.1 fric.", 6358, (1.0, -0.195), 9.8e-5),
+        PublishedMode(11, "Bounce right, 0.2 fric.", 4151, (1.0, -0.39), 1.96e-4),
+        PublishedMode(12, "Ramp bounce, 0.1 fric.", 79, (-0.0725, -1.0725), 5.39e-4),
+        PublishedMode(13, "Ramp bounce, 0.2 fric.", 63, (-0.17, -1.17), 5.88e-4),
+        PublishedMode(14, "Ramp bounce, 0.1 fric.", 50, (-0.475, -0.475)),
+        PublishedMode(15, "Ramp bounce, 0.1 fric.", 47, (0.1225, -0.8775), 4.41e-4),
+    ),
+}
+"""Rows by table and axis. The last row but four of Table 4.17 says right and means left: its weight is negative."""
+
+
+@dataclass(frozen=True, slots=True)
+class Confusion:
+    """Tables 4.7, 4.8, 4.15 and 4.16: counts by predicted mode (rows) and correct mode (columns)."""
+
+    errors: tuple[tuple[int, ...], ...]
+    examples: tuple[int, ...]
+
+    @property
+    def rate(self) -> float:
+        """Share of errors."""
+        return sum(map(sum, self.errors)) / sum(self.examples)
+
+
+CONFUSIONS: Final[Mapping[str, Confusion]] = {
+    "4.7": Confusion(((0, 12, 1), (26, 0, 17), (63, 1, 0)), (23495, 318, 187)),
+    "4.8": Confusion(((0, 69, 0, 0), (6, 0, 91, 0), (4, 0, 0, 1), (75, 12, 1, 0)), (13530, 9768, 515, 187)),
+    "4.15": Confusion(
+        (
+            (0, 0, 3, 0, 20, 0),
+            (0, 0, 620, 0, 43, 0),
+            (32, 16, 0, 0, 0, 0),
+            (5, 2, 0, 0, 0, 0),
+            (0, 25, 0, 0, 0, 0),
+            (0, 0, 3, 11, 0, 0),
+        ),
+        (4746, 4976, 13936, 199, 67, 30),
+    ),
+    "4.16": Confusion(
+        (
+            (0, 48, 0, 0, 0, 0),
+            (12, 0, 138, 1, 0, 0),
+            (0, 0, 0, 0, 0, 0),
+            (0, 1, 0, 0, 1, 0),
+            (1, 10, 0, 5, 0, 0),
+            (2, 10, 0, 1, 4, 0),
+        ),
+        (13325, 10337, 210, 23, 30, 30),
+    ),
+}
+"""As printed, save that Table 4.16 has its column sums once more in the row of mode 6; here is what they leave."""
+
+ROLLOUT_FAILURES: Final[Mapping[str, int]] = {
+    "bad collision resolution, vertical": 9,
+    "bad collision resolution, ramp slant": 9,
+    "bounce against a corner": 4,
+    "misclassified ramp bounce": 5,
+    "delayed falling": 7,
+}
+"""Table 4.18. The text counts 13 and 9 bad resolutions (22, then corrected by hand) and 26 trials with an error."""
+
+LWR: Final[Mapping[str, str]] = {
+    "4.19": "median above our 95th percentile until 128 blocks, then a drop; the third quartile never below the change",
+    "4.20": "uncentred: all three worse than in Figure 4.19",
+}
+"""What the text says of figures 4.19 and 4.20; they print no numbers."""
+
+CLASSIFIER_ERRORS: Final[Mapping[str, Mapping[int, float]]] = {
+    "FOIL": {32: 0.041, 160: 0.035},
+    "svm": {32: 0.177, 160: 0.082},
+    "knn-10": {32: 0.307, 160: 0.259},
+}
+"""Figure 4.21 as its text gives it (§4.7.2): misclassified x modes of experiment 2 after so many blocks."""
+
+TRANSFER: Final[Mapping[str, str]] = {
+    "4.27": "modes 1 and 2 right; mode 3 not learned, for there was no ramp",
+    "4.28": "all three learned; bounces against the box sometimes taken for the ramp's",
+    "4.29": "about as Figure 4.28",
+}
+"""What the text says of figures 4.27 to 4.29."""
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedClause:
+    """A row of Table 4.3: the clause, examples it decides rightly and wrongly, whether a tree stands behind it."""
+
+    clause: str
+    correct: int
+    incorrect: int
+    tree: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedPair:
+    """A section of Table 4.3: the modes, whether it is marked "Negated", and its training performance."""
+
+    mode: int
+    rival: int
+    negated: bool
+    performance: float
+    clauses: tuple[PublishedClause, ...]
+
+
+@cache
+def published_pairs(table: str) -> tuple[PublishedPair, ...]:
+    """Sections of a table of clauses: ``"3.2"``, ``"4.3"`` to ``"4.6"``, ``"4.10"`` to ``"4.14"``."""
+    text = files(__package__).joinpath("published_clauses.txt").read_text(encoding="utf-8")
+    section = text.split(f"[{table}]\n")[1].split("\n[")[0]
+    pairs: list[PublishedPair] = []
+    clauses: list[PublishedClause] = []
+    for line in section.strip("\n").split("\n"):
+        if line.startswith(" "):
+            clause, correct, incorrect, tree = (part.strip() for part in line.split("|"))
+            clauses.append(PublishedClause(clause, int(correct), int(incorrect), tree == "yes"))
+            pairs[-1] = PublishedPair(*_head(pairs[-1]), tuple(clauses))
+        else:
+            mode, rival, sign, performance = line.split()
+            clauses = []
+            pairs.append(PublishedPair(int(mode), int(rival), sign == "negated", float(performance), ()))
+    return tuple(pairs)
+
+
+def _head(pair: PublishedPair) -> tuple[int, int, bool, float]:
+    return pair.mode, pair.rival, pair.negated, pair.performance

@@ -1,0 +1,61 @@
+"""Box pushing: the modes, clauses and roles of tables 3.1 and 3.2 and Figure 3.8."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from relgym.config import ModelConfig
+from relgym.experiments.analytic import truck_modes
+from relgym.experiments.chapter4.lesson import config_of
+from relgym.experiments.data import truck_blocks
+from relgym.experiments.online import learned
+from relgym.experiments.truck_check import truck_mode_of
+from relgym.model.report import report
+from relgym.model.text import plain
+
+__all__ = ["lesson"]
+
+
+def lesson(*, learner: str, seed: int, repeats: int = 2) -> dict[str, Any]:
+    """Learn the box pushing domain: every layout x permutation x repeats, 40 steps each (§3.1).
+
+    Parameters
+    ----------
+    learner
+        Name of a configuration (`relgym.experiments.chapter4.protocol.LEARNERS`).
+    seed
+        Of the training blocks.
+    repeats
+        How often each permutation is shown; 2 in the thesis (1,920 examples).
+
+    Returns
+    -------
+    Plain data: the model's report, and which row of Table 3.1 each mode states (-1: none).
+    """
+    model = learned(truck_blocks(seed=seed, repeats=repeats), config=_config(learner))
+    laws = truck_modes(3)
+    part = model.property_model("truck", "vx")
+    known = {law: row for row, law in enumerate(laws)}
+    stated = {}
+    for mode in part.modes:
+        law = truck_mode_of(mode, laws)
+        stated[str(mode.id)] = -1 if law is None else known[law]
+    return {
+        "report": plain(report(model)),
+        "text": model.describe(),
+        "stated": stated,
+        "laws": [law.name for law in laws],
+        "noise": part.clusterer.noise_examples,
+    }
+
+
+def _config(learner: str) -> ModelConfig:
+    """The learner's, but clauses may speak of every object.
+
+    Table 3.2 tells stacks of three by a box on one that the truck doesn't touch: no clause about what it touches can.
+    """
+    config = config_of(learner)
+    if config.classification.context != "touching":
+        return config
+    return replace(config, classification=replace(config.classification, context="all"))

@@ -1,0 +1,190 @@
+"""Running jobs and keeping what they show: text, data and figure of each, and a page that holds them all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from relgym.errors import StoreError
+from relgym.experiments.chapter4.canvas import TITLES
+from relgym.experiments.chapter4.catalogue import JOBS
+from relgym.experiments.chapter4.job import Job, Shown
+from relgym.experiments.chapter4.protocol import LEARNERS, Protocol
+from relgym.experiments.jobs.run import Progress, results, run
+from relgym.experiments.jobs.store import ResultStore, write_atomically
+from relgym.experiments.jobs.task import Task
+
+__all__ = ["Made", "compute", "make", "page"]
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A job's output on disk.
+
+    Attributes
+    ----------
+    name, title, source
+        Of the job.
+    text
+        The table, beside the thesis' numbers.
+    figure
+        File name of the figure; empty if it is a table.
+    day, command
+        When and how it was made.
+    seconds
+        Of computing, all tasks together.
+    """
+
+    name: str
+    title: str
+    source: str
+    text: str
+    figure: str
+    day: str
+    command: str
+    seconds: float
+
+
+def compute(
+    jobs: Iterable[Job],
+    protocol: Protocol,
+    store: ResultStore,
+    *,
+    workers: int | None = None,
+    backend: str = "local",
+    address: str | None = None,
+) -> Iterator[Progress]:
+    """Compute whatever the jobs need and the store lacks (`relgym.experiments.jobs.run.run`)."""
+    tasks = [task for job in jobs for group in job.plan(protocol).values() for task in group]
+    yield from run(tasks, store, workers=workers, backend=backend, address=address)
+
+
+def make(job: Job, protocol: Protocol, store: ResultStore, out: Path, command: str) -> Made:
+    """Make a table or figure from results in the store; writes ``NAME.json``, ``.txt``, ``.csv``, ``.png``.
+
+    Parameters
+    ----------
+    job, protocol, store
+        What to show, at which size, from where.
+    out
+        Folder to write to.
+    command
+        How it was asked for.
+    """
+    plan = job.plan(protocol)
+    shown = job.show(protocol, {group: results(tasks, store) for group, tasks in plan.items()})
+    figure = f"{job.name}.png" if shown.draw is not None else ""
+    made = Made(
+        job.name,
+        job.title,
+        job.source,
+        shown.text,
+        figure,
+        date.today().isoformat(),
+        command,
+        _seconds(plan, store),
+    )
+    write_atomically(out / f"{job.name}.txt", f"{shown.text}\n".encode())
+    write_atomically(out / f"{job.name}.csv", _csv(shown).encode())
+    if shown.draw is not None:
+        write_atomically(out / figure, _drawn(shown))
+    write_atomically(
+        out / f"{job.name}.json", json.dumps(asdict(made), indent=1, ensure_ascii=False).encode()
+    )
+    return made
+
+
+def _seconds(plan: Mapping[str, Sequence[Task]], store: ResultStore) -> float:
+    found = [store.get(task) for task in {t for tasks in plan.values() for t in tasks}]
+    return sum(result.seconds for result in found if result is not None)
+
+
+def _csv(shown: Shown) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(shown.rows)
+    return text.getvalue()
+
+
+def _drawn(shown: Shown) -> bytes:
+    assert shown.draw is not None, "tables aren't drawn"
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "figure.png"
+        shown.draw(path)
+        return path.read_bytes()
+
+
+# ------------------------------------------------------------------ the page of results
+def page(out: Path, target: Path) -> list[str]:
+    """Write the page of results (Markdown) from what jobs have written, and copy their figures beside it.
+
+    Parameters
+    ----------
+    out
+        Folder that jobs have written to.
+    target
+        The page; figures go to a folder of its name.
+
+    Returns
+    -------
+    Names of the jobs on it.
+
+    Raises
+    ------
+    StoreError
+        The folder holds no results.
+    """
+    made = list(_made(out))
+    if not made:
+        raise StoreError(f"{out} holds no results: run `relgym reproduce NAME --out {out}` first")
+    folder = target.with_suffix("")
+    for each in made:
+        if each.figure:
+            write_atomically(folder / each.figure, (out / each.figure).read_bytes())
+    sections = [_section(each, folder.name) for each in made]
+    write_atomically(target, "\n\n".join([_head(made), *sections, ""]).encode())
+    return [each.name for each in made]
+
+
+def _made(out: Path) -> Iterator[Made]:
+    for name in JOBS:
+        path = out / f"{name}.json"
+        if path.is_file():
+            try:
+                entry: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+                yield Made(**entry)
+            except (ValueError, TypeError) as error:
+                raise StoreError(
+                    f"{path} is damaged ({error}); run `relgym reproduce {name}` again"
+                ) from error
+
+
+def _head(made: Sequence[Made]) -> str:
+    learners = "\n".join(f"- **{TITLES[name]}**: {words}" for name, words in LEARNERS.items())
+    contents = "\n".join(f"- [{each.name}: {each.title}](#{_anchor(each)})" for each in made)
+    missing = [name for name in JOBS if name not in {each.name for each in made}]
+    rest = f"\nNot made yet: {', '.join(missing)}.\n" if missing else ""
+    return (
+        "# Results\n\n"
+        "Chapter IV of the thesis again, each table and figure beside what was printed. `relgym reproduce` wrote this "
+        "page; nothing\non it is typed by hand. *printed* is what the thesis says, § one of its sections; velocities "
+        "are in units per step.\n\n"
+        f"Learners:\n\n{learners}\n\n{contents}\n{rest}"
+    )
+
+
+def _anchor(made: Made) -> str:
+    words = f"{made.name}: {made.title} ({made.source})".lower()
+    return "".join(c for c in words.replace(" ", "-") if c.isalnum() or c in "-_")
+
+
+def _section(made: Made, folder: str) -> str:
+    figure = f"\n\n![{made.title}]({folder}/{made.figure})" if made.figure else ""
+    how = f"`{made.command}`, {made.day}; {made.seconds:.0f} s of computing."
+    return f"## {made.name}: {made.title} ({made.source})\n\n{how}{figure}\n\n```text\n{made.text}\n```"

@@ -1,0 +1,177 @@
+"""Roll-outs of 200 steps, and why the failed ones failed (§4.8: figures 4.22 to 4.26, Table 4.18)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.experiments.blocks import Block
+from relgym.experiments.chapter4.lesson import config_of
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.online import learned
+from relgym.experiments.rollouts import STRAY
+from relgym.model.world_model import WorldModel
+
+__all__ = ["CAUSES", "cause_of", "imagine", "trial_blocks"]
+
+CAUSES: Final = (
+    "bad collision resolution, vertical",
+    "bad collision resolution, ramp slant",
+    "bounce against a corner",
+    "misclassified ramp bounce",
+    "delayed falling",
+    "several contacts at once",
+    "misclassified contact with a level surface",
+    "other",
+)
+"""Rows of Table 4.18, and three that it doesn't have."""
+
+_SIGNIFICANT: Final = 1e-6
+"""Position error, in units, with which a failed roll-out begins to go wrong; all before is rounding."""
+
+_CONFIGURATIONS: Final = 40
+
+_RECENT: Final = 3
+"""A body that was hit so few steps ago may still overlap."""
+
+
+def imagine(
+    *, learner: str, experiment: int, seed: int, order: int, blocks: int, tests: Sequence[int], trials: int
+) -> dict[str, Any]:
+    """Train on one batch, then imagine whole episodes from their first scenes.
+
+    Parameters
+    ----------
+    learner, experiment, seed, order, blocks
+        The training (`relgym.experiments.chapter4.lesson`).
+    tests
+        Seeds of the scenes, each shown in all 40 configurations as long as there are trials left.
+    trials
+        How many roll-outs; 80 in the thesis.
+
+    Returns
+    -------
+    Plain data: errors of both coordinates by trial and step, paths, cause of every failure, counts of the bounces.
+    """
+    model = learned(ball_blocks(experiment, seed=seed, order=order, blocks=blocks), config=config_of(learner))
+    real = trial_blocks(experiment, tests, trials)
+    dreamed, steps = _dreams(model, real)
+    bounces = Counter[str]()
+    for block in real:
+        bounces.update(_surfaces(block, experiment))
+    tried = [_trial(*each, experiment) for each in zip(real, dreamed, steps, strict=True)]
+    return {"trials": tried, "bounces": dict(sorted(bounces.items()))}
+
+
+def trial_blocks(experiment: int, tests: Sequence[int], trials: int) -> list[Block]:
+    """What really happens in the trials: number k shows configuration ``k mod 40``, one seed after the other."""
+    found: list[Block] = []
+    for seed in tests:
+        count = min(_CONFIGURATIONS, trials - len(found))
+        found += list(ball_blocks(experiment, seed=seed, blocks=_CONFIGURATIONS, order=None, test=True))[
+            :count
+        ]
+    return found
+
+
+def _dreams(model: WorldModel, real: Sequence[Block]) -> tuple[NDArray[np.float64], list[int]]:
+    """All roll-outs side by side, shape ``(trials, steps + 1, width)``, and how many steps of each were predicted.
+
+    One that stopped repeats its last scene.
+    """
+    truth = np.stack([block.vectors for block in real])
+    dreamed, steps = np.repeat(truth[:, :1], truth.shape[1], axis=1), [truth.shape[1] - 1] * len(truth)
+    going = np.arange(len(truth))
+    for k in range(1, truth.shape[1]):
+        step = model.predict_batch(real[0].layout, dreamed[going, k - 1])
+        for stopped in going[~step.ok].tolist():
+            steps[stopped] = k - 1
+        going = going[step.ok]
+        dreamed[going, k:] = step.vectors[step.ok][:, None]
+    return dreamed, steps
+
+
+def _trial(block: Block, dreamed: NDArray[np.float64], steps: int, experiment: int) -> dict[str, Any]:
+    ball = block.layout.index("ball")
+    places = [block.layout.column(ball, prop) for prop in ("px", "py")]
+    off = np.abs(dreamed[:, places] - block.vectors[:, places])
+    off[steps + 1 :] = np.inf  # it said nothing there
+    failed = bool((off > STRAY).any())
+    begins = int(np.argmax((off > _SIGNIFICANT).any(axis=1))) if failed else -1
+    return {
+        "errors": [[_finite(v) for v in column] for column in off.T.tolist()],
+        "corner": bool(block.truth.corner.any()),
+        "failed": failed,
+        "stopped": steps < len(block),
+        "begins": begins,
+        "cause": cause_of(block, begins - 1, experiment) if failed else "",
+        "real": block.vectors[:, places].tolist(),
+        "imagined": dreamed[:, places].tolist(),
+    }
+
+
+def _finite(value: float) -> float | None:
+    """JSON knows no infinity."""
+    return value if np.isfinite(value) else None
+
+
+def cause_of(block: Block, step: int, experiment: int) -> str:
+    """Which row of Table 4.18 a failure belongs to, by what really happened in the step that went wrong.
+
+    Nothing is read from the model: it erred there, and the engine's own log says what it should have predicted.
+
+    Parameters
+    ----------
+    block
+        What really happened.
+    step
+        The first transition whose result is off.
+    experiment
+        1 or 2.
+    """
+    surfaces = _surface_names(block, experiment)
+    if block.truth.corner[step]:
+        return "bounce against a corner"
+    if block.truth.active[step] > 1:
+        return "several contacts at once"
+    if surfaces[step] in ("vertical", "slope"):
+        return "misclassified ramp bounce"
+    if surfaces[step] in ("level", "slide"):
+        return "misclassified contact with a level surface"
+    before = surfaces[max(0, step - _RECENT) : step]
+    if surfaces[step] == "none":
+        for surface, cause in (("vertical", CAUSES[0]), ("slope", CAUSES[1]), ("slide", "delayed falling")):
+            if surface in before:
+                return cause
+    return "other"
+
+
+def _surfaces(block: Block, experiment: int) -> Mapping[str, int]:
+    """How many bounces there were against which kind of surface."""
+    names = _surface_names(block, experiment)
+    return Counter(name for name in names if name in ("vertical", "slope", "level"))
+
+
+def _surface_names(block: Block, experiment: int) -> list[str]:
+    """Per transition: what the ball was pushed by; ``none``, ``slide``, ``level``, ``vertical``, ``slope``, ``?``."""
+    modes = BALL_EXPERIMENTS[experiment].modes()
+    kinds = []
+    for listed, axis in ((modes.x, "ball.vx"), (modes.y, "ball.vy")):
+        options = [{_kind(case.surface, case.sliding) for case in mode.cases} for mode in listed]
+        kinds.append([options[k] if k >= 0 else {"?"} for k in block.truth.mode[axis].tolist()])
+    return [
+        "none" if active == 0 else next(iter(sorted((x & y) - {"none"})), "?")
+        for x, y, active in zip(*kinds, block.truth.active.tolist(), strict=True)
+    ]
+
+
+def _kind(surface: str, sliding: bool) -> str:
+    if surface in ("left face", "right face"):
+        return "vertical"
+    if surface in ("floor", "ceiling"):
+        return "slide" if sliding else "level"
+    return surface

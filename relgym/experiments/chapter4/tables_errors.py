@@ -1,0 +1,168 @@
+"""Tables of errors: which modes are taken for which (4.7, 4.8, 4.15, 4.16), roll-outs (4.18), rates of all learners."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from relgym.experiments.chapter4.canvas import PRINTED, TITLES
+from relgym.experiments.chapter4.job import Shown, Values
+from relgym.experiments.chapter4.protocol import Protocol
+from relgym.experiments.chapter4.published import CONFUSIONS, MODES, ROLLOUT_FAILURES, Confusion
+from relgym.experiments.chapter4.rolled import CAUSES
+from relgym.experiments.chapter4.scores import pooled_scores, quantile
+from relgym.experiments.chapter4.tables_modes import best_run, row_of
+from relgym.model.text import Cell, table
+
+__all__ = ["confusion_shown", "rates_shown", "rollouts_shown"]
+
+_TARGETS: Final[Mapping[str, tuple[str, str]]] = {
+    "4.7": ("4.2", "x"),
+    "4.8": ("4.2", "y"),
+    "4.15": ("4.9", "x"),
+    "4.16": ("4.9", "y"),
+}
+
+
+def confusion_shown(_: Protocol, values: Values, number: str) -> Shown:
+    """Which mode was taken for which, a single model of each learner."""
+    modes, axis = _TARGETS[number]
+    target, published = f"ball.v{axis}", MODES[modes, axis]
+    texts = [f"{PRINTED}: rate of errors {CONFUSIONS[number].rate:.4f}\n\n{_published(CONFUSIONS[number])}"]
+    data: list[list[Cell]] = [["learner", "predicted", "correct", "count"]]
+    for learner, runs in values.items():
+        run = best_run(runs)
+        found = run["confusions"].get(target)
+        if found is None:
+            score = run["scores"][-1]["targets"][target]["counted"]
+            texts.append(
+                f"{TITLES[learner]}: laws, no modes; wrong {score['wrong']} of {score['examples']:,}"
+            )
+            continue
+        named = [_name(mode, run["modes"][target], published) for mode in found["modes"]]
+        order = sorted(range(len(named)), key=lambda k: (len(named[k]), named[k]))  # rows of the table first
+        names = [named[k] for k in order]
+        counts = [[found["table"][i][j] for j in order] for i in (*order, len(order))]
+        texts.append(f"{TITLES[learner]}: {_confusion(counts, names)}")
+        data += [
+            [learner, row, column, counts[i][j]]
+            for i, row in enumerate([*names, "none"])
+            for j, column in enumerate(names)
+        ]
+    note = (
+        "Rows: predicted mode, columns: correct mode (the one with the least error; equally good ones are as correct). "
+        "Modes that the\nthesis' table lacks are named by their functions; there are other rare modes than it shows."
+    )
+    return Shown("\n\n".join([*texts, note]), data)
+
+
+def _published(confusion: Confusion) -> str:
+    columns = [str(k + 1) for k in range(len(confusion.examples))]
+    lines: list[list[Cell]] = [[k + 1, *row, sum(row)] for k, row in enumerate(confusion.errors)]
+    totals = [sum(column) for column in zip(*confusion.errors, strict=True)]
+    lines.append(["errors", *totals, sum(totals)])
+    lines.append(["examples", *confusion.examples, sum(confusion.examples)])
+    return table(["predicted", *columns, "total"], lines)
+
+
+def _name(mode: int, known: Sequence[Mapping[str, Any]], published: Sequence[Any]) -> str:
+    found = next(m for m in known if m["id"] == mode)
+    row = row_of(found, published)
+    return str(row) if row else str(found["function"])
+
+
+def _confusion(counts: Sequence[Sequence[int]], names: Sequence[str]) -> str:
+    size = len(names)
+    off = [[0 if i == j else counts[i][j] for j in range(size)] for i in range(size)] + [list(counts[size])]
+    lines: list[list[Cell]] = [
+        [name, *row, sum(row)] for name, row in zip([*names, "none"], off, strict=True)
+    ]
+    totals = [sum(row[j] for row in off) for j in range(size)]
+    examples = [sum(row[j] for row in counts) for j in range(size)]
+    lines.append(["errors", *totals, sum(totals)])
+    lines.append(["examples", *examples, sum(examples)])
+    rate = sum(totals) / max(sum(examples), 1)
+    short = [name if len(name) < 4 else f"({chr(ord('a') + k)})" for k, name in enumerate(names)]
+    keys = "".join(f"\n  {s} {n}" for s, n in zip(short, names, strict=True) if s != n)
+    for line, name in zip(lines, [*short, "none"], strict=False):
+        line[0] = name
+    return f"rate of errors {rate:.4f}{keys}\n\n{table(['predicted', *short, 'total'], lines)}"
+
+
+def rollouts_shown(_: Protocol, values: Values) -> Shown:
+    """Table 4.18: what roll-outs failed of."""
+    counts = {learner: Counter(t["cause"] for t in runs[0]["trials"]) for learner, runs in values.items()}
+    heading = ["error", PRINTED, *(TITLES[learner] for learner in values)]
+    lines: list[list[Cell]] = [
+        [cause, ROLLOUT_FAILURES.get(cause, "-"), *(each[cause] for each in counts.values())]
+        for cause in CAUSES
+    ]
+    trials = {learner: runs[0]["trials"] for learner, runs in values.items()}
+    for name, wanted in (
+        ("failed, of all", None),
+        ("failed, a corner hit in truth", True),
+        ("failed, none", False),
+    ):
+        shares = [_failed(each, wanted) for each in trials.values()]
+        lines.append([name, "26 of 80" if wanted is None else "-", *shares])
+    some = next(iter(values.values()))[0]
+    bounces = ", ".join(f"{n} {name}" for name, n in some["bounces"].items())
+    note = (
+        f"A roll-out fails when a position is off by more than 0.01. Its cause is what really happened where it went "
+        f"wrong first.\nBounces in the {len(some['trials'])} trials: {bounces} (printed: 205 vertical, 108 slant). "
+        "The thesis corrected 22 bad resolutions by hand."
+    )
+    return Shown(f"{table(heading, lines)}\n\n{note}", [heading, *lines])
+
+
+def _failed(trials: Sequence[Mapping[str, Any]], corner: bool | None) -> str:
+    some = [t for t in trials if corner is None or t["corner"] == corner]
+    return f"{sum(t['failed'] for t in some)} of {len(some)}"
+
+
+_EXPECTED: Final[Mapping[tuple[int, str], tuple[float, float]]] = {
+    (1, "ball.vx"): (0.003, 0.007),
+    (1, "ball.vy"): (0.007, 0.015),
+    (2, "ball.vx"): (0.02, 0.05),
+    (2, "ball.vy"): (0.007, 0.016),
+}
+"""Where the original program's shares of wrong predictions lie in the thesis (tables 4.7, 4.8, 4.15, 4.16)."""
+
+
+def rates_shown(_: Protocol, values: Values) -> Shown:
+    """All learners at the end of experiments 1 and 2; groups are ``experiment/learner``."""
+    heading = [
+        "experiment",
+        "target",
+        "learner",
+        "wrong %",
+        "not learned %",
+        "misclassified %",
+        "strict %",
+        "p95",
+        "p99.9",
+        "printed range %",
+    ]
+    lines = []
+    for group, runs in values.items():
+        experiment, learner = group.split("/")
+        for target in ("ball.vx", "ball.vy"):
+            score = pooled_scores(run["scores"][-1]["targets"][target]["counted"] for run in runs)
+            low, high = _EXPECTED[int(experiment), target]
+            lines.append(
+                [int(experiment), target, TITLES[learner], *_shares(score), f"{100 * low:g}-{100 * high:g}"]
+            )
+    lines.sort(key=lambda line: (line[0], line[1]))
+    note = (
+        "wrong: off by more than 1e-9, or no prediction. not learned: no learned mode is right. strict: the thesis' "
+        "count, the chosen\nmode isn't the best one, ties forgiven. p95, p99.9: quantiles of the absolute error."
+    )
+    return Shown(f"{table(heading, lines)}\n\n{note}", [heading, *lines])
+
+
+def _shares(score: Mapping[str, Any]) -> list[Cell]:
+    shares: list[Cell] = []
+    for key in ("wrong", "unlearned", "misclassified", "strict"):
+        shares.append(round(100 * score[key] / score["examples"], 3) if key in score else "-")
+    return [*shares, *(f"{quantile(score['errors'], q):.0e}" for q in (0.95, 0.999))]

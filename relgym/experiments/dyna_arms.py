@@ -1,0 +1,194 @@
+"""What the Dyna experiments compare: courses, arms, and the agent that all arms share.
+
+torch and Stable-Baselines3 belong to the extra ``sb3``; both are imported when an agent is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import gymnasium as gym
+
+import relgym
+from relgym.errors import ConfigError
+from relgym.wrappers.action_repeat import ActionRepeat
+from relgym.wrappers.flat import FlatView
+from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.sb3.settings import DynaConfig
+
+if TYPE_CHECKING:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+__all__ = ["ARMS", "COURSES", "WARM_UP", "Arm", "Course", "make_agent", "make_dyna", "make_env"]
+
+WARM_UP: Final = 500
+"""Random steps that every arm begins with."""
+
+AGENT: Final[Mapping[str, Any]] = {
+    "learning_rate": 1e-3,
+    "batch_size": 256,
+    "gamma": 0.99,
+    "tau": 0.01,
+    "learning_starts": WARM_UP,
+    "policy_kwargs": {"net_arch": [64, 64]},
+    "device": "cpu",
+}
+"""SAC's parameters, the same in all arms; the others are Stable-Baselines3's defaults."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """An env and how agents act in it.
+
+    Attributes
+    ----------
+    name, title
+        For files, and for people.
+    env_id, arguments
+        What `gymnasium.make` is asked for.
+    repeat
+        Env steps that a decision lasts.
+    horizon
+        Decisions that an episode lasts at most.
+    dreams
+        How to dream there, where it isn't as by default: parameters of `DynaConfig`.
+    """
+
+    name: str
+    title: str
+    env_id: str
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    repeat: int = 1
+    horizon: int = 20
+    dreams: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """A way to learn; the arms differ in nothing else.
+
+    Attributes
+    ----------
+    name, title
+        For files, and for people.
+    model
+        What is dreamed in.
+    updates
+        Gradient steps per real step.
+    learned
+        Whether reward and termination are learned too, or given.
+    varied
+        Whether objects of one type are exchanged and distances redrawn: in dreams, or without a model in the
+        replay buffer (objects only).
+    """
+
+    name: str
+    title: str
+    model: Literal["none", "neural", "relational"]
+    updates: int = 1
+    learned: bool = False
+    varied: bool = False
+
+
+_BALL_DREAMS: Final[Mapping[str, Any]] = {
+    "horizon": 30,
+    "dreams": 32,
+    "every": 20,
+    "from_start": 0.3,
+    "redraw": False,
+}
+"""Episodes are long and their steps short, so dreams branch off anywhere; goals in mid-air would teach nothing."""
+
+COURSES: Final = {
+    course.name: course
+    for course in (
+        Course("truck", "TruckPush, task push", "relgym/TruckPush-v0", {"task": "push"}),
+        Course("ball", "BallGoal", "relgym/BallGoal-v0", {}, repeat=5, horizon=100, dreams=_BALL_DREAMS),
+    )
+}
+
+ARMS: Final = {
+    arm.name: arm
+    for arm in (
+        Arm("sac", "SAC", "none"),
+        Arm("sac20", "SAC, 20 updates a step", "none", updates=20),
+        Arm("sac-permuted", "SAC, objects permuted", "none", varied=True),
+        Arm("ensemble", "Dyna, MLP ensemble", "neural", updates=20, learned=True),
+        Arm("relgym", "Dyna, relgym", "relational", updates=20, learned=True, varied=True),
+        Arm("relgym-given", "Dyna, relgym, reward given", "relational", updates=20, varied=True),
+    )
+}
+
+
+def make_env(course: Course, **arguments: Any) -> gym.Env[Any, Any]:
+    """The course's env as agents see it: flat, relative, with decisions of several steps where it has them."""
+    env: gym.Env[Any, Any] = gym.make(
+        course.env_id, disable_env_checker=True, **{**course.arguments, **arguments}
+    )
+    env = TransitionRecorder(env)
+    return FlatView(ActionRepeat(env, course.repeat) if course.repeat > 1 else env)
+
+
+def make_agent(arm: Arm, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -> Any:
+    """SAC, ready for `make_dyna`'s callback.
+
+    Raises
+    ------
+    ConfigError
+        Stable-Baselines3 isn't installed.
+    """
+    try:
+        from stable_baselines3 import SAC
+
+        from relgym.wrappers.sb3.replay import replay_options
+    except ImportError as missing:
+        raise ConfigError(
+            f"{missing}: Dyna needs the extra sb3 (pip install 'relgym[sb3]', or make dyna)"
+        ) from None
+    mixing = replay_options(env.observation_space, gamma=AGENT["gamma"])
+    env.action_space.seed(seed)
+    updates = arm.updates if arm.model == "none" else 1  # until the model is trusted
+    return SAC("MlpPolicy", env, seed=seed, gradient_steps=updates, **{**AGENT, **mixing, **changes})
+
+
+def make_dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -> Any:
+    """The arm's callback: a `Dyna`, a `PermutedReplay`, or none.
+
+    `changes` go to its `DynaConfig`.
+    """
+    if arm.model == "none":
+        if not arm.varied:
+            return None
+        from relgym.wrappers.sb3.permuting import PermutedReplay
+
+        return PermutedReplay(seed=seed)
+    return _dyna(arm, course, env, seed=seed, **changes)
+
+
+def _dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -> Dyna:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    settings = {
+        "horizon": course.horizon,
+        "updates": arm.updates,
+        "permute": arm.varied,
+        "redraw": arm.varied,
+        "seed": seed,
+    }
+    model = _model(arm, env, seed)
+    chosen = DynaConfig(**{**settings, **course.dreams, **changes})
+    return Dyna(model, chosen, judge="learned" if arm.learned else None)
+
+
+def _model(arm: Arm, env: gym.Env[Any, Any], seed: int) -> Any:
+    schema = env.get_wrapper_attr("schema")
+    if arm.model == "relational":
+        return relgym.WorldModel(schema)
+    from relgym.baselines.ensemble import MLPEnsemble
+    from relgym.baselines.neural_world import NeuralWorldModel
+
+    # The nets see the scene as the policy does: relative and scaled, which is to their advantage.
+    features = env.get_wrapper_attr("flattener")
+    return NeuralWorldModel(schema, features=features, ensemble=MLPEnsemble(seed=seed))

@@ -1,0 +1,122 @@
+"""Which code does a result depend on? A digest of a module and of all of relgym that it imports, step by step."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Final
+
+from relgym.errors import ConfigError
+
+__all__ = ["code_version", "modules_behind"]
+
+_PACKAGE: Final = "relgym"
+
+_LIBRARIES: Final = {
+    "fcl": "python-fcl",
+    "numpy": "numpy",
+    "pymunk": "pymunk",
+    "river": "river",
+    "scipy": "scipy",
+    "sklearn": "scikit-learn",
+    "torch": "torch",
+}
+"""Libraries that results depend on: import name and distribution."""
+
+
+@cache
+def code_version(module: str) -> str:
+    """Hexadecimal digest of the code behind a module, and of the versions of the libraries that they import.
+
+    A change anywhere else leaves it as it is (what draws a figure isn't what measured it), and so does one of comments
+    and docstrings.
+
+    Raises
+    ------
+    ConfigError
+        There is no such module.
+    """
+    digest = hashlib.sha256()
+    libraries: set[str] = set()
+    for name in modules_behind(module):
+        digest.update(f"{name}\n{ast.dump(_bare(name))}\0".encode())
+        libraries |= {found.split(".")[0] for found in _imports(name)} & _LIBRARIES.keys()
+    for library in sorted(libraries):
+        digest.update(f"{library} {_version(_LIBRARIES[library])}\n".encode())
+    return digest.hexdigest()
+
+
+def modules_behind(module: str) -> tuple[str, ...]:
+    """The module itself and every module of relgym that it imports, directly or not, sorted by name.
+
+    Imports inside functions count.
+    """
+    if _source(module) is None:
+        raise ConfigError(f"no module {module!r} to take the version of")
+    known: set[str] = set()
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name in known:
+            continue
+        known.add(name)
+        waiting += [
+            found
+            for found in _imports(name)
+            if found.split(".")[0] == _PACKAGE and _source(found) is not None
+        ]
+    return tuple(sorted(known))
+
+
+@cache
+def _imports(module: str) -> frozenset[str]:
+    """Dotted names that a module imports, and those of what it takes from them: modules, or names in them."""
+    return frozenset(_found(ast.parse(_source(module) or b"")))
+
+
+def _bare(module: str) -> ast.Module:
+    """A module without docstrings and other strings that nothing is done with."""
+    tree = ast.parse(_source(module) or b"")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            node.body = [line for line in node.body if not _idle(line)] or [ast.Pass()]
+    return tree
+
+
+def _idle(line: ast.stmt) -> bool:
+    return (
+        isinstance(line, ast.Expr)
+        and isinstance(line.value, ast.Constant)
+        and isinstance(line.value.value, str)
+    )
+
+
+def _found(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@cache
+def _source(module: str) -> bytes | None:
+    """Text of a module's file; none if there is no such module."""
+    try:
+        spec = find_spec(module)
+    except (ModuleNotFoundError, ValueError):  # the parent is no package, or no module at all
+        return None
+    return None if spec is None or spec.origin is None else Path(spec.origin).read_bytes()
+
+
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return "none"

@@ -1,0 +1,66 @@
+"""A world model as plain data and arrays, and back; what `relgym.model.storage` puts into files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.config import ModelConfig
+from relgym.model.parts import Parts
+from relgym.model.storage import schema_from_json, schema_to_json, target_from_json, target_to_json
+
+__all__ = ["parts_from_json", "parts_to_arrays", "parts_to_json"]
+
+_Arrays = dict[str, NDArray[Any]]
+
+
+def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
+    """Schema, config and everything learned; with history also what further learning needs."""
+    return {
+        "schema": schema_to_json(parts.schema),
+        "config": parts.config.to_json(),
+        "open": parts.open,
+        "given": [list(pair) for pair in parts.perception.given],
+        "targets": [
+            {"target": target_to_json(t), "model": parts.models[t].to_json(history=history)}
+            for t in parts.targets
+        ],
+        "tables": [parts.tables[name].to_json() for name in sorted(parts.tables)] if history else [],
+        "laws": None if parts.laws is None else parts.laws.to_json(history=history),
+    }
+
+
+def parts_to_arrays(parts: Parts) -> _Arrays:
+    """The history: examples of all types and targets, and of the laws."""
+    arrays: _Arrays = {}
+    for k, type_name in enumerate(sorted(parts.tables)):
+        arrays |= {f"table{k}.{name}": a for name, a in parts.tables[type_name].to_arrays().items()}
+    for k, target in enumerate(parts.targets):
+        arrays |= {f"target{k}.{name}": a for name, a in parts.models[target].to_arrays().items()}
+    if parts.laws is not None:
+        arrays |= {f"laws.{name}": a for name, a in parts.laws.learner.to_arrays().items()}
+    return arrays
+
+
+def parts_from_json(body: Mapping[str, Any], arrays: Mapping[str, NDArray[np.generic]] | None) -> Parts:
+    """Read what `parts_to_json` and `parts_to_arrays` wrote; without arrays it can only predict."""
+    schema = schema_from_json(body["schema"])
+    targets = [target_from_json(part["target"]) for part in body["targets"]]
+    parts = Parts(schema, ModelConfig.from_json(body["config"]), None if body["open"] else targets)
+    for target in targets if parts.open else ():
+        parts.add_target(target)
+    for k, type_name in enumerate(sorted(parts.tables) if arrays is not None else ()):
+        parts.tables[type_name].restore(body["tables"][k], _of(arrays, f"table{k}."), parts.signature_of)
+    for k, target in enumerate(targets):
+        parts.models[target].restore(body["targets"][k]["model"], _of(arrays, f"target{k}."))
+    if parts.laws is not None and body["laws"] is not None:
+        parts.laws.restore(body["laws"], _of(arrays, "laws."))
+    return parts
+
+
+def _of(arrays: Mapping[str, NDArray[np.generic]] | None, prefix: str) -> _Arrays:
+    """Arrays whose names begin with a prefix, without it."""
+    return {name[len(prefix) :]: a for name, a in (arrays or {}).items() if name.startswith(prefix)}

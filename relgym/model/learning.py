@@ -1,0 +1,98 @@
+"""Learning from one transition: one example per target of every object that stays (design §5)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.clusterer import ClusterReport
+from relgym.model.chaining import CHECK_AT, revise
+from relgym.model.parts import Parts
+from relgym.model.perception import Percept
+from relgym.model.property_model import bodies_of
+from relgym.model.scenes import next_values, unwrapped
+from relgym.scene.objects import Transition
+
+__all__ = ["LearnReport", "finish", "learn"]
+
+
+@dataclass(frozen=True, slots=True)
+class LearnReport:
+    """What one transition taught.
+
+    Attributes
+    ----------
+    parts
+        Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice.
+    work
+        Deterministic units of work spent on re-learning classifiers.
+    """
+
+    parts: dict[tuple[str, str], ClusterReport]
+    work: int
+
+    @property
+    def changed(self) -> bool:
+        """Whether any target's set of modes changed."""
+        return any(part.changed for part in self.parts.values())
+
+
+def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport:
+    """Take up one transition, whose first scene has been perceived and whose numbers are finite."""
+    before, after = transition.before, transition.after
+    if parts.open:
+        parts.discover_targets(before, after)
+    following = unwrapped(before.layout, before.vector, next_values(before, after))
+    reports: dict[tuple[str, str], ClusterReport] = {}
+    for type_name in dict.fromkeys(t.type for t in parts.targets):
+        if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
+            continue
+        for index in before.layout.of_type(type_name):
+            if before.layout.names[index] in after:
+                _learn_object(parts, percept, index, following, reports)
+    for type_name, table in parts.tables.items() if parts.open else ():
+        if len(table) in CHECK_AT:
+            revise(parts, type_name)
+    if parts.laws is not None:
+        stays = {i: name in after for i, name in enumerate(before.layout.names)}
+        parts.laws.learn_one(percept, following, stays, parts.models)
+    return LearnReport(reports, _refresh(parts))
+
+
+def finish(parts: Parts) -> int:
+    """Re-learn every stale classifier now, without a budget; returns the work spent."""
+    return sum(parts.models[t].refresh(None) for t in parts.targets if not parts.governs(t))
+
+
+def _learn_object(
+    parts: Parts,
+    percept: Percept,
+    index: int,
+    following: NDArray[np.float64],
+    reports: dict[tuple[str, str], ClusterReport],
+) -> None:
+    layout = percept.layout
+    type_name = layout.types[index].name
+    situation = percept.situation(index)
+    table = parts.tables[type_name]
+    x = percept.rows(index, following[None])[0]
+    bodies = bodies_of(situation.order[0], layout)
+    row = table.add(situation.signature, x, situation.keys[0], bodies)
+    example = replace(situation.examples[0], key=situation.keys[0])
+    for target in parts.targets:
+        if target.type == type_name:
+            y = float(following[layout.column(index, target.property)])
+            report = parts.models[target].learn_one(table, row, y, situation, example)
+            reports[layout.names[index], target.property] = report
+
+
+def _refresh(parts: Parts) -> int:
+    budget, spent = parts.config.work_per_step, 0
+    for target in parts.targets:
+        if not parts.governs(target):  # no clause is asked where laws predict
+            spent += parts.models[target].refresh(budget - spent)
+        if spent >= budget:
+            break
+    return spent

@@ -1,0 +1,161 @@
+"""What a world model is made of: schema, config, what perceives, and one property model per target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.columns import SlotSignature
+from relgym.clustering.examples import ExampleTable
+from relgym.config import ModelConfig
+from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
+from relgym.model.chaining import in_order
+from relgym.model.motion import Laws, possible_targets
+from relgym.model.perception import Perception
+from relgym.model.property_model import PropertyModel
+from relgym.model.scenes import mismatch
+from relgym.scene.objects import ACTION, TASK, Scene, SceneLayout, SceneSchema, Target
+
+__all__ = ["Parts"]
+
+
+class Parts:
+    """The state of a world model; learning, querying and storage are functions of it.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    config
+        Free parameters.
+    targets
+        What to learn, in causal order; None: every property that turns out to change.
+
+    Attributes
+    ----------
+    open
+        Whether targets are found while learning.
+    targets
+        Targets so far, in causal order.
+    models
+        The property model of each target.
+    tables
+        Regression rows by type name, shared by all targets of a type.
+    perception
+        Turns scenes into relations and rows.
+    laws
+        Laws of motion; None with ``frames="world"``.
+    """
+
+    def __init__(self, schema: SceneSchema, config: ModelConfig, targets: Sequence[Target] | None) -> None:
+        self.schema = schema
+        self.config = config
+        self.open = targets is None
+        self.targets: tuple[Target, ...] = ()
+        given = tuple(dict.fromkeys(pair for t in targets or () for pair in t.given))
+        chained = tuple((t.type, t.property) for t in possible_targets(schema)) if self.open else ()
+        self.perception = Perception(
+            schema, given, config.geometry, chained=chained, features=config.features
+        )
+        self.models: dict[Target, PropertyModel] = {}
+        self.tables: dict[str, ExampleTable] = {}
+        self.laws: Laws | None = None
+        if config.frames == "auto":
+            self.laws = Laws(schema, None if targets is None else tuple(targets), config)
+        self._kin: dict[int, SceneSchema] = {}
+        for target in targets or ():
+            self.add_target(target)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_kin": {}}  # keyed by identity, which a copy doesn't share
+
+    def check(self, scene: Scene) -> None:
+        """Raise `ObservationError` for NaN, infinity, or a scene of another schema."""
+        schema = scene.schema
+        if schema is not self.schema and id(schema) not in self._kin:
+            difference = mismatch(schema, self.schema)
+            if difference:
+                raise ObservationError(
+                    f"the scene follows another schema than the model: {difference}; numbers and names of objects may "
+                    "differ, their types may not"
+                )
+            self._kin[id(schema)] = schema  # kept alive, so that its id stays its own
+        if not np.isfinite(scene.vector).all():
+            schema.scene(scene.values())  # raises, naming object and property
+
+    def checked_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """State vectors as contiguous float64; `ObservationError` for another width, NaN or infinity."""
+        vectors = np.ascontiguousarray(vectors, dtype=np.float64)
+        if vectors.ndim != 2 or vectors.shape[1] != layout.width:
+            raise ObservationError(f"expected vectors of shape (n, {layout.width}), got {vectors.shape}")
+        if not np.isfinite(vectors).all():
+            row = int(np.flatnonzero(~np.isfinite(vectors).all(axis=1))[0])
+            self.check(Scene(self.schema, layout, vectors[row].copy()))
+        return vectors
+
+    def add_target(self, target: Target) -> None:
+        """Learn one more target, after all others in causal order.
+
+        Raises
+        ------
+        SchemaError
+            Its type has no such property.
+        ConfigError
+            The property comes from outside the world.
+        """
+        t = self.schema.type(target.type)
+        if target.property not in t.properties:
+            raise SchemaError(f"target {target}: type {t.name!r} has no property {target.property!r}")
+        if t.name == ACTION or target.property in t.exogenous:
+            raise ConfigError(
+                f"target {target} can't be learned: it comes from outside the world; leave it out"
+            )
+        if self.open and t.name == TASK:  # worth is a function of what was, what was done and what came of it
+            target = replace(target, given=tuple(p for p in self.perception.chained if p[0] != TASK))
+        self.targets = in_order((*self.targets, target)) if self.open else (*self.targets, target)
+        self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config, self.schema)
+        self.tables.setdefault(target.type, ExampleTable())
+
+    def discover_targets(self, before: Scene, after: Scene) -> None:
+        """Every property that changes becomes a target; it sees all transitions from its first change on."""
+        derived = {(k.type, k.property) for k in self.schema.kinematics}
+        for i, t in enumerate(before.layout.types):
+            if t.name == ACTION or before.layout.names[i] not in after:
+                continue
+            was, now = before.vector[before.layout.slice(i)], after[before.layout.names[i]].values
+            for k in np.flatnonzero(was != now):
+                prop = t.properties[k]
+                known = any(x.type == t.name and x.property == prop for x in self.targets)
+                if not known and (t.name, prop) not in derived and prop not in t.exogenous:
+                    self.add_target(Target(t.name, prop))
+
+    def retarget(self, target: Target, other: Target) -> None:
+        """Put another target of the same property in a target's place; it begins anew, order included."""
+        model = self.models.pop(target)
+        model.retarget(other, self.tables[target.type])
+        self.models[other] = model
+        self.targets = in_order(other if t == target else t for t in self.targets)
+
+    def lead(self, rate: tuple[str, str], prop: str, step: float) -> None:
+        """Take note that a property follows a rate: ``prop' = prop + step * rate'``."""
+        model = self.property_model(*rate)
+        model.lead(prop, step, self.tables[rate[0]])
+
+    def signature_of(self, names: tuple[str, ...]) -> SlotSignature:
+        """The slot signature of types of these names."""
+        return self.perception.signature_of(tuple(self.schema.type(name) for name in names))
+
+    def property_model(self, type_name: str, prop: str) -> PropertyModel:
+        """The model of one target; `QueryError` when there is none."""
+        for target in self.targets:
+            if (target.type, target.property) == (type_name, prop):
+                return self.models[target]
+        raise QueryError(f"{type_name}.{prop} is no target; the model has {[str(t) for t in self.targets]}")
+
+    def governs(self, target: Target) -> bool:
+        """Whether laws of motion, not modes, predict a target."""
+        return self.laws is not None and self.laws.governs(target)

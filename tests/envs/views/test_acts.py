@@ -1,0 +1,63 @@
+"""Actions as properties."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from relgym.envs.views import NumbersView
+from relgym.envs.views.acts import Acts
+from relgym.errors import ConfigError
+
+
+@pytest.mark.parametrize(
+    ("space", "action", "properties", "values"),
+    [
+        (spaces.Discrete(2), 1, ("a",), [1.0]),
+        (spaces.Discrete(3), np.int64(2), ("a", "a_is_0", "a_is_1", "a_is_2"), [2.0, 0.0, 0.0, 1.0]),
+        (spaces.Discrete(3, start=5), 6, ("a", "a_is_5", "a_is_6", "a_is_7"), [6.0, 0.0, 1.0, 0.0]),
+        (spaces.Discrete(17), 16, ("a",), [16.0]),
+        (spaces.Box(-2.0, 2.0, (1,), np.float32), np.array([0.5], np.float32), ("a",), [0.5]),
+        (spaces.Box(-2.0, 2.0, (2,), np.float32), np.array([0.5, -1.0]), ("a0", "a1"), [0.5, -1.0]),
+        (spaces.MultiBinary(2), np.array([0, 1], np.int8), ("a0", "a1"), [0.0, 1.0]),
+        (
+            spaces.MultiDiscrete([2, 3]),
+            np.array([1, 2]),
+            ("a0", "a1", "a1_is_0", "a1_is_1", "a1_is_2"),
+            [1.0, 2.0, 0.0, 0.0, 1.0],
+        ),
+    ],
+)
+def test_every_flat_action_has_properties(space: Any, action: Any, properties: Any, values: Any) -> None:
+    acts = Acts(space)
+    assert acts.type.properties == properties
+    np.testing.assert_array_equal(acts.values(action), values)
+    batch = acts.values_batch(np.array([action, action]))
+    np.testing.assert_array_equal(batch, [values, values])
+
+
+def test_choices_and_numbers_may_have_names() -> None:
+    assert Acts(spaces.Discrete(2), ("left", "right")).type.properties == ("a", "left", "right")
+    assert Acts(spaces.Box(-1, 1, (2,)), ("steer", "gas")).type.properties == ("steer", "gas")
+    with pytest.raises(ConfigError, match="names of the choices: expected 3"):
+        Acts(spaces.Discrete(3), ("left", "right"))
+    with pytest.raises(ConfigError, match="expected 2 different"):
+        Acts(spaces.Box(-1, 1, (2,)), ("gas", "gas"))
+
+
+def test_an_action_takes_the_place_of_another_one() -> None:
+    view = NumbersView(spaces.Box(-1, 1, (1,), np.float64), spaces.Discrete(2))
+    scene = view.with_action(view.with_action(view.scene(np.array([0.5])), 0), 1)
+    assert scene["action"]["a"] == 1.0
+    assert scene.layout.names == ("self", "action")
+
+
+@pytest.mark.parametrize(
+    "space", [spaces.Dict({"a": spaces.Discrete(2)}), spaces.Tuple([spaces.Discrete(2)])]
+)
+def test_nested_actions_are_refused_with_a_remedy(space: Any) -> None:
+    with pytest.raises(ConfigError, match="flatten it"):
+        Acts(space)

@@ -1,0 +1,101 @@
+"""Envs without scenes, whose laws are known: what views are tried on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+
+class Slider(gym.Env[Any, Any]):
+    """A box pushed left or right: v' = 0.8 v + 0.5 a, x' = x + v'; reward is -x', and it ends beyond `limit`.
+
+    Observes (x, v) as float64; an episode is truncated after `length` steps. `says`, where it is set, replaces the
+    next observation.
+    """
+
+    def __init__(self, length: int = 1000, limit: float = 1e6) -> None:
+        self.observation_space: spaces.Space[Any] = spaces.Box(-100.0, 100.0, (2,), np.float64)
+        self.action_space: spaces.Space[Any] = spaces.Box(-1.0, 1.0, (1,), np.float64)
+        self.length, self.limit = length, limit
+        self.x = self.v = 0.0
+        self.steps = 0
+        self.says: Any = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        self.x, self.v = (float(n) for n in self.np_random.uniform(-3.0, 3.0, 2))
+        self.steps = 0
+        return self._seen(), {"limit": self.limit}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        self.v = 0.8 * self.v + 0.5 * float(action[0])
+        self.x += self.v
+        self.steps += 1
+        ended = abs(self.x) > self.limit
+        return self._seen(), -self.x, ended, self.steps >= self.length, {"limit": self.limit}
+
+    def _seen(self) -> Any:
+        return np.array([self.x, self.v]) if self.says is None else self.says
+
+
+class Wheel(gym.Env[Any, Any]):
+    """A wheel that turns by u + 0.7 at each step; observes (cos, sin) of its angle as float32."""
+
+    def __init__(self, bound: float = 1.0) -> None:
+        self.observation_space = spaces.Box(-bound, bound, (2,), np.float32)
+        self.action_space = spaces.Box(-0.5, 0.5, (1,), np.float32)
+        self.angle = 0.0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        self.angle = float(self.np_random.uniform(-3.0, 3.0))
+        return self._seen(), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        self.angle += float(action[0]) + 0.7
+        return self._seen(), 0.0, False, False, {}
+
+    def _seen(self) -> Any:
+        return np.array([math.cos(self.angle), math.sin(self.angle)], np.float32)
+
+
+class Birds(gym.Env[Any, Any]):
+    """Up to three birds on a line, x' = x + 0.25 d, d constant; rows (here, x, d) sorted anew, nearest to 0 first.
+
+    A bird beyond 6 leaves; with `arrivals` another one comes in its place, from the left.
+    """
+
+    def __init__(self, arrivals: bool = False) -> None:
+        self.observation_space = spaces.Box(-10.0, 10.0, (3, 3), np.float64)
+        self.action_space = spaces.Discrete(1)
+        self.arrivals = arrivals
+        self.birds: list[list[float]] = []
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        draws = self.np_random.uniform(0.2, 0.9, 3)
+        self.birds = [[-4.0, float(draws[0])], [0.0, -float(draws[1])], [4.0, float(draws[2])]]
+        return self._seen(), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        flown = [[x + 0.25 * d, d] for x, d in self.birds]
+        self.birds = [bird for bird in flown if abs(bird[0]) <= 6.0]
+        if self.arrivals and len(self.birds) < 3:
+            self.birds.append([-6.0, float(self.np_random.uniform(0.2, 0.9))])
+        return self._seen(), 0.0, False, False, {}
+
+    def _seen(self) -> Any:
+        table = np.zeros((3, 3))
+        for row, (x, d) in enumerate(sorted(self.birds, key=lambda bird: abs(bird[0]))):
+            table[row] = 1.0, x, d
+        return table

@@ -1,0 +1,119 @@
+"""Training inside the dream: the vector env by hand, on-policy algorithms in it, and check-ups in the world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from dyna_worlds import Flat, LineEnv, LineModel, LineTask
+
+from relgym.errors import ConfigError
+from relgym.wrappers.sb3.apprentice import Apprentice
+from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.sb3.settings import DynaConfig
+
+pytestmark = pytest.mark.sb3
+
+QUICK = DynaConfig(horizon=3, least=5, window=10, shuffle=5, from_start=1.0, permute=False, redraw=False)
+
+
+def world() -> gym.Env[Any, Any]:
+    return Flat(TransitionRecorder(gym.wrappers.TimeLimit(LineEnv(), 8)))
+
+
+def apprentice(**model: float) -> Apprentice:
+    from relgym.wrappers.sb3.dreaming import explore
+
+    found = Apprentice(LineModel(**model), LineTask(), QUICK)
+    explore(found, world(), 40, seed=0)
+    return found
+
+
+def dreams(num_envs: int = 4, **model: float) -> Any:
+    from relgym.wrappers.sb3.dreaming import DreamVecEnv
+
+    return DreamVecEnv(apprentice(**model), world(), num_envs=num_envs, config=QUICK)
+
+
+def test_dreams_go_on_and_begin_anew() -> None:
+    env = dreams()
+    place = 2.0 * env.reset()[:, 0]
+    push = np.full((4, 1), 0.25, dtype=np.float32)
+    for k in range(2):
+        seen, rewards, dones, infos = env.step(push)
+        place = place + 0.5
+        np.testing.assert_allclose(2.0 * seen[:, 0], place, atol=1e-5)
+        np.testing.assert_allclose(rewards, -np.abs(place), atol=1e-5)
+        assert not dones.any(), k
+    seen, _, dones, infos = env.step(push)
+    assert dones.all()
+    assert all(info["TimeLimit.truncated"] for info in infos)
+    last = np.array([info["terminal_observation"][0] for info in infos])
+    np.testing.assert_allclose(2.0 * last, place + 0.5, atol=1e-5)
+    assert (np.abs(2.0 * seen[:, 0]) <= 2.0).all()  # where real episodes begin
+
+
+def test_a_dream_that_ends_is_no_time_limit() -> None:
+    env = dreams(off=200.0)  # so far that every step ends it, or leaves the observation space
+    env.reset()
+    _, rewards, dones, infos = env.step(np.zeros((4, 1), dtype=np.float32))
+    assert dones.all()
+    assert all(info["TimeLimit.truncated"] for info in infos)  # outside what can be seen: not known
+    assert not rewards.any()
+    env = dreams(off=6.0)
+    env.reset()
+    place = 2.0 * env.reset()[:, 0]
+    _, rewards, dones, infos = env.step(np.zeros((4, 1), dtype=np.float32))
+    np.testing.assert_array_equal(dones, place + 6.0 > 5.0)
+    assert not any(info.get("TimeLimit.truncated", False) for info in infos)
+    np.testing.assert_allclose(rewards, -(place + 6.0), atol=1e-5)
+
+
+def test_ppo_trains_in_the_dream_and_is_checked_in_the_world() -> None:
+    import torch
+    from stable_baselines3 import PPO
+
+    from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
+
+    torch.set_num_threads(1)
+    model = apprentice()
+    seen = len(model.stock)
+    env = DreamVecEnv(model, world(), num_envs=4, config=QUICK)
+    check = DreamCheckup(model, world(), every=60, episodes=2)
+    agent = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
+    agent.learn(256, callback=check)
+    assert agent.num_timesteps == 256
+    assert [at for at, *_ in check.history] == [4, 64, 124, 184, 244]
+    assert check.history[-1][1] == len(model.stock) - seen
+    assert model.gate.open
+
+
+def test_training_stops_when_the_model_is_trusted_no_more() -> None:
+    from stable_baselines3 import PPO
+
+    from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
+
+    model = apprentice()
+    assert model.gate.open
+    check = DreamCheckup(model, world(), every=32, episodes=3)
+    env = DreamVecEnv(model, world(), num_envs=4, config=QUICK)
+    model.model.off = 2.0  # type: ignore[attr-defined]  # the world is another now
+    agent = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
+    agent.learn(1_000, callback=check)
+    assert agent.num_timesteps < 100
+    assert not model.gate.open
+
+
+def test_refusals_name_the_remedy() -> None:
+    from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv, explore
+
+    with pytest.raises(ConfigError, match="no scenes to dream on from"):
+        DreamVecEnv(Apprentice(LineModel(), LineTask(), QUICK), world())
+    with pytest.raises(ConfigError, match="num_envs=0: expected at least 1"):
+        DreamVecEnv(apprentice(), world(), num_envs=0)
+    with pytest.raises(ConfigError, match="steps=0: expected at least 1"):
+        explore(apprentice(), world(), 0, seed=0)
+    with pytest.raises(ConfigError, match="every=0: expected at least 1"):
+        DreamCheckup(apprentice(), world(), every=0)

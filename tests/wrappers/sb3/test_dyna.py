@@ -1,0 +1,294 @@
+"""Dyna with Stable-Baselines3's algorithms: what goes into batches, when, and what is refused."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from dyna_worlds import Flat, LineEnv, LineModel
+from gymnasium import spaces
+
+from relgym.errors import ConfigError
+from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.sb3.settings import DynaConfig
+
+pytestmark = pytest.mark.sb3
+
+QUICK: dict[str, Any] = {
+    "dreams": 8,
+    "every": 4,
+    "updates": 2,
+    "shuffle": 5,
+    "horizon": 4,
+    "least": 5,
+    "window": 10,
+}
+
+
+def flat(steps: int = 8) -> gym.Env[Any, Any]:
+    return Flat(TransitionRecorder(gym.wrappers.TimeLimit(LineEnv(), steps)))
+
+
+def plain() -> gym.Env[Any, Any]:
+    return TransitionRecorder(LineEnv(dtype=np.float32))
+
+
+class Steering(gym.ActionWrapper[Any, Any, Any]):
+    """Left, not at all, or right."""
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        super().__init__(env)
+        self.action_space = spaces.Discrete(3)
+
+    def action(self, action: Any) -> Any:
+        return np.array([float(action) - 1.0], dtype=np.float32)
+
+
+def agent(name: str, env: Any, **options: Any) -> Any:
+    import stable_baselines3
+    import torch
+
+    from relgym.wrappers.sb3.replay import replay_options
+
+    torch.set_num_threads(1)
+    n_steps = options.pop("n_steps", 1)
+    policy = "MultiInputPolicy" if isinstance(env.observation_space, spaces.Dict) else "MlpPolicy"
+    mixing = replay_options(env.observation_space, n_steps=n_steps)
+    settings = {"learning_starts": 10, "batch_size": 16, "seed": 0, "device": "cpu", "buffer_size": 500}
+    algorithm = getattr(stable_baselines3, name)
+    return algorithm(policy, env, policy_kwargs={"net_arch": [8]}, **{**settings, **mixing, **options})
+
+
+@pytest.mark.parametrize(
+    ("name", "make", "options"),
+    [
+        ("SAC", flat, {}),
+        ("SAC", plain, {}),
+        ("SAC", flat, {"n_steps": 3}),
+        ("TD3", flat, {}),
+        ("DQN", lambda: Steering(flat()), {"train_freq": 1}),
+    ],
+)
+def test_trusted_dreams_are_exact_transitions(name: str, make: Any, options: dict[str, Any]) -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    world, env = LineModel(), make()
+    dyna = Dyna(world, DynaConfig(**QUICK))
+    algorithm = agent(name, env, **options)
+    algorithm.learn(60, callback=dyna)
+    gate = dyna.apprentice.gate
+    assert (gate.open, gate.known) == (True, 1.0)
+    assert gate.error < 1e-6  # observations are float32
+    assert dyna.imagined > 100
+    assert len(world.learned) == 60 - 5
+    pool = algorithm.replay_buffer.imagined
+    last = pool.size()
+    place = pool.observations["cart"][:last, 0, 0] if make is plain else 2.0 * pool.observations[:last, 0, 0]
+    after = (
+        pool.next_observations["cart"][:last, 0, 0]
+        if make is plain
+        else 2.0 * pool.next_observations[:last, 0, 0]
+    )
+    push = pool.actions[:last, 0, 0] - 1.0 if name == "DQN" else pool.actions[:last, 0, 0]
+    np.testing.assert_allclose(after, place + 2.0 * push, atol=1e-5)
+    np.testing.assert_allclose(pool.rewards[:last, 0], -np.abs(after), atol=1e-5)
+    ended = pool.dones[:last, 0] * (1.0 - pool.timeouts[:last, 0])
+    np.testing.assert_array_equal(ended, np.abs(after) > 5.0)
+    # A dream ends with a cut or a termination; within one, each step goes on from the last.
+    going = pool.dones[: last - 1, 0] == 0.0
+    np.testing.assert_allclose(place[1:][going], after[:-1][going], atol=1e-6)
+    assert algorithm.gradient_steps == 1  # as it was before
+
+
+def test_batches_hold_the_share_that_was_asked_for() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    dyna = Dyna(LineModel(), DynaConfig(**QUICK, real_ratio=0.25))
+    algorithm = agent("SAC", flat())
+    algorithm.learn(40, callback=dyna)
+    buffer = algorithm.replay_buffer
+    buffer.rewards[:] = 7.0  # as if the world paid this, and only the world
+    batch = buffer.sample(64)
+    assert int((batch.rewards == 7.0).sum()) == 16
+    assert batch.observations.shape == (64, 1)
+    buffer.trusted = False
+    assert bool((buffer.sample(64).rewards == 7.0).all())
+    buffer.trusted, buffer.real_ratio = True, 0.0
+    assert not bool((buffer.sample(64).rewards == 7.0).any())
+    buffer.real_ratio = 1.0
+    assert bool((buffer.sample(64).rewards == 7.0).all())
+
+
+def test_a_wrong_model_is_never_dreamed_in() -> None:
+    """No harm: with the gate shut, training is Stable-Baselines3's own, to the last weight."""
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    class Nothing(BaseCallback):  # type: ignore[misc]
+        def _on_step(self) -> bool:
+            return True
+
+    dyna = Dyna(LineModel(off=1.0), DynaConfig(**QUICK))
+    weights = []
+    for callback in (dyna, Nothing()):
+        algorithm = agent("SAC", flat())
+        algorithm.learn(60, callback=callback)
+        weights.append([part.detach().numpy() for part in algorithm.policy.parameters()])
+    assert dyna.imagined == 0
+    assert dyna.apprentice.gate.error > 0.5
+    for mine, theirs in zip(*weights, strict=True):
+        np.testing.assert_array_equal(mine, theirs)
+
+
+def test_when_the_world_changes_the_dreams_are_thrown_away() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    world = LineModel()
+    dyna = Dyna(world, DynaConfig(**QUICK))
+    algorithm = agent("SAC", flat())
+    algorithm.learn(40, callback=dyna)
+    assert algorithm.replay_buffer.imagined.size() > 0
+    world.off = 3.0  # the model is as wrong as if the world had changed
+    algorithm.learn(40, callback=dyna, reset_num_timesteps=False)
+    assert not dyna.apprentice.gate.open
+    assert algorithm.replay_buffer.imagined.size() == 0
+    assert not algorithm.replay_buffer.trusted
+
+
+def test_same_seed_same_weights() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    weights = []
+    for _ in range(2):
+        algorithm = agent("SAC", flat())
+        algorithm.learn(40, callback=Dyna(LineModel(), DynaConfig(**QUICK, seed=3)))
+        weights.append([part.detach().numpy() for part in algorithm.policy.parameters()])
+    for first, second in zip(*weights, strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+def test_the_log_tells(tmp_path: Any) -> None:
+    from stable_baselines3.common.logger import configure
+
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    algorithm = agent("SAC", flat())
+    algorithm.set_logger(configure(str(tmp_path), ["csv"]))
+    algorithm.learn(60, callback=Dyna(LineModel(), DynaConfig(**QUICK)), log_interval=1)
+    algorithm.logger.close()
+    head, *rows = (tmp_path / "progress.csv").read_text().splitlines()
+    for name in (
+        "error",
+        "known",
+        "trusted",
+        "imagined",
+        "dreams_known",
+        "learning_seconds",
+        "dreaming_seconds",
+    ):
+        assert f"relgym/{name}" in head
+    assert rows[-1].split(",")[head.split(",").index("relgym/trusted")] == "1.0"
+
+
+def test_several_envs_teach_one_model() -> None:
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    world = LineModel()
+    envs = VecNormalize(DummyVecEnv([flat, flat, flat]))
+    dyna = Dyna(world, DynaConfig(**QUICK))
+    agent("SAC", envs).learn(60, callback=dyna)
+    assert len(world.learned) == 60 - 5
+    assert dyna.imagined > 50
+
+
+def refused(env: Any, model: Any = None, *, name: str = "SAC", **options: Any) -> Any:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    algorithm = agent(name, env)
+    algorithm.learn(5, callback=Dyna(model or LineModel(), DynaConfig(**QUICK), **options))
+
+
+def test_updates_are_counted_per_real_step() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    counts = []
+    for model in (LineModel(), LineModel(off=1.0)):
+        algorithm = agent("SAC", flat(), train_freq=4, gradient_steps=3)
+        algorithm.learn(40, callback=Dyna(model, DynaConfig(**QUICK)))
+        counts.append(algorithm._n_updates)  # the only count there is
+    # After 10 first steps, training comes after steps 12, 16, ..., 40: 8 times 2 x 4 updates, or 3.
+    assert counts == [64, 24]
+
+
+def test_refusals_name_the_remedy() -> None:
+    import stable_baselines3
+
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    ppo = stable_baselines3.PPO("MlpPolicy", flat(), n_steps=8, batch_size=8, device="cpu")
+    with pytest.raises(ConfigError, match=r"PPO is not off-policy.*take SAC, TD3 or DQN"):
+        ppo.learn(8, callback=Dyna(LineModel()))
+    sac = stable_baselines3.SAC("MlpPolicy", flat(), device="cpu", buffer_size=100)
+    with pytest.raises(ConfigError, match=r"a ReplayBuffer can't mix.*\*\*replay_options"):
+        sac.learn(8, callback=Dyna(LineModel()))
+    with pytest.raises(ConfigError, match="has no TransitionRecorder"):
+        refused(Flat(LineEnv()))
+    with pytest.raises(ConfigError, match=r"the algorithm's observation_space is .*dream in the wrappers"):
+        refused(flat(), like=plain())
+    by_episode = agent("SAC", flat(), train_freq=(1, "episode"))
+    with pytest.raises(ConfigError, match="expected steps, since updates are counted per real step"):
+        by_episode.learn(5, callback=Dyna(LineModel()))
+    taskless = flat()
+    taskless.unwrapped.task = None  # type: ignore[attr-defined]
+    with pytest.raises(ConfigError, match="nothing says what a dream is worth"):
+        refused(taskless)
+    with pytest.raises(ConfigError, match=r"object is no model to dream with: it lacks \['schema'"):
+        refused(flat(), object())
+    unfrozen = LineModel()
+    unfrozen.frozen, unfrozen.targets = True, ()  # type: ignore[assignment]
+    with pytest.raises(ConfigError, match="knows none of the targets"):
+        refused(flat(), unfrozen)
+    with pytest.raises(ConfigError, match="training has not begun"):
+        _ = Dyna(LineModel()).apprentice
+
+
+def test_n_steps_are_refused_where_there_is_no_buffer_for_them() -> None:
+    from relgym.wrappers.sb3.replay import replay_options
+
+    with pytest.raises(ConfigError, match="n_steps=0: expected at least 1"):
+        replay_options(flat().observation_space, n_steps=0)
+    with pytest.raises(ConfigError, match="n_steps=3 with Dict observations"):
+        replay_options(plain().observation_space, n_steps=3)
+
+
+def test_stable_baselines3_is_still_what_this_stands_on() -> None:
+    """Fails where the public extension points move, and says which."""
+    from stable_baselines3 import DQN, SAC, TD3
+    from stable_baselines3.common.buffers import DictReplayBuffer, NStepReplayBuffer, ReplayBuffer
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+    from stable_baselines3.common.type_aliases import DictReplayBufferSamples, ReplayBufferSamples
+
+    for algorithm in (SAC, TD3, DQN):
+        assert issubclass(algorithm, OffPolicyAlgorithm)
+        parameters = inspect.signature(algorithm.__init__).parameters
+        assert {"replay_buffer_class", "replay_buffer_kwargs", "gradient_steps", "n_steps"} <= set(parameters)
+    names = ["buffer_size", "observation_space", "action_space", "device", "n_envs"]
+    for buffer in (ReplayBuffer, DictReplayBuffer):
+        assert list(inspect.signature(buffer.__init__).parameters)[1:6] == names
+    for buffer in (ReplayBuffer, DictReplayBuffer, NStepReplayBuffer):
+        assert list(inspect.signature(buffer.sample).parameters)[1:] == ["batch_size", "env"]
+        added = list(inspect.signature(buffer.add).parameters)[1:]
+        assert added == ["obs", "next_obs", "action", "reward", "done", "infos"]
+    fields = ("observations", "actions", "next_observations", "dones", "rewards", "discounts")
+    assert ReplayBufferSamples._fields == DictReplayBufferSamples._fields == fields
+    for hook in ("_init_callback", "_on_step", "_on_training_end", "training_env", "logger"):
+        assert hasattr(BaseCallback, hook)
+    for name in ("get_vec_normalize_env", "predict", "set_logger"):
+        assert callable(getattr(OffPolicyAlgorithm, name))

@@ -1,0 +1,87 @@
+"""Reward and termination learned as properties of the task, and what is said where nothing is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import relgym
+from relgym.envs.scripted import push_knowing
+from relgym.wrappers.sb3.judges import LearnedTask
+from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
+
+MOVING = {("truck", "vx"), ("truck", "px"), ("goal", "ahead"), ("box", "px")}
+
+
+def pushes(n: int, knowing: float, rng: np.random.Generator) -> list[Experience]:
+    """Steps of which a share is taken by a controller that knows the frictions."""
+    env = TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push", disable_env_checker=True))
+    env.action_space.seed(int(rng.integers(2**31)))
+    env.reset(seed=int(rng.integers(2**31)))
+    found: list[Experience] = []
+    while len(found) < n:
+        scene = env.get_wrapper_attr("scene")
+        action = push_knowing(scene) if rng.random() < knowing else env.action_space.sample()
+        *_, terminated, truncated, _ = env.step(action)
+        found += env.take()
+        if terminated or truncated:
+            env.reset()
+    return found
+
+
+def verdicts(judge: Any, steps: list[Experience]) -> Any:
+    return judge.judge(
+        steps[0].start.layout,
+        np.stack([s.start.vector for s in steps]),
+        np.stack([s.action for s in steps]),
+        np.stack([s.transition.after.vector for s in steps]),
+    )
+
+
+def test_the_push_task_is_learned_from_what_it_says(rng: np.random.Generator) -> None:
+    steps = [*pushes(300, 0.0, rng), *pushes(700, 0.9, rng)]
+    judge = LearnedTask(steps[0].start.schema, MOVING)
+    for k in rng.permutation(len(steps)):
+        judge.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
+    assert "reward' = 0.1 next.truck_vx - 0.02" in judge.model.describe()
+    assert "reward' = 1.98" in judge.model.describe()
+    fresh = pushes(300, 0.9, rng)
+    said = verdicts(judge, fresh)
+    known = np.isfinite(said.rewards)
+    assert known.mean() > 0.99
+    off = np.abs(said.rewards - [s.reward for s in fresh])[known]
+    assert (off > 1e-9).mean() < 0.03
+    assert (said.terminated != [s.terminated for s in fresh])[known].mean() < 0.1
+
+
+def test_it_says_nothing_before_it_was_told(rng: np.random.Generator) -> None:
+    steps = pushes(5, 0.0, rng)
+    judge = LearnedTask(steps[0].start.schema, MOVING)
+    said = verdicts(judge, steps)
+    assert np.isnan(said.rewards).all()
+    assert not said.terminated.any()
+
+
+@pytest.mark.sb3
+def test_dyna_learns_the_task_beside_the_world() -> None:
+    import torch
+    from stable_baselines3 import SAC
+
+    from relgym.wrappers.flat import FlatView
+    from relgym.wrappers.sb3 import Dyna, DynaConfig, replay_options
+
+    torch.set_num_threads(1)
+    env = FlatView(TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push", disable_env_checker=True)))
+    model = relgym.WorldModel(env.get_wrapper_attr("schema"))
+    dyna = Dyna(model, DynaConfig(updates=1, shuffle=20), judge="learned")
+    agent = SAC(
+        "MlpPolicy", env, learning_starts=10_000, device="cpu", **replay_options(env.observation_space)
+    )
+    agent.learn(250, callback=dyna)
+    judge = dyna.apprentice.judge
+    assert isinstance(judge, LearnedTask)
+    assert model.seen == judge.model.seen == 230
+    assert 0.0 < dyna.apprentice.gate.error < 1.0

@@ -1,0 +1,109 @@
+"""Scenes to dream on from: drawn, permuted and redrawn without leaving what the model licenses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dyna_worlds import SCHEMA, LineModel
+
+from relgym.errors import ConfigError
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.shapes import Box
+from relgym.wrappers.sb3.stock import SceneStock, free_properties, permuted
+
+POSE = ("px", "py", "pz", "rx", "ry", "rz", "sx", "sy", "sz")
+BLOCKS = SceneSchema(
+    (ObjectType("block", (*POSE, "vx", "weight"), Box(), velocity=("vx", None, None)),),
+    tuple((f"block{k}", "block") for k in range(3)),
+    targets=(Target("block", "vx"),),
+)
+
+
+def scene(x: float, at: float = 0.0) -> Scene:
+    return SCHEMA.scene({"cart": [x, 1.0], "other": [-x, 2.0], "mark": [at]})
+
+
+def test_draws_first_scenes_and_all_scenes(rng: np.random.Generator) -> None:
+    stock = SceneStock()
+    for k in range(10):
+        stock.add(scene(float(k)), first=k == 0)
+    assert len(stock) == 10
+    _, firsts = stock.draw(50, from_start=1.0, rng=rng)
+    assert set(firsts[:, 0]) == {0.0}
+    layout, anywhere = stock.draw(200, from_start=0.0, rng=rng)
+    assert set(anywhere[:, 0]) == set(map(float, range(10)))
+    assert layout.names == ("cart", "other", "mark")
+
+
+def test_forgets_the_oldest(rng: np.random.Generator) -> None:
+    stock = SceneStock(capacity=3)
+    for k in range(10):
+        stock.add(scene(float(k)), first=False)
+    assert set(stock.draw(50, from_start=0.5, rng=rng)[1][:, 0]) == {7.0, 8.0, 9.0}
+
+
+def test_nothing_to_draw_from(rng: np.random.Generator) -> None:
+    with pytest.raises(ConfigError, match="no scenes to dream on from"):
+        SceneStock().draw(1, from_start=0.5, rng=rng)
+    with pytest.raises(ConfigError, match="capacity=0: expected at least 1"):
+        SceneStock(capacity=0)
+
+
+def test_permuted_blocks_keep_places_and_exchange_weights(rng: np.random.Generator) -> None:
+    layout = BLOCKS.layout()
+    before = np.arange(33.0)[None].repeat(60, axis=0)
+    after = permuted(layout, before, WorldModel(BLOCKS), rng=rng).reshape(60, 3, 11)
+    places, weights = after[:, :, :10], after[:, :, 10]
+    # Whatever stands there (place, size, motion) stays together ...
+    assert {tuple(row) for row in places.reshape(-1, 10)} == {
+        tuple(row) for row in before[0].reshape(3, 11)[:, :10]
+    }
+    assert all(set(row) == {10.0, 21.0, 32.0} for row in weights.tolist())
+    # ... and each weight comes to stand in every place.
+    assert (
+        len(
+            {
+                (place[0], w)
+                for row, ws in zip(places, weights, strict=True)
+                for place, w in zip(row, ws, strict=True)
+            }
+        )
+        == 9
+    )
+    assert len({tuple(row) for row in after[:, :, 0]}) == 6
+
+
+def test_a_lone_object_stays_as_it_is(rng: np.random.Generator) -> None:
+    layout = SCHEMA.layout(("cart", "mark"))
+    before = np.arange(9.0).reshape(3, 3)
+    np.testing.assert_array_equal(permuted(layout, before, LineModel(), rng=rng), before)
+
+
+def pushed(before: Scene, by: float) -> Scene:
+    return before.replace({("cart", "x"): before["cart"]["x"] + by})
+
+
+def taught(rng: np.random.Generator, *, minding_the_mark: bool) -> WorldModel:
+    model = WorldModel(SCHEMA)
+    for _ in range(80):
+        x, at, push = rng.uniform(-2, 2, 3)
+        before = SCHEMA.scene({"cart": [x, 1.0], "other": [-x, 2.0], "mark": [at], "action": [push]})
+        model.learn_one(Transition(before, pushed(before, push + at * minding_the_mark)))
+    return model
+
+
+def test_only_what_no_law_mentions_is_redrawn(rng: np.random.Generator) -> None:
+    free, minding = (taught(rng, minding_the_mark=minds) for minds in (False, True))
+    assert free_properties(free) == {("mark", "at")}
+    assert free_properties(minding) == frozenset()
+    assert free_properties(LineModel()) == frozenset()  # nothing to read, nothing licensed
+    stock = SceneStock()
+    for at in (1.0, 3.0):
+        stock.add(scene(0.5, at), first=True)
+    layout, vectors = stock.draw(40, from_start=1.0, rng=rng)
+    varied = stock.redrawn(layout, vectors, free, rng=rng)
+    np.testing.assert_array_equal(varied[:, :4], vectors[:, :4])
+    assert ((varied[:, 4] >= 1.0) & (varied[:, 4] <= 3.0)).all()
+    assert len(set(varied[:, 4])) == 40
+    np.testing.assert_array_equal(stock.redrawn(layout, vectors, minding, rng=rng), vectors)

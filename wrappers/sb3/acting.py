@@ -1,0 +1,28 @@
+"""Actions in many scenes at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.scene.objects import ACTION, Float2D, SceneLayout, SceneSchema
+
+__all__ = ["acting_all"]
+
+
+def acting_all(
+    schema: SceneSchema, layout: SceneLayout, vectors: Float2D, actions: NDArray[Any]
+) -> tuple[SceneLayout, NDArray[np.float64]]:
+    """Layout and state vectors with actions in them, in physical units: `relgym.envs.actions.acting` for n."""
+    if ACTION not in schema.order:
+        return layout, vectors
+    whole = schema.layout((*layout.names, ACTION))
+    done = np.asarray(actions, dtype=np.float64).reshape(len(vectors), -1)
+    if schema.action_scale:
+        ranges = {p: (k, low, high) for k, (p, low, high) in enumerate(schema.action_scale)}
+        scaled = [ranges[prop] for prop in schema.type_of(ACTION).properties]
+        done = np.stack([low + (done[:, k] + 1.0) / 2.0 * (high - low) for k, low, high in scaled], axis=1)
+    at = whole.offsets[whole.index(ACTION)]
+    return whole, np.concatenate([vectors[:, :at], done, vectors[:, at:]], axis=1)

@@ -1,0 +1,136 @@
+"""A model beside an agent: it foretells every real step, is judged by it, and then learns from it."""
+
+from __future__ import annotations
+
+import math
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from relgym.errors import ConfigError
+from relgym.model.scenes import mismatch
+from relgym.scene.objects import TASK, Scene
+from relgym.wrappers.sb3.gate import Key, TrustGate, Verdict
+from relgym.wrappers.sb3.judges import Judge
+from relgym.wrappers.sb3.lens import Lens
+from relgym.wrappers.sb3.recorder import Experience
+from relgym.wrappers.sb3.settings import DynaConfig
+from relgym.wrappers.sb3.stock import DreamModel, SceneStock, changing
+
+__all__ = ["Apprentice", "check_model"]
+
+
+class Apprentice:
+    """Foretells, is judged, learns; test, then train (Dawid 1984).
+
+    Parameters
+    ----------
+    model
+        The model; one that is frozen (``model.frozen``) is judged all the same, but doesn't learn.
+    judge
+        Reward and termination, if they are to be foretold as well.
+    config
+        Free parameters.
+
+    Attributes
+    ----------
+    gate : TrustGate
+        Whether to trust the model.
+    stock : SceneStock
+        Real scenes to dream on from.
+    seconds : float
+        Time spent on foretelling and learning.
+    """
+
+    def __init__(self, model: DreamModel, judge: Judge, config: DynaConfig) -> None:
+        self.model = model
+        self.judge = judge
+        self.gate = TrustGate(
+            open_at=config.open_at, shut_at=config.shut_at, window=config.window, least=config.least
+        )
+        self.stock = SceneStock()
+        self.seconds = 0.0
+        self._learns = not getattr(model, "frozen", False)
+        self._waiting: list[Experience] = []
+        self._shuffle = config.shuffle
+        self._rng = np.random.default_rng([config.seed, 1])
+
+    def take_up(self, real: Experience) -> None:
+        """Foretell a real step, judge the model by it, and learn from it or from an earlier one."""
+        started = perf_counter()
+        self.gate.count(self._judged(real))
+        self.stock.add(real.start, first=real.first)
+        if self._learns:
+            self._learn(real)
+        self.seconds += perf_counter() - started
+
+    def _learn(self, real: Experience) -> None:
+        """A stock of `shuffle` experiences is learned from in random order, one for every new one."""
+        self._waiting.append(real)
+        if len(self._waiting) > self._shuffle:
+            chosen = int(self._rng.integers(len(self._waiting)))
+            self._waiting[chosen], self._waiting[-1] = self._waiting[-1], self._waiting[chosen]
+            self._teach(self._waiting.pop())
+
+    def _teach(self, real: Experience) -> None:
+        if not hasattr(self.model, "learn_step"):
+            self.model.learn_one(real.transition)
+        for part in (self.model, self.judge):  # those that learn the task
+            if hasattr(part, "learn_step"):
+                part.learn_step(real.transition, real.reward, terminated=real.terminated)
+
+    def _judged(self, real: Experience) -> Verdict:
+        before, after = real.start, real.transition.after
+        foretold = self.model.predict_one(real.transition.before)
+        changes: dict[Key, float] = {}
+        residuals: dict[Key, float] = {}
+        moving = changing(self.model)
+        for o in before:
+            for prop in o.type.properties:
+                if (o.type.name, prop) in moving and o.name in after:
+                    key, now = (o.type.name, prop), after[o.name][prop]
+                    _widen(changes, key, now - o[prop])
+                    _widen(residuals, key, now - foretold.scene[o.name][prop])
+        changes[TASK, "reward"] = real.reward
+        changes[TASK, "terminated"] = 1.0
+        if foretold.ok:
+            residuals |= self._task_residuals(real, foretold.scene)
+        spoke = foretold.ok and all(map(math.isfinite, residuals.values()))
+        return Verdict(residuals if spoke else {}, changes)
+
+    def _task_residuals(self, real: Experience, foretold: Scene) -> dict[Key, float]:
+        layout = real.start.layout
+        following = np.concatenate([foretold[name].values for name in layout.names])
+        judged = self.judge.judge(
+            layout, real.start.vector[None], np.asarray(real.action)[None], following[None]
+        )
+        return {
+            (TASK, "reward"): real.reward - float(judged.rewards[0]),
+            (TASK, "terminated"): float(real.terminated) - float(judged.terminated[0]),
+        }
+
+
+def check_model(model: Any, lens: Lens) -> None:
+    """Raise `ConfigError` unless a model can speak of the env's scenes."""
+    missing = [
+        name for name in ("schema", "targets", "predict_one", "predict_batch") if not hasattr(model, name)
+    ]
+    if missing:
+        raise ConfigError(f"{type(model).__name__} is no model to dream with: it lacks {missing}")
+    schema = lens.recorder.view.schema
+    if difference := mismatch(schema, model.schema):
+        raise ConfigError(
+            f"the model was made for other scenes than the env shows: {difference}; make it with the env's schema "
+            "(env.get_wrapper_attr('schema'))"
+        )
+    if getattr(model, "frozen", False) and not model.targets:
+        raise ConfigError(
+            "the model knows none of the targets and can't learn (it was loaded without its history): load one that "
+            "was taught, or save with history=True"
+        )
+
+
+def _widen(found: dict[Key, float], key: Key, value: float) -> None:
+    if abs(value) >= abs(found.get(key, 0.0)):
+        found[key] = value

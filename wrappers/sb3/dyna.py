@@ -1,0 +1,264 @@
+"""Dyna (Sutton 1991) as a callback: off-policy algorithms learn from real and imagined transitions alike."""
+
+from __future__ import annotations
+
+import copy
+from time import perf_counter
+from typing import Any, Literal, cast
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+from relgym.errors import ConfigError
+from relgym.wrappers.sb3.apprentice import Apprentice, check_model
+from relgym.wrappers.sb3.imagination import Imagination, Imagined
+from relgym.wrappers.sb3.judges import Judge, LearnedTask, NeuralModel, NeuralTask
+from relgym.wrappers.sb3.lens import Lens, Observations
+from relgym.wrappers.sb3.replay import Mixing
+from relgym.wrappers.sb3.settings import DynaConfig
+from relgym.wrappers.sb3.stock import DreamModel, changing, permuted
+
+__all__ = ["Dyna", "check_algorithm", "judge_of", "lens_of"]
+
+
+class Dyna(BaseCallback):  # type: ignore[misc]
+    """Lets SAC, TD3 or DQN train in a model that learns while they act.
+
+    At every real step the model foretells it, is judged by what happened, and learns. While its prequential
+    error is small (`TrustGate`), every few steps the policy dreams on from scenes that were seen, and batches
+    mix what it dreamed with what was real. While it isn't, the algorithm is the one that Stable-Baselines3
+    ships.
+
+    Parameters
+    ----------
+    model
+        What to learn and dream in: a `WorldModel`, an `MLPEnsemble`, anything with their methods.
+    config
+        Free parameters.
+    judge
+        Reward and termination of dreams; default: the env's own ``task``. ``"learned"``: by what the model learns of
+        them, or if it leaves them out, by a `LearnedTask` beside it.
+    like
+        An env in the same wrappers as those that the agent acts in; needed where these run in other
+        processes.
+    verbose
+        As in Stable-Baselines3.
+
+    Raises
+    ------
+    ConfigError
+        When training begins: an algorithm that isn't off-policy, a replay buffer that can't mix, an env
+        without a `TransitionRecorder`, spaces or schemas that don't match, no reward function.
+
+    Notes
+    -----
+    Logged: ``relgym/error``, ``relgym/known``, ``relgym/trusted``, ``relgym/imagined`` (how many so far),
+    ``relgym/dreams_known``, ``relgym/learning_seconds`` and ``relgym/dreaming_seconds``.
+
+    Examples
+    --------
+    >>> import gymnasium as gym, relgym
+    >>> from relgym.wrappers.sb3 import Dyna, TransitionRecorder, replay_options
+    >>> from stable_baselines3 import SAC  # doctest: +SKIP
+    >>> env = TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push"))
+    >>> model = relgym.WorldModel(env.get_wrapper_attr("schema"))
+    >>> agent = SAC("MultiInputPolicy", env, **replay_options(env.observation_space))  # doctest: +SKIP
+    >>> agent.learn(2_000, callback=Dyna(model))  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        model: DreamModel,
+        config: DynaConfig | None = None,
+        *,
+        judge: Judge | Literal["learned"] | None = None,
+        like: gym.Env[Any, Any] | None = None,
+        verbose: int = 0,
+    ) -> None:
+        super().__init__(verbose)
+        self.world = model
+        self.config = config or DynaConfig()
+        self.imagined = 0
+        self.dreaming_seconds = 0.0
+        self._judge = judge
+        self._like = like
+        self._rng = np.random.default_rng([self.config.seed, 0])
+        self._dreamed_at = 0
+        self._known = 0.0
+        self._apprentice: Apprentice | None = None
+        self._imagination: Imagination | None = None
+
+    @property
+    def apprentice(self) -> Apprentice:
+        """The model at work: gate, stock of scenes, time spent; `ConfigError` before training began."""
+        if self._apprentice is None:
+            raise ConfigError("training has not begun: call algorithm.learn(..., callback=dyna) first")
+        return self._apprentice
+
+    # ------------------------------------------------------------------ Stable-Baselines3's callback
+    def _init_callback(self) -> None:
+        check_algorithm(self.model)
+        lens = lens_of(self.training_env, self._like)
+        _check_spaces(self.model, lens)
+        check_model(self.world, lens)
+        judge = judge_of(lens, self._judge, self.world)
+        if self._apprentice is None:  # a second learn() goes on with what is known
+            self._apprentice = Apprentice(self.world, judge, self.config)
+            self.buffer.hold(self.config.capacity)
+        self.buffer.real_ratio = self.config.real_ratio
+        self._imagination = Imagination(self.world, lens, judge)
+        self._usual = int(self.model.gradient_steps)
+        self._dreamed_at = min(self._dreamed_at, int(self.model.num_timesteps))
+
+    def _on_step(self) -> bool:
+        for steps in self.training_env.env_method("take"):
+            for real in steps:
+                self.apprentice.take_up(real)
+        trusted = self.apprentice.gate.open
+        if self.buffer.trusted and not trusted:  # what a model dreamed that is wrong by now is worth nothing
+            self.buffer.hold(self.config.capacity)
+        if trusted and not self._awake() and (self.buffer.imagined.size() == 0 or self._due()):
+            self._dream()
+        self.buffer.trusted = trusted
+        self.model.gradient_steps = self._gradient_steps(trusted)
+        self._log()
+        return True
+
+    def _on_training_end(self) -> None:
+        self.model.gradient_steps = self._usual
+
+    # ------------------------------------------------------------------ dreams
+    @property
+    def buffer(self) -> Any:
+        """The algorithm's replay buffer, a `Mixing` one."""
+        return self.model.replay_buffer
+
+    def _due(self) -> bool:
+        return bool(self.num_timesteps - self._dreamed_at >= self.config.every)
+
+    def _awake(self) -> bool:
+        """Whether the algorithm still gathers its first steps, and what is dreamed would be stale before use."""
+        return bool(self.num_timesteps + self.config.every < self.model.learning_starts)
+
+    def _gradient_steps(self, trusted: bool) -> int:
+        each = self.config.updates if trusted else self.config.updates_alone
+        if each is None:
+            return self._usual
+        return each * int(self.training_env.num_envs * self.model.train_freq.frequency)
+
+    def _dream(self) -> None:
+        started = perf_counter()
+        config, stock = self.config, self.apprentice.stock
+        layout, vectors = stock.draw(config.dreams, from_start=config.from_start, rng=self._rng)
+        if config.permute:
+            vectors = permuted(layout, vectors, self.world, rng=self._rng)
+        if config.redraw:
+            vectors = stock.redrawn(layout, vectors, self.world, rng=self._rng)
+        assert self._imagination is not None, "made when training begins"
+        found = self._imagination.dream(layout, vectors, self._act, horizon=config.horizon)
+        self._keep(found)
+        self._dreamed_at = self.num_timesteps
+        self.dreaming_seconds += perf_counter() - started
+
+    def _keep(self, found: Imagined | None) -> None:
+        self._known = 0.0 if found is None else found.known
+        if found is not None:
+            self.buffer.imagine(found)
+            self.imagined += len(found)
+
+    def _act(self, seen: Observations) -> tuple[NDArray[Any], NDArray[Any]]:
+        """The policy as it explores: actions for the env, and scaled to [-1, 1] for the buffer."""
+        normalise = self.model.get_vec_normalize_env()
+        shown = seen if normalise is None else normalise.normalize_obs(seen)
+        actions, _ = self.model.predict(shown, deterministic=False)
+        if not isinstance(self.model.action_space, gym.spaces.Box):
+            return actions, actions
+        scaled = self.model.policy.scale_action(actions)
+        if self.model.action_noise is not None:
+            draw = copy.deepcopy(self.model.action_noise)  # its state is that of the real exploration
+            noise = np.stack([draw().ravel()[: scaled.shape[1]] for _ in scaled])
+            scaled = np.clip(scaled + noise, -1.0, 1.0)
+        return self.model.policy.unscale_action(scaled), scaled
+
+    # ------------------------------------------------------------------ the log
+    def _log(self) -> None:
+        gate = self.apprentice.gate
+        record = self.logger.record
+        record("relgym/error", gate.error)
+        record("relgym/known", gate.known)
+        record("relgym/trusted", float(gate.open))
+        record("relgym/imagined", self.imagined)
+        record("relgym/dreams_known", self._known)
+        record("relgym/learning_seconds", self.apprentice.seconds)
+        record("relgym/dreaming_seconds", self.dreaming_seconds)
+
+
+def lens_of(training_env: Any, like: gym.Env[Any, Any] | None) -> Lens:
+    """What the agent sees and does, read from one of its envs.
+
+    Raises
+    ------
+    ConfigError
+        They run in other processes and none was given beside them, or have no `TransitionRecorder`.
+    """
+    if like is not None:
+        return Lens(like)
+    inner = training_env
+    while hasattr(inner, "venv"):  # wrappers round vector envs
+        inner = inner.venv
+    if not isinstance(inner, DummyVecEnv):
+        raise ConfigError(
+            f"the envs of a {type(inner).__name__} can't be looked into: pass like=make_env(), one in the same "
+            "wrappers"
+        )
+    return Lens(inner.envs[0])
+
+
+def judge_of(lens: Lens, judge: Judge | Literal["learned"] | None, model: DreamModel) -> Judge:
+    """Reward and termination of dreams: those given, learned ones, or else the env's own."""
+    if judge == "learned":
+        if hasattr(model, "judge_all"):
+            return NeuralTask(cast(NeuralModel, model))
+        return LearnedTask(lens.recorder.view.schema, changing(model))
+    if judge is not None:
+        return judge
+    recorder = lens.recorder
+    task = recorder.get_wrapper_attr("task") if recorder.has_wrapper_attr("task") else None
+    if task is None:
+        raise ConfigError(
+            "nothing says what a dream is worth: pass judge='learned', or judge= an object with judge(layout, before, "
+            "actions, after), or give the env a task"
+        )
+    found: Judge = task
+    return found
+
+
+def check_algorithm(algorithm: Any) -> None:
+    """Raise `ConfigError` unless an algorithm is off-policy and its replay buffer can mix."""
+    if not isinstance(algorithm, OffPolicyAlgorithm):
+        raise ConfigError(
+            f"{type(algorithm).__name__} is not off-policy and has no replay buffer to mix: take SAC, TD3 or DQN, or "
+            "train it in the dream itself (DreamCheckup)"
+        )
+    if not isinstance(algorithm.replay_buffer, Mixing):
+        raise ConfigError(
+            f"a {type(algorithm.replay_buffer).__name__} can't mix in what was imagined: make the algorithm with "
+            f"{type(algorithm).__name__}(..., **replay_options(env.observation_space))"
+        )
+    if algorithm.train_freq.unit.value != "step":
+        raise ConfigError(
+            f"train_freq={tuple(algorithm.train_freq)}: expected steps, since updates are counted per real step"
+        )
+
+
+def _check_spaces(algorithm: Any, lens: Lens) -> None:
+    for what in ("observation_space", "action_space"):
+        own, seen = getattr(algorithm, what), getattr(lens, what)
+        if own != seen:
+            raise ConfigError(
+                f"the algorithm's {what} is {own}, the env's {seen}: dream in the wrappers that the agent acts in"
+            )

@@ -1,0 +1,119 @@
+"""Whether to trust a model: decided by how well it foretold what then really happened, with hysteresis."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+__all__ = ["Spread", "TrustGate", "Verdict"]
+
+Key: TypeAlias = tuple[str, str]
+"""A type or the task, and a property."""
+
+
+@dataclass(slots=True)
+class Spread:
+    """Running root mean square of how far a property moves in a step, in its units."""
+
+    count: int = 0
+    mean_square: float = 0.0
+
+    def add(self, change: float) -> None:
+        """Take up one change."""
+        self.count += 1
+        self.mean_square += (change * change - self.mean_square) / self.count
+
+    @property
+    def scale(self) -> float:
+        """The root mean square; 0 before anything moved."""
+        return float(self.mean_square**0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One real step, as foretold and as it came.
+
+    Attributes
+    ----------
+    residuals
+        Observed minus foretold value, by (type or task, property); the largest where several objects have it.
+        Empty where the model didn't speak.
+    changes
+        Observed change of the same properties: what a model that says *nothing changes* is off by.
+    """
+
+    residuals: Mapping[Key, float]
+    changes: Mapping[Key, float]
+
+
+class TrustGate:
+    """Opens when a model's prequential error is small, shuts when it has grown large.
+
+    The error of a step is the largest ratio, over all properties, of how far the foretold value was off to
+    how far the property usually moves, cut off at 1; the gate's error is its mean over the latest steps. A
+    model that says *nothing changes* scores about 1, an exact one 0. Steps of which the model said nothing
+    don't count: nobody dreams them.
+
+    Parameters
+    ----------
+    open_at, shut_at
+        The gate opens at an error of at most `open_at` and shuts at one of at least `shut_at`; in between it
+        stays as it is.
+    window
+        How many of the latest steps count.
+    least
+        With fewer of them the gate stays shut.
+
+    Examples
+    --------
+    >>> gate = TrustGate(open_at=0.1, shut_at=0.5, window=4, least=2)
+    >>> for off in (0.0, 0.0, 1.0, 1.0, 1.0):
+    ...     gate.count(Verdict({("cart", "v"): off}, {("cart", "v"): 1.0}))
+    ...     print(gate.error, gate.open)
+    0.0 False
+    0.0 True
+    0.3333333333333333 True
+    0.5 False
+    0.75 False
+    """
+
+    def __init__(self, *, open_at: float, shut_at: float, window: int, least: int) -> None:
+        self.open_at, self.shut_at, self.least = open_at, shut_at, least
+        self.open = False
+        self.switches = 0
+        self._errors: deque[float] = deque(maxlen=window)
+        self._spoke: deque[bool] = deque(maxlen=window)
+        self._spreads: dict[Key, Spread] = {}
+
+    @property
+    def error(self) -> float:
+        """Mean error of the latest steps that the model spoke of; 1 while it hasn't spoken."""
+        return sum(self._errors) / len(self._errors) if self._errors else 1.0
+
+    @property
+    def known(self) -> float:
+        """Share of the latest steps that the model spoke of."""
+        return sum(self._spoke) / len(self._spoke) if self._spoke else 0.0
+
+    def count(self, verdict: Verdict) -> None:
+        """Take up one real step; `open` is up to date afterwards."""
+        for key, change in verdict.changes.items():
+            self._spreads.setdefault(key, Spread()).add(change)
+        self._spoke.append(bool(verdict.residuals))
+        if verdict.residuals:
+            self._errors.append(max(self._ratio(key, off) for key, off in verdict.residuals.items()))
+        self._decide()
+
+    def _ratio(self, key: Key, off: float) -> float:
+        scale = self._spreads[key].scale if key in self._spreads else 0.0
+        if scale == 0.0:  # it never moved: any error is a whole one
+            return float(abs(off) > 1e-9)
+        return min(1.0, abs(off) / scale)
+
+    def _decide(self) -> None:
+        enough = len(self._errors) >= self.least
+        now = enough and (self.error <= self.open_at or (self.open and self.error < self.shut_at))
+        self.switches += now != self.open
+        self.open = now

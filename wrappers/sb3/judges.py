@@ -1,0 +1,167 @@
+"""Who says what a dreamed step is worth: the env's own task, or what was learned of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.config import ClusteringConfig, ModelConfig
+from relgym.envs.tasks import Judgement
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import (
+    ACTION,
+    TASK,
+    Float2D,
+    ObjectType,
+    SceneLayout,
+    SceneSchema,
+    Target,
+    Transition,
+)
+from relgym.wrappers.sb3.acting import acting_all
+
+__all__ = ["Judge", "LearnedTask", "NeuralModel", "NeuralTask"]
+
+_NOW, _NEXT = "now", "next"
+
+_EXACT: Final = ModelConfig(frames="world", clustering=ClusteringConfig(min_examples=5))
+"""What a task says is free of noise, and success is rare at first: five examples found a mode."""
+
+
+class Judge(Protocol):
+    """Reward and termination of n steps; a `relgym.envs.tasks.Task` is one.
+
+    One that learns says so (``learned = True``): where it doesn't know, its rewards are NaN. Of any other NaN is an
+    error.
+    """
+
+    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
+        """Judge n steps; scenes without actions, actions in the units of the bare env's space."""
+
+
+class LearnedTask:
+    """Learns reward and termination as properties of the bodiless object `task`, with modes and clauses.
+
+    They are functions of the scene, the action and the next scene, so the judge's own little world has no
+    bodies: an object ``now`` with the properties of all objects that are the only one of their type, an object
+    ``next`` with those of them that change, the action, and the task.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    changing
+        (type, property) pairs that change.
+    config
+        Free parameters of the model; laws of motion have nothing to say here.
+
+    Attributes
+    ----------
+    model : WorldModel
+        What was learned: ``print(judge.model.describe())``.
+
+    Notes
+    -----
+    What depends on one among several objects of a type can't be learned so.
+    """
+
+    learned: Final = True
+
+    def __init__(
+        self, schema: SceneSchema, changing: set[tuple[str, str]], config: ModelConfig | None = None
+    ) -> None:
+        self.schema = schema
+        counts = Counter(name for _, name in schema.objects)
+        single = [
+            (name, schema.type(t)) for name, t in schema.objects if counts[t] == 1 and t not in (ACTION, TASK)
+        ]
+        self._now = [(name, prop) for name, t in single for prop in t.properties]
+        self._next = [
+            (name, prop) for name, t in single for prop in t.properties if (t.name, prop) in changing
+        ]
+        self._action = schema.type(ACTION).properties if ACTION in schema.order else ()
+        self.model = WorldModel(self._small_schema(), config or _EXACT)
+
+    def _small_schema(self) -> SceneSchema:
+        def named(pairs: list[tuple[str, str]]) -> tuple[str, ...]:
+            return tuple(f"{name}_{prop}" for name, prop in pairs)
+
+        parts = {_NOW: named(self._now), _NEXT: named(self._next), ACTION: self._action}
+        types = [ObjectType(name, properties) for name, properties in parts.items() if properties]
+        types.append(ObjectType(TASK, ("reward", "terminated")))
+        targets = (Target(TASK, "reward"), Target(TASK, "terminated"))
+        return SceneSchema(tuple(types), tuple((t.name, t.name) for t in types), targets=targets)
+
+    def learn_step(self, transition: Transition, reward: float, *, terminated: bool) -> None:
+        """Take up what the task said of a real step."""
+        before, after = transition.before, transition.after
+        values: dict[str, list[float]] = {
+            _NOW: [before[name][prop] for name, prop in self._now],
+            _NEXT: [after[name][prop] for name, prop in self._next],
+        }
+        if self._action:
+            values[ACTION] = before[ACTION].values.tolist()
+        values = {name: part for name, part in values.items() if part}
+        small = self.model.schema.scene({**values, TASK: [0.0, 0.0]})
+        said = {(TASK, "reward"): float(reward), (TASK, "terminated"): float(terminated)}
+        self.model.learn_one(Transition(small, small.replace(said)))
+
+    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
+        """What the modes say; NaN where none does."""
+        small = self.model.schema.layout()
+        vectors = np.zeros((len(before), small.width))
+        for k, name in enumerate(small.names):
+            vectors[:, small.slice(k)] = self._part(name, layout, before, actions, after)
+        found = self.model.predict_batch(small, vectors)
+        task = small.index(TASK)
+        known = found.ok if self.model.seen else np.zeros(len(before), dtype=bool)
+        rewards = np.where(known, found.vectors[:, small.column(task, "reward")], np.nan)
+        ended = found.vectors[:, small.column(task, "terminated")] > 0.5
+        return Judgement(rewards, ended & known, np.zeros(len(before), dtype=bool))
+
+    def _part(
+        self, name: str, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
+    ) -> NDArray[np.float64]:
+        """The properties of one of the judge's objects, shape ``(n, …)``."""
+        if name == TASK:
+            return np.zeros((len(before), 2))
+        if name == ACTION:
+            whole, joined = acting_all(self.schema, layout, before, actions)
+            return joined[:, whole.slice(whole.index(ACTION))]
+        pairs, vectors = (self._now, before) if name == _NOW else (self._next, after)
+        found: NDArray[np.float64] = vectors[:, [layout.column(layout.index(o), prop) for o, prop in pairs]]
+        return found
+
+
+class NeuralModel(Protocol):
+    """A model that foretells rewards and ends beside scenes, such as `relgym.baselines.NeuralWorldModel`."""
+
+    schema: SceneSchema
+
+    def judge_all(
+        self, layout: SceneLayout, vectors: Float2D
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Rewards and ends of n scenes with actions in them."""
+
+
+class NeuralTask:
+    """Lets a model judge that foretells rewards and ends itself.
+
+    Parameters
+    ----------
+    model
+        The model; it learns the task together with the scenes.
+    """
+
+    learned: Final = True
+
+    def __init__(self, model: NeuralModel) -> None:
+        self.model = model
+
+    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
+        """What the model says; the next scene doesn't matter to it."""
+        rewards, ended = self.model.judge_all(*acting_all(self.model.schema, layout, before, actions))
+        return Judgement(rewards, ended, np.zeros(len(before), dtype=bool))

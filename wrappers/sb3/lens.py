@@ -1,0 +1,132 @@
+"""What lies between scenes and an agent: wrappers that show it observations and pass on its actions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from relgym.errors import ConfigError
+from relgym.scene.objects import Float2D, SceneLayout
+from relgym.wrappers.sb3.recorder import TransitionRecorder
+
+__all__ = ["Lens", "Observations", "picked"]
+
+Observations: TypeAlias = NDArray[Any] | dict[str, NDArray[Any]]
+"""n observations: an array, or for Dict spaces one per key, each with n rows."""
+
+
+class Lens:
+    """Sees scenes as an agent does, and translates what it does into actions of the bare env.
+
+    Parameters
+    ----------
+    env
+        The env that the agent acts in, in all its wrappers, a `TransitionRecorder` among them. Wrappers that
+        leave the spaces as they are (time limits, monitors) are looked through; of the others those count
+        that are a `gymnasium.ObservationWrapper` or a `gymnasium.ActionWrapper`, whose functions are asked,
+        and an action repeat (an attribute ``repeat``).
+
+    Attributes
+    ----------
+    recorder : TransitionRecorder
+        The recorder.
+    repeat : int
+        Env steps that one decision of the agent lasts.
+
+    Raises
+    ------
+    ConfigError
+        No recorder, or a wrapper that changes a space in a way that nobody can follow.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        self.observation_space, self.action_space = env.observation_space, env.action_space
+        self.repeat = 1
+        self._show: list[Any] = []
+        self._do: list[Any] = []
+        layer: Any = env
+        while not isinstance(layer, TransitionRecorder):
+            if not isinstance(layer, gym.Wrapper):
+                raise ConfigError(
+                    f"{env} has no TransitionRecorder: put one directly round the bare env, inside all wrappers "
+                    "that change observations or actions"
+                )
+            self._take_up(layer)
+            layer = layer.env
+        self.recorder = layer
+        self._show.reverse()
+        base: Any = layer.observation_space  # a Dict of Boxes, as the recorder's view has checked
+        self._dtypes = {name: part.dtype for name, part in base.spaces.items()}
+        self._low = {name: part.low for name, part in base.spaces.items()}
+        self._high = {name: part.high for name, part in base.spaces.items()}
+
+    def _take_up(self, layer: gym.Wrapper[Any, Any, Any, Any]) -> None:
+        own = vars(layer).get("repeat")
+        if isinstance(own, int):
+            self.repeat *= own
+        elif isinstance(layer, gym.ObservationWrapper):
+            self._show.append(layer)
+        elif isinstance(layer, gym.ActionWrapper):
+            self._do.append(layer)
+        elif (layer.observation_space, layer.action_space) != (
+            layer.env.observation_space,
+            layer.env.action_space,
+        ):
+            raise ConfigError(
+                f"{type(layer).__name__} changes a space, and nobody knows how a dream could follow: make it a "
+                "gymnasium.ObservationWrapper or ActionWrapper, or put it inside the TransitionRecorder"
+            )
+
+    def observations(self, layout: SceneLayout, vectors: Float2D) -> Observations:
+        """What the agent sees of n scenes, with the dtypes of its observation space."""
+        if self._show and hasattr(self._show[0], "flattener"):
+            seen = self._show[0].flattener(layout, vectors)
+            for layer in self._show[1:]:
+                seen = _stacked([layer.observation(picked(seen, k)) for k in range(len(vectors))])
+        else:
+            seen = self._raw(layout, vectors)
+            for layer in self._show:
+                seen = _stacked([layer.observation(picked(seen, k)) for k in range(len(vectors))])
+        return self._cast(seen)
+
+    def actions(self, actions: NDArray[Any]) -> NDArray[Any]:
+        """Actions of the bare env for n actions of the agent."""
+        for layer in self._do:
+            actions = np.stack([np.asarray(layer.action(action)) for action in actions])
+        return actions
+
+    def inside(self, layout: SceneLayout, vectors: Float2D) -> NDArray[np.bool_]:
+        """Which of n scenes lie in the bare env's observation space."""
+        low, high = (
+            np.concatenate([ends[name] for name in layout.names]) for ends in (self._low, self._high)
+        )
+        within = (low <= vectors) & (vectors <= high)
+        return np.asarray(within.all(axis=1))
+
+    def _raw(self, layout: SceneLayout, vectors: Float2D) -> dict[str, NDArray[Any]]:
+        cuts = ((name, layout.slice(k)) for k, name in enumerate(layout.names))
+        return {name: vectors[:, cut].astype(self._dtypes[name]) for name, cut in cuts}
+
+    def _cast(self, seen: Observations) -> Observations:
+        if isinstance(seen, dict):
+            parts = self.observation_space.spaces if isinstance(self.observation_space, spaces.Dict) else {}
+            return {key: seen[key].astype(part.dtype, copy=False) for key, part in parts.items()}
+        return seen.astype(self.observation_space.dtype or seen.dtype, copy=False)
+
+
+def picked(seen: Observations, which: Any) -> Any:
+    """The observation of that number; with an array of numbers, those observations."""
+    if isinstance(seen, dict):
+        return {key: part[which] for key, part in seen.items()}
+    return seen[which]
+
+
+def _stacked(seen: list[Any]) -> Observations:
+    if isinstance(seen[0], Mapping):
+        return {key: np.stack([np.asarray(one[key]) for one in seen]) for key in seen[0]}
+    return np.stack([np.asarray(one) for one in seen])

@@ -1,0 +1,100 @@
+"""A wrapper that writes down what really happened, scene by scene, for a model beside the agent to learn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+from gymnasium.error import ResetNeeded
+from gymnasium.utils import RecordConstructorArgs
+
+from relgym.envs.arguments import checked_action
+from relgym.scene.objects import Scene, Transition
+from relgym.wrappers.views import view_of
+
+__all__ = ["Experience", "TransitionRecorder"]
+
+
+@dataclass(frozen=True, slots=True)
+class Experience:
+    """One real step.
+
+    Attributes
+    ----------
+    transition
+        The scene before, with the action in it, and the scene after.
+    start
+        The scene before, without the action.
+    action
+        What was done, in the units of the action space.
+    reward, terminated
+        What the env said.
+    first
+        Whether the episode began with it.
+    """
+
+    transition: Transition
+    start: Scene
+    action: Any
+    reward: float
+    terminated: bool
+    first: bool
+
+
+class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """Keeps the latest steps until somebody takes them; what the env returns stays as it is.
+
+    It goes directly round an env whose observations are scenes, inside all wrappers that change observations
+    or actions: what these hide, scale or repeat, the model sees as it is.
+
+    Parameters
+    ----------
+    env
+        As for `relgym.wrappers.ModelLearner`.
+
+    Attributes
+    ----------
+    view : View
+        How observations and actions become scenes.
+
+    Raises
+    ------
+    ConfigError
+        An env without a schema, or with changed spaces.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any]) -> None:
+        RecordConstructorArgs.__init__(self)
+        gym.Wrapper.__init__(self, env)
+        self.view = view_of(env)
+        self._scene: Scene | None = None
+        self._first = True
+        self._taken: list[Experience] = []
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._scene, self._first = self.view.scene(observation), True
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Step the env and write down what happened."""
+        if self._scene is None:
+            raise ResetNeeded("no current scene: call reset() first")
+        checked = checked_action(self.env.action_space, action)
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        after = self.view.scene(observation)
+        transition = Transition(self.view.with_action(self._scene, checked), after)
+        self._taken.append(
+            Experience(transition, self._scene, checked, float(reward), bool(terminated), self._first)
+        )
+        self._scene, self._first = after, False
+        return observation, reward, terminated, truncated, info
+
+    def take(self) -> list[Experience]:
+        """All steps since the last call, in order; the recorder forgets them."""
+        taken, self._taken = self._taken, []
+        return taken

@@ -1,0 +1,100 @@
+"""Free parameters of Dyna, as one frozen record."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from relgym.errors import ConfigError
+
+__all__ = ["DynaConfig"]
+
+
+@dataclass(frozen=True, slots=True)
+class DynaConfig:
+    """How an agent trains in its model while it acts in the world.
+
+    Parameters
+    ----------
+    real_ratio
+        Share of every batch that really happened, 0 to 1. 0.05 is MBPO's; raising it costs the model's help.
+    horizon
+        Decisions that a dream lasts at most, at least 1: the k of k-step branches. Dreams from first scenes
+        last as long, so that with the task's time limit as horizon they are whole episodes.
+    from_start
+        Share of the dreams that begin in first scenes of episodes; the others branch off anywhere.
+    dreams
+        How many scenes are dreamed on at once. Raising it refreshes the imagined transitions faster.
+    every
+        Real steps between two rounds of dreams.
+    capacity
+        How many imagined transitions are kept, the latest. Small enough that those of old policies and
+        models are soon forgotten.
+    updates, updates_alone
+        Gradient steps per real step while the model is trusted, and while it isn't; the latter none: as many as
+        the algorithm was made for.
+    permute
+        Whether dreams exchange the roles of objects of one type. The model licenses that, a net doesn't.
+    redraw
+        Whether dreams redraw properties of bodiless objects that no law of motion mentions, between the
+        smallest and the largest value seen at the start of episodes. The model licenses that too.
+    shuffle
+        The model learns transitions in random order, out of a stock of so many. What stays the same
+        throughout an episode would otherwise pass for a law; 0: as they come.
+    open_at, shut_at
+        The model is trusted when its prequential error falls to `open_at`, until it rises to `shut_at`
+        (`TrustGate`).
+    window, least
+        Latest real steps that the error is a mean of, and how many there must be.
+    seed
+        Of everything that dreams draw.
+    """
+
+    real_ratio: float = 0.05
+    horizon: int = 20
+    from_start: float = 0.5
+    dreams: int = 128
+    every: int = 10
+    capacity: int = 20_000
+    updates: int = 20
+    updates_alone: int | None = None
+    permute: bool = True
+    redraw: bool = True
+    shuffle: int = 150
+    open_at: float = 0.1
+    shut_at: float = 0.2
+    window: int = 100
+    least: int = 50
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("real_ratio", "from_start"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ConfigError(f"{name}={getattr(self, name)!r}: expected a share from 0 to 1")
+        for name, low in _LEAST.items():
+            value = getattr(self, name)
+            if value is None and name == "updates_alone":
+                continue
+            if not isinstance(value, int) or isinstance(value, bool) or value < low:
+                raise ConfigError(f"{name}={value!r}: expected a whole number, at least {low}")
+        if self.least > self.window:
+            raise ConfigError(f"least={self.least}: expected at most window={self.window}")
+        if not 0.0 <= self.open_at <= self.shut_at or not math.isfinite(self.shut_at):
+            raise ConfigError(
+                f"open_at={self.open_at!r}, shut_at={self.shut_at!r}: expected 0 <= open_at <= shut_at, so that "
+                "the gate doesn't flutter"
+            )
+
+
+_LEAST = {
+    "horizon": 1,
+    "dreams": 1,
+    "every": 1,
+    "capacity": 1,
+    "updates": 1,
+    "updates_alone": 0,
+    "shuffle": 0,
+    "window": 1,
+    "least": 1,
+    "seed": 0,
+}

@@ -1,0 +1,71 @@
+"""What the learners are told about their models, as plain data: targets, parameters, a file to go on from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
+from relgym.errors import ConfigError
+from relgym.model.storage import target_from_json
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import SceneSchema, Target
+
+__all__ = ["PlainTarget", "config_of", "model_of", "target_of"]
+
+PlainTarget: TypeAlias = Target | str | Sequence[Any]
+"""A target, its name (``"ball.vx"``), or ``(type, property)``."""
+
+
+def target_of(given: PlainTarget) -> Target:
+    """The target that is meant; `ConfigError` where none is."""
+    if isinstance(given, Target):
+        return given
+    if not isinstance(given, str):
+        return target_from_json([*given, []] if len(given) == 2 else list(given))
+    type_name, dot, prop = given.rpartition(".")  # type names may hold dots
+    if not (dot and type_name and prop):
+        raise ConfigError(f"target {given!r}: expected 'ball.vx', ('ball', 'vx') or a Target")
+    return Target(type_name, prop)
+
+
+def config_of(given: ModelConfig | Mapping[str, Any]) -> ModelConfig:
+    """The parameters that are meant: a dict holds those that differ from the default."""
+    if isinstance(given, ModelConfig):
+        return given
+    try:
+        halves = {
+            "clustering": ClusteringConfig(**given.get("clustering", {})),
+            "classification": ClassificationConfig(**given.get("classification", {})),
+        }
+        return ModelConfig(**{**given, **halves})
+    except TypeError as error:
+        raise ConfigError(f"config={dict(given)!r}: {error}; see relgym.config.ModelConfig") from None
+
+
+def model_of(
+    schema: SceneSchema,
+    *,
+    config: ModelConfig | None,
+    targets: Sequence[Target] | None,
+    path: str | os.PathLike[str] | None,
+) -> WorldModel:
+    """An empty model, or the one in a file.
+
+    Raises
+    ------
+    ConfigError
+        The file's model was learned in another world, or targets or config are given beside it.
+    """
+    if path is None:
+        return WorldModel(schema, config, targets=targets)
+    if config is not None or targets is not None:
+        raise ConfigError("a loaded model keeps its targets and config: pass either model or those")
+    model = WorldModel.load(path)
+    if model.schema != schema:
+        raise ConfigError(
+            f"{path}: the model was learned in another world (objects {list(model.schema.order)}) than the env's "
+            f"(objects {list(schema.order)}); make the env with the arguments it was learned with"
+        )
+    return model

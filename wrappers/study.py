@@ -1,0 +1,123 @@
+"""The learning half of every wrapper: predict, compare, learn; here or in a process of its own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from relgym.errors import ConfigError
+from relgym.model.prediction import ScenePrediction
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Scene, Transition
+from relgym.wrappers.background import Background
+from relgym.wrappers.prequential import Prequential, StepReport, compared
+
+__all__ = ["NOTHING", "Study"]
+
+NOTHING = StepReport(None, {}, (), None)
+"""The report of a step that taught nothing: a pseudo-transition, or a bad observation."""
+
+
+class Study:
+    """Test, then train.
+
+    Parameters
+    ----------
+    model
+        What learns.
+    learn, predict
+        Whether to learn, and whether to predict before.
+    window
+        How many steps count as the latest.
+    precision
+        Relative precision of what is observed; errors below it aren't counted as wrong.
+    background
+        Length of the queue to a process that learns in the background; ``None``: learn here.
+
+    Attributes
+    ----------
+    model : WorldModel
+        What was learned; with a background process as of the last `catch_up`.
+    prequential : Prequential
+        Errors of predictions made before their outcome was learned; as of the last `catch_up`, too.
+    """
+
+    def __init__(
+        self,
+        model: WorldModel,
+        *,
+        learn: bool = True,
+        predict: bool = True,
+        window: int = 1000,
+        precision: float = 0.0,
+        background: int | None = None,
+    ) -> None:
+        self.model = model
+        self.prequential = Prequential(window)
+        self._predict = predict
+        self._precision = precision
+        self.learning = learn
+        self._background: Background | None = None
+        if background is not None:
+            self._background = Background(
+                model, self.prequential if predict else None, precision=precision, queue=background
+            )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A copy has a model of its own; a process can't be copied, so the copy learns here.
+        self.catch_up()
+        return self.__dict__ | {"_background": None}
+
+    @property
+    def learning(self) -> bool:
+        """Whether transitions are being learned from; `ConfigError` to ask it of a model without history."""
+        return self._learn
+
+    @learning.setter
+    def learning(self, learn: bool) -> None:
+        if learn and self.model.frozen:
+            raise ConfigError(
+                "this model was loaded without its history and can only predict: save it with "
+                "save(path, history=True), or pass learn=False"
+            )
+        self._learn = learn
+
+    @property
+    def dropped(self) -> int:
+        """How many transitions found the queue full and weren't learned from; 0 without a background process."""
+        return 0 if self._background is None else self._background.dropped
+
+    def expect(self, before: Scene | None) -> ScenePrediction | None:
+        """What the model says will follow; ``None`` where it isn't asked."""
+        if before is None or not self._predict or self._background is not None:
+            return None
+        return self.model.predict_one(before)
+
+    def take_up(self, transition: Transition | None, prediction: ScenePrediction | None) -> StepReport:
+        """Count the errors of a prediction, then learn from what happened."""
+        if transition is None:
+            return NOTHING
+        if self._background is not None:
+            if self._learn:
+                self._background.put(transition)
+            return NOTHING
+        residuals, wrong = compared(prediction, transition.after, self._precision)
+        if prediction is not None:
+            self.prequential.count(residuals, wrong)
+        learned = self.model.learn_one(transition) if self._learn else None
+        return StepReport(prediction, residuals, wrong, learned)
+
+    def catch_up(self) -> WorldModel:
+        """Wait until all that is queued was learned; the model as it then is."""
+        if self._background is not None:
+            extra = self.model.extra
+            self.model, count = self._background.fetch()
+            self.model.extra = extra
+            self.prequential = self.prequential if count is None else count
+        return self.model
+
+    def close(self) -> None:
+        """Fetch what was learned and end the background process, if there is one; learning goes on here."""
+        if self._background is not None:
+            self.catch_up()
+            self._background.close()
+            self._background = None

@@ -1,0 +1,251 @@
+"""The wrapper that learns one model from all envs of a vector env."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import iterate
+from numpy.typing import NDArray
+
+from relgym.config import ModelConfig
+from relgym.envs.arguments import checked_action
+from relgym.envs.views import View
+from relgym.errors import ConfigError, ObservationError
+from relgym.model.world_model import WorldModel
+from relgym.wrappers.follower import BadObservations
+from relgym.wrappers.observer import Observer
+from relgym.wrappers.prequential import Prequential, StepReport
+from relgym.wrappers.settings import PlainTarget
+from relgym.wrappers.study import NOTHING
+from relgym.wrappers.views import ViewLike, chosen_view
+
+__all__ = ["VectorModelLearner", "info_at"]
+
+
+class VectorModelLearner(gym.vector.VectorWrapper[Any, Any, Any, Any, Any]):
+    """Learns one `WorldModel` from n envs at once; what they return stays as it is.
+
+    The envs' transitions are taken up one after the other, in their order, as if one env had made them all: predict,
+    compare, learn. Never learned are pseudo-transitions, from the end of an episode to the beginning of the next:
+    with ``NEXT_STEP`` autoreset the step that resets is left out; with ``SAME_STEP`` the transition leads to
+    ``info["final_obs"]``; with ``DISABLED`` the caller resets (``reset(options={"reset_mask": mask})``).
+
+    ``info["relgym"]`` holds a `StepReport` for each env, in an array of shape ``(num_envs,)``.
+
+    Parameters
+    ----------
+    env
+        A vector env that declares its ``metadata["autoreset_mode"]``.
+    view, targets, config, learn, predict, learn_reward, learn_termination, bad_observations, background, model, window
+        As of `ModelLearner`; views see single envs.
+
+    Raises
+    ------
+    ConfigError
+        A single env, a vector env that doesn't declare its autoreset mode, or as of `ModelLearner`.
+
+    Examples
+    --------
+    >>> import gymnasium as gym, relgym
+    >>> envs = VectorModelLearner(gym.make_vec("relgym/TruckPush-v0", 4, redraw="step"), targets=["truck.vx"])
+    >>> _ = envs.reset(seed=0)
+    >>> *_, info = envs.step(envs.action_space.sample())
+    >>> envs.model
+    WorldModel(truck.vx: 0 modes; 4 transitions)
+    """
+
+    def __init__(
+        self,
+        env: gym.vector.VectorEnv[Any, Any, Any],
+        *,
+        view: ViewLike = None,
+        targets: Sequence[PlainTarget] | None = None,
+        config: ModelConfig | Mapping[str, Any] | None = None,
+        learn: bool = True,
+        predict: bool = True,
+        learn_reward: bool = False,
+        learn_termination: bool = False,
+        bad_observations: BadObservations = "raise",
+        background: int | None = None,
+        model: str | os.PathLike[str] | None = None,
+        window: int = 1000,
+    ) -> None:
+        if not isinstance(env, gym.vector.VectorEnv):
+            raise ConfigError(f"expected a vector env, got {env}: ModelLearner(env) learns from a single one")
+        super().__init__(env)
+        self._mode = _autoreset_mode(env)
+        spaces_of = (env.single_observation_space, env.single_action_space)
+        chosen = chosen_view(
+            view, *spaces_of, schema=_schema(env), reward=learn_reward, terminated=learn_termination
+        )
+        self._observer = Observer(
+            chosen,
+            *spaces_of,
+            envs=env.num_envs,
+            targets=targets,
+            config=config,
+            model=model,
+            learn=learn,
+            predict=predict,
+            window=window,
+            background=background,
+            bad_observations=bad_observations,
+            metadata={"env": None if env.spec is None else env.spec.id},
+        )
+
+    # ------------------------------------------------------------------ the Gymnasium contract
+    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin episodes: in all envs, or in those of ``options["reset_mask"]``."""
+        mask = (options or {}).get("reset_mask")
+        begun = range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist()
+        for number in begun:
+            self._observer.followers[number].forget()
+        observations, infos = self.env.reset(seed=seed, options=options)
+        seen = self._single(observations)
+        self._observer.begin({k: (seen[k], info_at(infos, k)) for k in begun})
+        return observations, infos
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Step all envs, then predict and learn, one env after the other.
+
+        Raises
+        ------
+        ActionError
+            An action outside the action space; model and envs are unchanged.
+        ObservationError
+            An observation is no scene, and such aren't skipped. The envs have stepped; `reset` begins anew.
+        """
+        given = list(iterate(self.action_space, actions))
+        checked = [checked_action(self.single_action_space, action) for action in given]
+        observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        seen = self._single(observations)
+        reports: NDArray[Any] = np.full(self.num_envs, None, dtype=object)
+        try:
+            for k in range(self.num_envs):
+                ended = bool(terminated[k] or truncated[k])
+                outcome = (rewards[k], bool(terminated[k]), ended)
+                reports[k] = self._take_up(k, checked[k], seen[k], outcome, infos)
+        except ObservationError:
+            # All envs have stepped, not all were followed: none may go on from what it saw last.
+            for follower in self._observer.followers:
+                follower.forget()
+            raise
+        return observations, rewards, terminated, truncated, {**infos, "relgym": reports}
+
+    def _take_up(
+        self, k: int, action: Any, observation: Any, outcome: tuple[Any, bool, bool], infos: dict[str, Any]
+    ) -> StepReport:
+        observer, follower = self._observer, self._observer.followers[k]
+        reward, terminated, ended = outcome
+        info = info_at(infos, k)
+        if follower.over and self._mode is AutoresetMode.NEXT_STEP:
+            observer.begin({k: (observation, info)})  # this step was a reset, and the action meant nothing
+            follower.over = ended
+            return NOTHING
+        before = follower.act(action)
+        prediction = observer.expect(before)
+        final = ended and self._mode is AutoresetMode.SAME_STEP
+        last, last_info = (
+            (_final(infos, k), info_at(infos.get("final_info", {}), k)) if final else (observation, info)
+        )
+        follower.over = ended
+        report = observer.follow(k, before, prediction, last, last_info, reward=reward, terminated=terminated)
+        if final:
+            observer.begin({k: (observation, info)})
+        return report
+
+    def close(self, **kwargs: Any) -> None:
+        """Close the envs, and end the background process if there is one, once it has learned all."""
+        self._observer.close()
+        super().close(**kwargs)
+
+    def _single(self, observations: Any) -> list[Any]:
+        return list(iterate(self.observation_space, observations))
+
+    # ------------------------------------------------------------------ learning
+    @property
+    def view(self) -> View:
+        """How observations and actions become scenes; final after the first reset, where angles are open."""
+        return self._observer.view
+
+    @property
+    def model(self) -> WorldModel:
+        """What was learned from all envs together."""
+        return self._observer.study.model
+
+    @property
+    def prequential(self) -> Prequential:
+        """How many predictions were wrong, in total and lately; a step of one env counts as one."""
+        return self._observer.study.prequential
+
+    @property
+    def learning(self) -> bool:
+        """Whether transitions are being learned from."""
+        return self._observer.study.learning
+
+    @learning.setter
+    def learning(self, learn: bool) -> None:
+        self._observer.study.learning = learn
+
+    @property
+    def skipped(self) -> int:
+        """How many bad observations were skipped."""
+        return self._observer.skipped
+
+    @property
+    def dropped(self) -> int:
+        """How many transitions found the queue to the background process full."""
+        return self._observer.study.dropped
+
+    def catch_up(self) -> WorldModel:
+        """Wait until the background process has learned all it was sent; the model as it then is."""
+        return self._observer.study.catch_up()
+
+    def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
+        """Write model, spaces, view and some first scenes to one file, as `ModelLearner.save`."""
+        self._observer.save(path, history=history)
+
+
+def info_at(infos: Mapping[str, Any], k: int) -> dict[str, Any]:
+    """The k-th env's part of a vector env's infos."""
+    return dict(_entries(infos, k))
+
+
+def _entries(infos: Mapping[str, Any], k: int) -> Iterator[tuple[str, Any]]:
+    for key, values in infos.items():
+        mask = infos.get(f"_{key}")
+        if mask is None or not mask[k]:
+            continue
+        yield key, info_at(values, k) if isinstance(values, Mapping) else values[k]
+
+
+def _final(infos: Mapping[str, Any], k: int) -> Any:
+    final = infos["final_obs"]
+    return {key: part[k] for key, part in final.items()} if isinstance(final, Mapping) else final[k]
+
+
+def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> AutoresetMode:
+    mode = env.metadata.get("autoreset_mode")
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        raise ConfigError(
+            f"{env} doesn't say how it begins new episodes: expected metadata['autoreset_mode'] to be one of "
+            f"{list(AutoresetMode)}, got {mode!r}; without it the step from one episode to the next would be learned"
+        ) from None
+
+
+def _schema(env: gym.vector.VectorEnv[Any, Any, Any]) -> Any:
+    """The envs' schema, if they have one."""
+    inner = env.unwrapped
+    if hasattr(inner, "schema"):
+        return inner.schema
+    # Asked first: an attribute that isn't there would end the processes of an AsyncVectorEnv.
+    if not hasattr(inner, "call") or not inner.call("has_wrapper_attr", "schema")[0]:
+        return None
+    return inner.get_attr("schema")[0]
