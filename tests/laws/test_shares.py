@@ -19,11 +19,15 @@ def collisions(rng: np.random.Generator, share: np.ndarray) -> tuple[np.ndarray,
 
 
 def bodies(rng: np.random.Generator) -> tuple[Columns, Columns]:
-    one, two = ({"mass": rng.uniform(1, 3, N), "extent": rng.uniform(1, 2, N), "v": np.zeros(N)} for _ in "ab")
+    one, two = (
+        {"mass": rng.uniform(1, 3, N), "extent": rng.uniform(1, 2, N), "v": np.zeros(N)} for _ in "ab"
+    )
     return one, two
 
 
-def found(rng: np.random.Generator, share: np.ndarray, a: Columns, b: Columns, *, alike: bool) -> Share | None:
+def found(
+    rng: np.random.Generator, share: np.ndarray, a: Columns, b: Columns, *, alike: bool
+) -> Share | None:
     mine, change = collisions(rng, share)
     return find_share(mine, change, a, b, alike=alike, tolerance=1e-12)
 
