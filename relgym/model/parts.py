@@ -54,7 +54,9 @@ class Parts:
         self.open = targets is None
         self.targets: tuple[Target, ...] = ()
         given = tuple(dict.fromkeys(pair for t in targets or () for pair in t.given))
-        self.perception = Perception(schema, given, config.geometry)
+        self.perception = Perception(
+            schema, given, config.geometry, parting=config.classification.contact_facts
+        )
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}
         self.laws: Laws | None = None
