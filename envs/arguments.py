@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -22,6 +23,7 @@ __all__ = [
     "checked_count",
     "checked_least",
     "checked_mask",
+    "checked_range",
     "counted",
     "numbered",
     "per_object",
@@ -45,6 +47,14 @@ def checked_least(what: str, value: Any, least: float) -> float:
     if not _is_number(value) or not least <= value < np.inf:
         raise ConfigError(f"{what}={value!r}: expected a finite number of at least {least:g}")
     return float(value)
+
+
+def checked_range(what: str, span: tuple[float, float]) -> tuple[float, float]:
+    """`span` as two floats; `ConfigError` unless they are finite with 0 <= low <= high."""
+    low, high = (float(x) for x in span) if len(tuple(span)) == 2 else (math.nan, math.nan)
+    if not 0.0 <= low <= high < math.inf:
+        raise ConfigError(f"{what}={span!r}: expected two finite numbers with 0 <= low <= high")
+    return low, high
 
 
 def numbered(kind: str, count: int) -> tuple[str, ...]:

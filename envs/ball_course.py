@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,27 +110,28 @@ def _attempt(standing: Mapping[str, str], inclines: Mapping[str, float], draws: 
     drop = draws.number("drop", _DROP)
     if room is None or start == goal:
         return None
-    spots = [_spot(_place(room, name), share, r) for name, share in zip((start, goal), shares, strict=True)]
-    if any(spot is None for spot in spots):
+    places = _places(room)
+    begin, end = (_spot(places[name], x, r) for name, x in zip((start, goal), shares, strict=True))
+    if begin is None or end is None or abs(begin[0] - end[0]) < _APART:
         return None
-    (x, top), (goal_x, goal_top) = (spot for spot in spots if spot is not None)
-    if abs(x - goal_x) < _APART or top + drop + 2 * r > room.height - CLEARANCE:
+    if begin[1] + drop + 2 * r > room.height - CLEARANCE:
         return None
     # The goal is shifted with the room: as a body without extent it is drawn in with the rest.
-    placed = {"ball": Placed(x, top + drop + r, 2 * r, 2 * r), "goal": Placed(goal_x, goal_top + r, 0.0, 0.0)}
+    placed = {
+        "ball": Placed(begin[0], begin[1] + drop + r, 2 * r, 2 * r),
+        "goal": Placed(end[0], end[1] + r, 0.0, 0.0),
+    }
     objects = furnished(room, placed, draws)
     target = objects.pop("goal")
     return Course(objects, (target.x, target.y), draws.taken)
 
 
-def _place(room: EmptyRoom, name: str) -> _Place:
-    stands: Sequence[Any] = room.stands
-    for stand in stands:
-        if stand.name == name:
-            return _Place(stand.left, stand.right, stand.height)
-    k = int(name.removeprefix("gap")) - 1
-    left = stands[k - 1].right if k else 0.0
-    return _Place(left, stands[k].left if k < len(stands) else room.width, 0.0)
+def _places(room: EmptyRoom) -> dict[str, _Place]:
+    """Gaps of the floor from left to right, and the tops of what stands there, by name."""
+    edges = [0.0, *(edge for stand in room.stands for edge in (stand.left, stand.right)), room.width]
+    gaps = zip(edges[::2], edges[1::2], strict=True)
+    tops = {stand.name: _Place(stand.left, stand.right, stand.height) for stand in room.stands}
+    return {f"gap{k + 1}": _Place(left, right, 0.0) for k, (left, right) in enumerate(gaps)} | tops
 
 
 def _spot(place: _Place, share: float, r: float) -> tuple[float, float] | None:

@@ -8,17 +8,17 @@ from typing import Any, Literal
 
 import gymnasium as gym
 from gymnasium.error import ResetNeeded
-from numpy.typing import NDArray
 
-from relgym.envs.actions import acting, without_action
+from relgym.envs.actions import without_action
 from relgym.envs.arguments import check_options, checked_action, checked_count, checked_least
 from relgym.envs.learned_model_ends import Cause, explained, horizon_reached, parts_of
 from relgym.envs.learned_model_judges import Judge, Judges, Start, TaskFunctions
 from relgym.envs.learned_model_setting import Setting, check_knowledge
+from relgym.envs.views import View
 from relgym.errors import ConfigError
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Float1D, Scene
+from relgym.scene.objects import TASK, Scene
 
 __all__ = ["Judge", "LearnedModelEnv"]
 
@@ -78,6 +78,9 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         if it has one. Numbers and names of objects may differ from those that the model was trained on. Wrappers
         around it are looked through. Or a `Scene`: its objects get the bounds of their types, and dreams begin with
         it. Not needed where a `ModelLearner` taught the model.
+    view
+        The view that the model was learned through (`relgym.envs.views`). Needed only for a `FunctionView`, which no
+        file can hold.
     reward, terminated
         Functions of (scene, action, next scene), or ``"learned"``: as the model predicts ``task.reward`` and
         ``task.terminated``. None: see above.
@@ -116,6 +119,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         model: WorldModel | str | os.PathLike[str],
         like: gym.Env[Any, Any] | Scene | None = None,
         *,
+        view: View | None = None,
         reward: Judge | Literal["learned"] | None = None,
         terminated: Judge | Literal["learned"] | None = None,
         task: TaskFunctions | None = None,
@@ -129,11 +133,12 @@ class LearnedModelEnv(gym.Env[Any, Any]):
             raise ConfigError(
                 f"render_mode={render_mode!r}: expected None or one of {self.metadata['render_modes']}"
             )
-        self._setting = place = Setting.of(model, like, snapshot=snapshot)
+        self._setting = place = Setting.of(model, like, view, snapshot=snapshot)
         self.model, self.schema, self.render_mode = place.model, place.schema, render_mode
         self.observation_space, self.action_space = place.observation_space, place.action_space
         self.metadata = {**self.metadata, "render_fps": place.render_fps}
         self.task = place.task if task is None else task
+        self.flat_spec = place.flat_spec
         self._judges = Judges.of(reward, terminated, self.task, place.model, place.layout)
         self._start = start
         self._horizon = None if horizon is None else checked_count("horizon", horizon, 1, 10**9)
@@ -159,8 +164,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         """
         super().reset(seed=seed)
         check_knowledge(self.model)
-        vector = self._first(seed, options or {})
-        self._scene = Scene(self.schema, self._setting.layout, vector)
+        self._scene = self._first(seed, options or {})
         self._steps = 0
         if self.render_mode == "human":
             self.render()
@@ -178,7 +182,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         """
         before = self.scene
         taken = checked_action(self.action_space, action)
-        prediction = self.model.predict_one(acting(before, taken))
+        prediction = self.model.predict_one(self._setting.shown.acting(before, taken))
         after = without_action(prediction.scene)
         info: dict[str, Any] = {"prediction": prediction}
         if (end := self._end(prediction, after)) is not None:
@@ -187,7 +191,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         reward, ended = self._judges(before, taken, after)
         if self.task is not None and hasattr(self.task, "succeeded"):
             info["is_success"] = bool(self.task.succeeded(before, taken, after))
-        self._scene, self._steps = after, self._steps + 1
+        self._scene, self._steps = self._onward(after), self._steps + 1
         late = self._horizon is not None and self._steps >= self._horizon
         if late:
             info |= _told(Cause.HORIZON, horizon_reached(self._horizon))
@@ -203,7 +207,8 @@ class LearnedModelEnv(gym.Env[Any, Any]):
             raise ConfigError("nothing to render to: make the env with render_mode='rgb_array' or 'human'")
         if self._viewer is None:
             self._viewer = SceneViewer(self.render_mode, fps=self.metadata["render_fps"])
-        return self._viewer.show(self.scene)
+        regions = getattr(self.task, "regions", None)
+        return self._viewer.show(self.scene, marks=() if regions is None else regions(self.scene))
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -219,8 +224,8 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         return self._scene
 
     # ------------------------------------------------------------------ helpers
-    def _first(self, seed: int | None, options: Mapping[str, Any]) -> Float1D:
-        """State vector of the first scene."""
+    def _first(self, seed: int | None, options: Mapping[str, Any]) -> Scene:
+        """The first scene."""
         place = self._setting
         if "scene" in options or self._start is not None or place.world is None:
             check_options(options, ("scene",))
@@ -232,18 +237,25 @@ class LearnedModelEnv(gym.Env[Any, Any]):
             # A seed passes through, so that equal seeds begin equally; without one the dream's own draws decide.
             chosen = int(self.np_random.integers(2**31)) if seed is None else seed
             return place.real_start(chosen, options)
-        drawn: Float1D = place.pool[int(self.np_random.integers(len(place.pool)))].copy()
-        return drawn
+        return place.pool[int(self.np_random.integers(len(place.pool)))]
 
     def _end(self, prediction: ScenePrediction, after: Scene) -> tuple[Cause, str] | None:
         """Why a prediction can't be followed; None if it can."""
         if (told := explained(parts_of(prediction), self._min_margin)) is not None:
             return told
-        left = self._setting.outside(after.vector)
+        left = self._setting.shown.outside(after)
         return (Cause.LEFT, left) if left else None
 
-    def _observation(self) -> dict[str, NDArray[Any]]:
-        return self._setting.observations(self.scene.vector)
+    def _onward(self, after: Scene) -> Scene:
+        """The scene from which the dream goes on: what the next step will bring isn't known."""
+        if TASK not in after:
+            return after
+        layout, vector = after.layout, after.vector.copy()
+        vector[layout.slice(layout.index(TASK))] = 0.0
+        return Scene(after.schema, layout, vector)
+
+    def _observation(self) -> Any:
+        return self._setting.shown.observation(self.scene)
 
 
 def _told(cause: Cause, reason: str) -> dict[str, Any]:

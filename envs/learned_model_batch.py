@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.envs.actions import BatchActions
 from relgym.envs.learned_model_ends import CAUSES, Cause, causes, explained, horizon_reached, parts_of_row
 from relgym.envs.learned_model_judges import BatchJudges, TaskFunctions
 from relgym.envs.learned_model_setting import Setting
+from relgym.envs.learned_model_shown import Deeds
 from relgym.model.prediction import BatchPrediction
-from relgym.scene.objects import Float1D, Float2D
+from relgym.scene.objects import Float1D, Float2D, Scene
 
 __all__ = ["DreamStep", "Stepped"]
 
@@ -69,7 +69,7 @@ class DreamStep:
     setting: Setting
     judges: BatchJudges
     task: TaskFunctions | None
-    actions: BatchActions
+    actions: Deeds
     horizon: int | None
     min_margin: float
 
@@ -93,12 +93,13 @@ class DreamStep:
         acting = self.actions.joined(before, actions)
         prediction = self.setting.model.predict_batch(self.actions.layout, acting)
         after = self.actions.parted(prediction.vectors)
-        why = causes(prediction, self.setting.inside(after), self.min_margin)
+        why = causes(prediction, self.setting.shown.inside(after), self.min_margin)
         rewards, ended, success = self._judged(before, actions, after, why < 0)
         if self.horizon is not None:
             why[(why < 0) & (steps >= self.horizon)] = _HORIZON
         lost = (why >= 0) & (why != _HORIZON)
-        followed = np.where(lost[:, None], before, after) if lost.any() else after
+        followed = np.where(lost[:, None], before, after)
+        followed[:, self.setting.brought] = 0.0  # what the next step will bring isn't known
         return Stepped(followed, rewards, ended, why >= 0, why, success, after, prediction)
 
     def _judged(
@@ -126,4 +127,8 @@ class DreamStep:
         if stepped.causes[row] == _HORIZON:
             return horizon_reached(self.horizon)
         told = explained(parts_of_row(stepped.prediction, row), self.min_margin)
-        return self.setting.outside(stepped.foreseen[row]) if told is None else told[1]
+        if told is not None:
+            return told[1]
+        return self.setting.shown.outside(
+            Scene(self.setting.schema, self.setting.layout, stepped.foreseen[row].copy())
+        )

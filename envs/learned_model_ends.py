@@ -20,6 +20,7 @@ class Cause(enum.Enum):
     """
 
     NO_MODE = Outcome.NO_MODE.value
+    UNEXPLAINED = Outcome.UNEXPLAINED.value
     NO_ROLES = Outcome.NO_ROLES.value
     OUTSIDE = Outcome.OUTSIDE.value
     DEPENDS = Outcome.DEPENDS.value

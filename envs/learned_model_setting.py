@@ -15,13 +15,16 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from relgym.envs.actions import check_action_space
+from relgym.envs.flat import FlatSpec
 from relgym.envs.learned_model_judges import TaskFunctions
-from relgym.envs.model_files import EnvRecord, schema_like, world_like
+from relgym.envs.learned_model_shown import BoxesShown, Shown, ViewShown, checked_boxes, is_plain
+from relgym.envs.model_files import EnvRecord, copied, schema_like, world_like
+from relgym.envs.views import View, view_from_json
 from relgym.errors import ConfigError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
 
-__all__ = ["Setting", "check_knowledge"]
+__all__ = ["Setting", "check_knowledge", "recorded"]
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,10 @@ class Setting:
         The model's types with the dream's objects.
     observation_space, action_space
         Spaces of one dream.
-    layout
-        Layout of its scenes: the observed objects, and the `task` object if there is one; no action.
+    shown
+        How scenes become observations, and actions parts of scenes.
+    view
+        The view that the model was learned through, where scenes aren't shown as they are.
     world
         A copy of the real env, if one was given: it is reset for first scenes.
     starts
@@ -48,9 +53,10 @@ class Setting:
 
     model: WorldModel
     schema: SceneSchema
-    observation_space: spaces.Dict
+    observation_space: spaces.Space[Any]
     action_space: spaces.Space[Any]
-    layout: SceneLayout
+    shown: Shown
+    view: View | None
     world: gym.Env[Any, Any] | None
     starts: tuple[Scene, ...]
     render_fps: float
@@ -60,17 +66,18 @@ class Setting:
         cls,
         model: WorldModel | str | os.PathLike[str],
         like: gym.Env[Any, Any] | Scene | None,
+        view: View | None,
         *,
         snapshot: bool,
     ) -> Setting:
-        """Put together what a model or its file and a real env or a scene say.
+        """Put together what a model or its file, a real env or a scene, and a view say.
 
         Raises
         ------
         ConfigError
             No spaces, or spaces and objects that don't fit the model.
         ModelFileError
-            The file is damaged.
+            The file is damaged, or the model was learned through a function that no file can hold.
         QueryError
             A model that won't learn any more knows none of its targets.
         """
@@ -80,6 +87,11 @@ class Setting:
             model = copy.deepcopy(model)
         if model.frozen or snapshot:
             check_knowledge(model)
+        scenic = isinstance(like, gym.Env) and hasattr(like.unwrapped, "schema")
+        if view is None and not scenic and "view" in model.extra:
+            view = view_from_json(model.extra["view"])
+        if view is not None and not is_plain(view):
+            return cls._viewed(model, like, view)
         world: gym.Env[Any, Any] | None = None
         if isinstance(like, Scene):
             schema = schema_like(_present(like), model.schema, "like=scene")
@@ -87,105 +99,131 @@ class Setting:
         elif like is not None:
             world = world_like(like, model.schema)
             schema = schema_like(getattr(world, "schema", None), model.schema, f"like={like}")
-            metadata = {"render_fps": world.metadata.get("render_fps", 50)}
-            record = EnvRecord(world.observation_space, world.action_space, metadata=metadata)
+            record = EnvRecord(world.observation_space, world.action_space, metadata=_metadata(world))
         else:
-            schema, record = model.schema, _recorded(model)
+            schema, record = model.schema, recorded(model)
         check_action_space(schema, record.action_space)
-        seen = _boxes(record.observation_space, schema)
-        layout = schema.layout([*seen.spaces, *(name for name in (TASK,) if name in schema.order)])
-        fps = record.metadata.get("render_fps", 50)
-        return cls(model, schema, seen, record.action_space, layout, world, record.starts, fps)
+        shown = BoxesShown(schema, record.observation_space, record.action_space)
+        return cls._made(model, schema, record, shown, None, world)
+
+    @classmethod
+    def _viewed(cls, model: WorldModel, like: gym.Env[Any, Any] | Scene | None, view: View) -> Setting:
+        """The setting of a model that was learned through a view."""
+        schema_like(view.schema, model.schema, "the view's scenes")
+        if isinstance(like, Scene):
+            raise ConfigError(
+                "like=scene: the model was learned through a view, so bounds are known of observations only"
+            )
+        world: gym.Env[Any, Any] | None = None
+        if like is None:
+            record = recorded(model)
+        else:
+            world = copied(like)
+            record = EnvRecord(world.observation_space, world.action_space, metadata=_metadata(world))
+            known = recorded(model) if model.extra else record
+            for what in ("observation_space", "action_space"):
+                if getattr(record, what) != getattr(known, what):
+                    raise ConfigError(
+                        f"like={like}: expected the {what} of the env that the model was learned in, "
+                        f"{getattr(known, what)}, got {getattr(record, what)}; make it with the same arguments"
+                    )
+        shown = ViewShown(view, record.observation_space, record.action_space)
+        return cls._made(model, view.schema, record, shown, view, world)
+
+    @classmethod
+    def _made(
+        cls,
+        model: WorldModel,
+        schema: SceneSchema,
+        record: EnvRecord,
+        shown: Shown,
+        view: View | None,
+        world: gym.Env[Any, Any] | None,
+    ) -> Setting:
+        fps, spaces_of = (
+            record.metadata.get("render_fps", 50),
+            (record.observation_space, record.action_space),
+        )
+        return cls(model, schema, *spaces_of, shown, view, world, record.starts, fps)
+
+    @property
+    def layout(self) -> SceneLayout:
+        """Layout of the scenes of a batch: what is shown, and the `task` object if there is one; no action."""
+        return self.shown.layout
+
+    @property
+    def flat_spec(self) -> FlatSpec:
+        """What flat views show unless told otherwise: what those of the real env do."""
+        spec: FlatSpec = (
+            FlatSpec() if self.world is None else getattr(self.world.unwrapped, "flat_spec", FlatSpec())
+        )
+        return spec
 
     @property
     def task(self) -> TaskFunctions | None:
         """What the real env asks of its agents, if it says so."""
         return None if self.world is None else getattr(self.world, "task", None)
 
-    # ------------------------------------------------------------------ observations and bounds
     @cached_property
-    def cuts(self) -> tuple[tuple[str, slice, np.dtype[Any]], ...]:
-        """Name, place in a state vector and dtype of every observed object, in schema order."""
-        # As the real env's observations; the Dict space sorts its keys.
-        seen = self.observation_space.spaces
-        return tuple(
-            (name, self.layout.slice(i), np.dtype(seen[name].dtype))
-            for i, name in enumerate(self.layout.names)
-            if name in seen
-        )
-
-    @cached_property
-    def bounds(self) -> tuple[Float1D, Float1D]:
-        """Smallest and largest values in a state vector; infinite for what isn't observed."""
-        low, high = np.full(self.layout.width, -np.inf), np.full(self.layout.width, np.inf)
-        for name, cut, _ in self.cuts:
-            box = self.observation_space.spaces[name]
-            assert isinstance(box, spaces.Box), "checked when made"
-            low[cut], high[cut] = box.low, box.high
-        return low, high
-
-    def inside(self, vectors: Float2D) -> NDArray[np.bool_]:
-        """Which of n scenes lie in the observation space, shape ``(n,)``."""
-        low, high = self.bounds
-        return np.asarray(((low <= vectors) & (vectors <= high)).all(axis=1))
-
-    def outside(self, vector: Float1D) -> str:
-        """Which properties of a scene left the observation space, as a sentence; empty if none did."""
-        low, high = self.bounds
-        left = np.flatnonzero(~((low <= vector) & (vector <= high)))
-        if not len(left):
-            return ""
-        names = [
-            f"{o}.{p}"
-            for o, t in zip(self.layout.names, self.layout.types, strict=True)
-            for p in t.properties
-        ]
-        return "; ".join(
-            f"{names[k]} = {vector[k]:g} left the observation space [{low[k]:g}, {high[k]:g}]" for k in left
-        )
-
-    def observations(self, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-        """Observations of one state vector, or of n: arrays of their own, by object."""
-        return {name: vectors[..., cut].astype(dtype) for name, cut, dtype in self.cuts}
+    def brought(self) -> NDArray[np.intp]:
+        """Columns of the `task` object: before a step they are 0, for what it will bring isn't known."""
+        if TASK not in self.layout.names:
+            return np.zeros(0, dtype=np.intp)
+        return np.arange(self.layout.width)[self.layout.slice(self.layout.index(TASK))]
 
     # ------------------------------------------------------------------ first scenes
-    def fitted(self, scene: Scene) -> Float1D:
-        """State vector of a first scene, without its action; what isn't observed (the task) begins at 0.
+    def fitted(self, scene: Scene) -> Scene:
+        """A first scene as one of this setting's, without its action.
 
         Raises
         ------
         ObservationError
-            Not a scene, other objects, or properties outside the observation space.
+            Not a scene, other objects, or outside the observation space.
         """
         if not isinstance(scene, Scene):
             raise ObservationError(
                 f"expected a start scene, got {type(scene).__name__}; take env.scene, or schema.scene(observation)"
             )
         values: dict[str, Any] = {name: v for name, v in scene.values().items() if name != ACTION}
-        for name, t in zip(self.layout.names, self.layout.types, strict=True):
-            if name not in self.observation_space.spaces:
-                values.setdefault(name, np.zeros(len(t.properties)))
-        if set(values) != set(self.layout.names):
+        types = dict(zip(self.layout.names, self.layout.types, strict=True))
+        if TASK in types:
+            values[TASK] = np.zeros(len(types[TASK].properties))
+        needed = {name for name, t in types.items() if not (self.view is not None and t.optional)}
+        if not needed <= set(values) <= set(types):
             raise ObservationError(
-                f"a dream can't begin here: expected the objects {sorted(self.observation_space.spaces)}, got "
+                f"a dream can't begin here: expected the objects {sorted({*types} - {TASK})}, got "
                 f"{[name for name in scene.layout.names if name != ACTION]}; for scenes with other objects pass "
                 "like=scene, or an env that has them, when you make the dream"
             )
         # Through this schema: scenes of an equal one, or of another with the same objects, do too.
         fitted = self.schema.scene(values)
-        if left := self.outside(fitted.vector):
+        if left := self.shown.outside(fitted):
             raise ObservationError(f"a dream can't begin here: {left}")
-        return fitted.vector
+        return fitted
 
-    def real_start(self, seed: int, options: Mapping[str, Any]) -> Float1D:
-        """State vector after a reset of the real env's copy."""
+    def fitted_vector(self, scene: Scene) -> Float1D:
+        """State vector of a first scene in a batch, all of whose scenes have the same objects."""
+        return self.vector_of(self.fitted(scene))
+
+    def vector_of(self, scene: Scene) -> Float1D:
+        """State vector of a fitted scene in a batch; `ObservationError` where some of its objects are missing."""
+        if scene.layout != self.layout:
+            raise ObservationError(
+                f"many dreams at once have the same objects: expected {list(self.layout.names)}, got "
+                f"{list(scene.layout.names)}; where objects come and go use LearnedModelEnv"
+            )
+        return scene.vector
+
+    def real_start(self, seed: int, options: Mapping[str, Any]) -> Scene:
+        """First scene after a reset of the real env's copy."""
         assert self.world is not None, "asked only where there is a real env"
-        observation, _ = self.world.reset(seed=seed, options=dict(options))
-        return self.fitted(self.schema.scene(observation))
+        observation, info = self.world.reset(seed=seed, options=dict(options))
+        seen = self.schema.scene(observation) if self.view is None else self.view.scene(observation, info)
+        return self.fitted(seen)
 
     @cached_property
-    def pool(self) -> Float2D:
-        """State vectors of `starts`, shape ``(m, layout.width)``.
+    def pool(self) -> tuple[Scene, ...]:
+        """First scenes to draw from.
 
         Raises
         ------
@@ -197,7 +235,12 @@ class Setting:
                 "nothing says where a dream begins: pass options={'scene': scene} to reset, or start=function or "
                 "like=env to the env"
             )
-        return np.array([self.fitted(scene) for scene in self.starts])
+        return tuple(self.fitted(scene) for scene in self.starts)
+
+    @cached_property
+    def pool_vectors(self) -> Float2D:
+        """State vectors of `pool`, shape ``(m, layout.width)``."""
+        return np.array([self.vector_of(scene) for scene in self.pool])
 
 
 def check_knowledge(model: WorldModel) -> None:
@@ -210,7 +253,7 @@ def check_knowledge(model: WorldModel) -> None:
         )
 
 
-def _recorded(model: WorldModel) -> EnvRecord:
+def recorded(model: WorldModel) -> EnvRecord:
     """What the model's file says of its env."""
     if not model.extra:
         raise ConfigError(
@@ -227,8 +270,8 @@ def _present(scene: Scene) -> SceneSchema:
 
 def _of_scene(scene: Scene, model: WorldModel, schema: SceneSchema) -> EnvRecord:
     """Spaces for a scene's objects: each has the bounds of the recorded objects of its type."""
-    record = _recorded(model)
-    known = _boxes(record.observation_space, model.schema).spaces
+    record = recorded(model)
+    known = checked_boxes(record.observation_space, model.schema)
     bounds = {model.schema.type_of(name).name: box for name, box in known.items()}
     seen: dict[str, spaces.Space[Any]] = {}
     for name, type_name in schema.objects:
@@ -242,18 +285,5 @@ def _of_scene(scene: Scene, model: WorldModel, schema: SceneSchema) -> EnvRecord
     return EnvRecord(spaces.Dict(seen), record.action_space, (scene,), record.metadata)
 
 
-def _boxes(space: spaces.Space[Any], schema: SceneSchema) -> spaces.Dict:
-    """The space, if it is a Dict of flat Boxes, one for each of some objects; `ConfigError` otherwise."""
-    parts = space.spaces if isinstance(space, spaces.Dict) else {}
-    fits = [
-        isinstance(box, spaces.Box)
-        and name in schema.order
-        and box.shape == (len(schema.type_of(name).properties),)
-        for name, box in parts.items()
-    ]
-    if not fits or not all(fits) or not isinstance(space, spaces.Dict):
-        raise ConfigError(
-            f"expected a Dict observation space, object name -> Box with a number for each property, for the objects "
-            f"{[name for name in schema.order if name != ACTION]}, got {space}; wrap the dream as the env was"
-        )
-    return space
+def _metadata(world: gym.Env[Any, Any]) -> dict[str, Any]:
+    return {"render_fps": world.metadata.get("render_fps", 50)}

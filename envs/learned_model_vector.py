@@ -13,12 +13,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from relgym.envs.actions import BatchActions
 from relgym.envs.arguments import check_options, checked_count, checked_least, checked_mask
 from relgym.envs.learned_model_batch import DreamStep, Stepped
 from relgym.envs.learned_model_ends import CAUSES, Cause
 from relgym.envs.learned_model_judges import BatchJudge, BatchJudges, BatchStart, TaskFunctions
 from relgym.envs.learned_model_setting import Setting, check_knowledge
+from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
@@ -68,7 +68,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
 
     Arguments
     ---------
-    model, like, horizon, min_margin, snapshot, render_mode
+    model, like, view, horizon, min_margin, snapshot, render_mode
         As for `LearnedModelEnv`.
     num_envs
         How many dreams, >= 1.
@@ -101,6 +101,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         num_envs: int = 1,
         like: gym.Env[Any, Any] | Scene | None = None,
         *,
+        view: View | None = None,
         reward: BatchJudge | Literal["learned"] | None = None,
         terminated: BatchJudge | Literal["learned"] | None = None,
         task: TaskFunctions | None = None,
@@ -115,9 +116,10 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if render_mode not in (None, "rgb_array"):
             raise ConfigError(f"render_mode={render_mode!r}: expected None or 'rgb_array'")
         self._mode = _checked_mode(autoreset_mode)
-        self._setting = place = Setting.of(model, like, snapshot=snapshot)
+        self._setting = place = Setting.of(model, like, view, snapshot=snapshot)
         self.num_envs = checked_count("num_envs", num_envs, 1, 10**7)
         self.model, self.schema, self.render_mode = place.model, place.schema, render_mode
+        self.flat_spec = place.flat_spec
         self.single_observation_space, self.single_action_space = place.observation_space, place.action_space
         self.observation_space = batch_space(place.observation_space, self.num_envs)
         self.action_space = batch_space(place.action_space, self.num_envs)
@@ -131,7 +133,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             place,
             BatchJudges.of(reward, terminated, self.task, place.model, place.layout),
             self.task,
-            BatchActions(place.schema, place.layout, place.action_space),
+            place.shown.deeds(),
             _shorter(horizon, max_episode_steps),
             checked_least("min_margin", min_margin, 0.0),
         )
@@ -170,7 +172,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if self._vectors is None:
             self._vectors = np.empty((self.num_envs, self._setting.layout.width))
         self._begin(rows, first)
-        return self._setting.observations(self._vectors), {}
+        return self._setting.shown.observations(self._vectors), {}
 
     def step(self, actions: Any) -> tuple[Any, Float1D, _Bools, _Bools, dict[str, Any]]:
         """Predict one step of every dream.
@@ -204,7 +206,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._over = ended | cut
         if self._mode is AutoresetMode.SAME_STEP and self._over.any():
             infos = self._restarted(infos)
-        return self._setting.observations(self.vectors), rewards, ended, cut, infos
+        return self._setting.shown.observations(self.vectors), rewards, ended, cut, infos
 
     def render(self) -> tuple[Any, ...]:
         """Draw every dream: arrays of shape (height, width, 3)."""
@@ -235,7 +237,10 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     @property
     def scenes(self) -> tuple[Scene, ...]:
         """The current scenes, without an action."""
-        return tuple(Scene(self.schema, self._setting.layout, vector.copy()) for vector in self.vectors)
+        return tuple(self._scene(vector) for vector in self.vectors)
+
+    def _scene(self, vector: Float1D) -> Scene:
+        return Scene(self.schema, self._setting.layout, vector.copy())
 
     # ------------------------------------------------------------------ beginning
     def _first(self, rows: _Rows, seed: int | None, options: Mapping[str, Any]) -> Float2D:
@@ -246,28 +251,30 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if "scenes" in options:
             return self._checked_first(options["scenes"], count, "options['scenes']")
         if "scene" in options:
-            return np.repeat(place.fitted(options["scene"])[None], count, axis=0)
+            return np.repeat(place.fitted_vector(options["scene"])[None], count, axis=0)
         if self._start is not None:
             return self._checked_first(self._start(self.np_random, count), count, "start")
         if place.world is not None:
             seeds = self.np_random.integers(2**31, size=count) if seed is None else seed + rows
-            return np.array([place.real_start(int(s), options) for s in seeds])
-        drawn: Float2D = place.pool[self.np_random.integers(len(place.pool), size=count)]
+            return np.array([place.vector_of(place.real_start(int(s), options)) for s in seeds])
+        drawn: Float2D = place.pool_vectors[self.np_random.integers(len(place.pool), size=count)]
         return drawn
 
     def _checked_first(self, given: Any, count: int, what: str) -> Float2D:
         place = self._setting
         if not isinstance(given, np.ndarray):
-            given = np.array([place.fitted(scene) for scene in given])
+            given = np.array([place.fitted_vector(scene) for scene in given])
         if given.shape != (count, place.layout.width):
             raise ObservationError(
                 f"{what}: expected {count} first scenes, as state vectors of shape {(count, place.layout.width)} for "
                 f"the objects {list(place.layout.names)}, got shape {given.shape}"
             )
         vectors: Float2D = np.array(given, dtype=np.float64)
-        if not (inside := place.inside(vectors)).all():  # false for NaN, too
+        if not (inside := place.shown.inside(vectors)).all():  # false for NaN, too
             row = int(np.flatnonzero(~inside)[0])
-            raise ObservationError(f"{what}: dream {row} can't begin here: {place.outside(vectors[row])}")
+            raise ObservationError(
+                f"{what}: dream {row} can't begin here: {place.shown.outside(self._scene(vectors[row]))}"
+            )
         return vectors
 
     def _begin(self, rows: _Rows, first: Float2D) -> None:
@@ -306,7 +313,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     def _restarted(self, infos: dict[str, Any]) -> dict[str, Any]:
         """Begin anew what is over, in the same step; its last observations and infos move to ``final_…``."""
         over = self._over
-        last = self._setting.observations(self.vectors)
+        last = self._setting.shown.observations(self.vectors)
         final = np.full(self.num_envs, None, dtype=object)
         for k in np.flatnonzero(over).tolist():
             final[k] = {name: values[k].copy() for name, values in last.items()}

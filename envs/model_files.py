@@ -15,7 +15,7 @@ from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.errors import ConfigError, ModelFileError, ObservationError
 from relgym.scene.objects import Scene, SceneSchema
 
-__all__ = ["EnvRecord", "schema_like", "world_like"]
+__all__ = ["EnvRecord", "copied", "schema_like", "world_like"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,14 +84,19 @@ def world_like(like: gym.Env[Any, Any], schema: SceneSchema) -> gym.Env[Any, Any
     """
     inner = like.unwrapped
     schema_like(getattr(inner, "schema", None), schema, f"like={like}")
+    return copied(inner)
+
+
+def copied(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
+    """A copy that draws nothing, so that its resets disturb nobody; `ConfigError` where there can't be one."""
     try:
-        world = copy.deepcopy(inner)
+        world = copy.deepcopy(env)
     except (TypeError, NotImplementedError, copy.Error) as error:
         raise ConfigError(
-            f"like={like} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
+            f"like={env} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
             "that a ModelLearner taught holds spaces and first scenes of its own: leave out like"
         ) from error
-    world.render_mode = None  # its resets are no one's to see
+    world.unwrapped.render_mode = None  # its resets are no one's to see
     return world
 
 

@@ -2,39 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import check_options, checked_count, physical_action
+from relgym.envs.arguments import check_options, checked_count, checked_range, physical_action
 from relgym.envs.base import SceneEnv
 from relgym.envs.draws import Draws, Range
 from relgym.envs.truck_goal import (
     FLAT,
     FORCES,
-    GOAL,
-    GOAL_TARGET,
     STEPS,
     PushTask,
     draw_distance,
     draw_frictions,
     friction_options,
 )
-from relgym.envs.truck_scenes import Placed, Stacks, draw_row, layouts, loads, option_names, stacks_of
+from relgym.envs.truck_scenes import Stacks, draw_row, layouts, loads, option_names, stacks_of
+from relgym.envs.truck_schema import body_values, truck_schema
 from relgym.errors import ConfigError
-from relgym.scene.objects import (
-    ACTION,
-    POSE,
-    Float1D,
-    Kinematics,
-    ObjectType,
-    SceneSchema,
-    Target,
-)
-from relgym.scene.shapes import Box
+from relgym.scene.objects import POSE, Float1D
 
 __all__ = ["BOX_MASS", "GRAVITY", "TRUCK_MASS", "TruckPushEnv"]
 
@@ -173,12 +162,12 @@ class TruckPushEnv(SceneEnv):
         self._boxes = tuple(f"box{k + 1}" for k in range(checked_count("n_boxes", n_boxes, 1, 12)))
         count = checked_count("bystanders", bystanders, 0, 100)
         self._bystanders = tuple(f"bystander{k + 1}" for k in range(count))
-        self._frictions = Range(*_checked_range("friction_range", friction_range), 0.0, 1e3)
+        self._frictions = Range(*checked_range("friction_range", friction_range), 0.0, 1e3)
         self._redraw = redraw
         names = (*self._boxes, *self._bystanders)
         forces = force_range or (FORCES if task else _WATCHED_FORCES)
-        forces = _checked_range("force_range", forces)
-        schema = _schema(names, forces, exogenous=redraw == "step", goal=task is not None)
+        forces = checked_range("force_range", forces)
+        schema = truck_schema(names, forces, exogenous=redraw == "step", goal=task is not None)
         super().__init__(
             schema,
             spaces.Box(-1.0, 1.0, (1,), np.float32),
@@ -209,7 +198,7 @@ class TruckPushEnv(SceneEnv):
         draws = Draws(options, rng)
         placed, stacks, speed = draw_row(self._boxes, self._bystanders, draws)
         own = self._draw_frictions(draws) | {"truck": speed}
-        parts = [_properties(placed[name], own[name]) for name in self._layout.names if name in placed]
+        parts = [body_values(placed[name], own[name]) for name in self._layout.names if name in placed]
         if self.task is not None:
             parts.append(np.array([draw_distance(draws)]))
         self._stacks, self._configuration = stacks, draws.taken
@@ -277,38 +266,3 @@ class TruckPushEnv(SceneEnv):
 
     def _restore(self, vector: Float1D, hidden: Any) -> None:
         self._stacks = stacks_of(self._scene_of(vector)) if hidden is None else hidden
-
-
-def _schema(
-    boxes: tuple[str, ...], force_range: tuple[float, float], *, exogenous: bool, goal: bool
-) -> SceneSchema:
-    truck = ObjectType("truck", (*POSE, "vx"), Box(), velocity=("vx", None, None))
-    box = ObjectType("box", (*POSE, "friction"), Box(), exogenous=("friction",) if exogenous else ())
-    targets = (Target("truck", "vx"), Target("box", "px", given=(("truck", "vx"),)))
-    marks = (GOAL,) if goal else ()
-    return SceneSchema(
-        types=(truck, box, *marks, ObjectType(ACTION, ("force",))),
-        objects=(
-            ("truck", "truck"),
-            *((name, "box") for name in boxes),
-            *((t.name, t.name) for t in marks),
-            (ACTION, ACTION),
-        ),
-        up="y",
-        planar=False,
-        kinematics=(Kinematics("truck", "px", "vx"),),
-        targets=(*targets, GOAL_TARGET) if goal else targets,
-        action_scale=(("force", *force_range),),
-    )
-
-
-def _properties(placed: Placed, own: float) -> Float1D:
-    p = placed
-    return np.array([p.x, p.y, p.z, 0.0, 0.0, 0.0, p.width, p.height, p.depth, own])
-
-
-def _checked_range(what: str, span: tuple[float, float]) -> tuple[float, float]:
-    low, high = (float(x) for x in span) if len(tuple(span)) == 2 else (math.nan, math.nan)
-    if not 0.0 <= low <= high < math.inf:
-        raise ConfigError(f"{what}={span!r}: expected two finite numbers with 0 <= low <= high")
-    return low, high

@@ -187,6 +187,9 @@ class ClusteringConfig:
         determine isn't learned. Default 3.
     refit_growth
         A mode is refitted when its examples have grown by this factor. Default 2.
+    approximate
+        Whether, where no exact law explains most examples, the best sparse function is taken that leaves at most a
+        tenth of the change, with its residuals as noise. Default true; the thesis had no such thing.
     stickiness
         Whether, of the modes that explain an example equally well, those with fewest parameters win
         ("simple", default) or, as in the original program, whichever is nearest ("nearest").
@@ -202,6 +205,7 @@ class ClusteringConfig:
     unify_ratio: float = 0.9
     support: int = 3
     refit_growth: float = 2.0
+    approximate: bool = True
     stickiness: Literal["simple", "nearest"] = "simple"
 
     def __post_init__(self) -> None:
@@ -243,6 +247,17 @@ class ModelConfig:
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
         do. ``"world"``: modes along the world's axes for everything, as in the thesis.
+    features
+        Non-linear features offered beside the properties (§5.1): ``"trig"`` (sines and cosines at frequencies 1 to 3
+        of the type's angles, or else of all the target's own properties; ``"trig(th)"``: of that one), ``"squares"``,
+        ``"products"``, ``"degree3"``, ``"degree4"`` (of properties, and of sines and cosines if there are any), and
+        names of functions registered with `relgym.clustering.features.register_function`. ``"cart:trig"`` offers them
+        to one type only. Default none; where linear laws don't explain a property, the report says what would.
+        A linear law wins where it is enough; every kind offered makes searches slower.
+    history
+        Examples kept per object type; memory stays flat beyond. Default 200,000, range >= 100. Of more, a uniform
+        choice stays, and everything rare: small modes, recent noise, and what classifiers remember. Raising it costs
+        memory (some 100 bytes an example and upwards), lowering it makes late discoveries rest on fewer examples.
     """
 
     clustering: ClusteringConfig = field(default_factory=ClusteringConfig)
@@ -252,10 +267,13 @@ class ModelConfig:
     abstain: bool = True
     work_per_step: int = 400_000
     frames: Literal["auto", "world"] = "auto"
+    features: tuple[str, ...] = ()
+    history: int = 200_000
 
     def __post_init__(self) -> None:
         _one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
         _at_least(self, 0, "seed", "work_per_step")
+        _at_least(self, 100, "history")
 
     @classmethod
     def thesis(cls, **changes: Any) -> ModelConfig:
@@ -270,7 +288,9 @@ class ModelConfig:
         Differences that serve bounded memory and time: FOIL sees at most `exemplars_per_state` examples of a mode in a
         relational state, weighted; σ is estimated unless it is given.
         """
-        clustering = ClusteringConfig(min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9)
+        clustering = ClusteringConfig(
+            min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9, approximate=False
+        )
         return cls._world(clustering, ClassificationConfig.thesis(), **changes)
 
     @classmethod
@@ -288,6 +308,7 @@ class ModelConfig:
             draws=1000,
             inlier_stds=3.0,
             unify_ratio=0.9,
+            approximate=False,
             stickiness="nearest",
         )
         return cls._world(clustering, ClassificationConfig.original(), **changes)
@@ -311,6 +332,7 @@ class ModelConfig:
                 **data,
                 "clustering": ClusteringConfig(**data["clustering"]),
                 "classification": ClassificationConfig(**data["classification"]),
+                "features": tuple(data.get("features", ())),
             }
         )
 

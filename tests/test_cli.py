@@ -53,6 +53,17 @@ def test_demo_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(map(len, text.split("\n"))) <= max(100, len(str(folder)) + 40)
 
 
+@pytest.mark.sb3
+def test_dyna_shows_both_agents_and_the_laws(tmp_path: Path) -> None:
+    text = run("dyna", "--steps", 260, "--out", tmp_path)
+    assert "successes of 100 fixed episodes" in text
+    assert "Dyna, relgym, reward given" in text and "SAC" in text
+    assert "What the agent learned of its world, and dreamed in:" in text
+    assert "truck.vx" in text
+    for name in ("curves.png", "episodes.png"):
+        assert (tmp_path / name).stat().st_size > 5_000
+
+
 def test_rules_print_a_model(folder: Path) -> None:
     model = WorldModel.load(folder / "ball.json")
     assert run("rules", folder / "ball.json").rstrip("\n") == model.describe()

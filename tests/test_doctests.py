@@ -14,6 +14,9 @@ WITH_EXAMPLES = [m.name for m in modules() if ">>>" in m.path.read_text(encoding
 @pytest.mark.parametrize("name", WITH_EXAMPLES)
 def test_docstring_examples(name: str) -> None:
     # Not --doctest-modules: it would import envs/ and wrappers/ under their names in the checkout.
+    if name.startswith("relgym.wrappers.sb3"):
+        pytest.importorskip("stable_baselines3")
+    found = doctest.DocTestFinder().find(importlib.import_module(name))
+    assert any(test.examples for test in found)
     result = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)
-    assert result.attempted > 0
     assert result.failed == 0, "the difference stands in the captured output"

@@ -13,7 +13,17 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError, ObservationError
 
-__all__ = ["NOISE", "Bools", "Example", "ExampleBatch", "Floats", "Vocabulary", "difference", "mode_value"]
+__all__ = [
+    "NOISE",
+    "Bools",
+    "Example",
+    "ExampleBatch",
+    "Floats",
+    "Vocabulary",
+    "consequence",
+    "difference",
+    "mode_value",
+]
 
 Bools: TypeAlias = NDArray[np.bool_]
 Floats: TypeAlias = NDArray[np.float64]
@@ -38,6 +48,9 @@ class Vocabulary:
         Real-valued features of the target alone or of objects without a body (A).
     contact
         Those names that are contact facts, which the thesis didn't have.
+    follows
+        Own features that move along with the target: (name, k) says that ``name' = name + k * target'``. For each
+        mode, ``name + k * F`` is offered as a number too: where the object would get to if that mode held.
 
     Raises
     ------
@@ -50,6 +63,7 @@ class Vocabulary:
     pair: tuple[str, ...] = ()
     own: tuple[str, ...] = ()
     contact: frozenset[str] = frozenset()
+    follows: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         names = Counter((*self.relations, *self.unary, *self.pair, *self.own))
@@ -64,13 +78,15 @@ class Vocabulary:
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON-able dictionary."""
         names = ("relations", "unary", "pair", "own")
-        return {name: list(getattr(self, name)) for name in names} | {"contact": sorted(self.contact)}
+        plain = {name: list(getattr(self, name)) for name in names}
+        return plain | {"contact": sorted(self.contact), "follows": [list(pair) for pair in self.follows]}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Vocabulary:
         """Inverse of `to_dict`."""
-        names = {name: tuple(value) for name, value in data.items() if name != "contact"}
-        return cls(contact=frozenset(data["contact"]), **names)
+        names = {name: tuple(value) for name, value in data.items() if name not in ("contact", "follows")}
+        follows = tuple((str(name), float(k)) for name, k in data.get("follows", ()))
+        return cls(contact=frozenset(data["contact"]), follows=follows, **names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +186,12 @@ def check_example(vocabulary: Vocabulary, example: Example) -> None:
 def mode_value(mode: int) -> str:
     """Name under which a mode's prediction enters clauses and trees."""
     return f"F{mode}"
+
+
+def consequence(name: str, k: float, mode: int) -> str:
+    """Name of the number that says where a property would get to if a mode held."""
+    size = f"{abs(k):.6g}"
+    return f"{name} {'-' if k < 0 else '+'} {'' if size == '1' else f'{size} '}{mode_value(mode)}"
 
 
 def difference(i: int, j: int) -> str:

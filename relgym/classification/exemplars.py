@@ -198,6 +198,12 @@ class Exemplars:
         self._trim()
         self.version += 1
 
+    def widen(self, vocabulary: Vocabulary, own: Floats) -> None:
+        """Other own features: their names, and their values for every slot, shape ``(n, len(vocabulary.own))``."""
+        self.vocabulary = vocabulary
+        self.columns["own"] = own
+        self.version += 1
+
     def weights(self) -> Floats:
         """How many seen examples each slot stands for: 1 if hard, an equal share of the rest otherwise.
 

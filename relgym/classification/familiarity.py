@@ -58,7 +58,8 @@ class Familiarity:
     def is_seen_batch(self, view: View) -> Bools:
         """The same for many examples, shape ``(n,)``."""
         seen = np.fromiter(self.seen, dtype=np.uint64, count=len(self.seen))
-        return np.isin(situations(view, self.used), seen)
+        first, which = _alike(view, self.used)
+        return np.isin(situations(view.take(first), self.used), seen)[which]
 
     def add(self, example: Example, key: Key) -> None:
         """Remember an example's situation."""
@@ -94,6 +95,18 @@ def situations(view: View, used: Used) -> _Hashes:
         exists = view.close if context == "touching" else view.exists
         result = _mix(result + _situation(view, exists, list(relations), list(unary)))
     return result
+
+
+def _alike(view: View, used: Used) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Group examples that show the same in what clauses use: one of each group, and every example's group."""
+    columns = sorted({column for _, relations, _ in used for column in relations})
+    unary = sorted({column for _, _, columns in used for column in columns})
+    shown = (view.close, view.exists, view.table[:, columns], view.unary[:, unary])
+    bits = np.packbits(np.concatenate([part.reshape(len(view), -1) for part in shown], axis=1), axis=1)
+    whole = np.concatenate([bits, view.target[:, None].view(np.uint8)], axis=1)
+    # As strings, of equal length, rows are sorted fast.
+    _, first, which = np.unique(whole.view(f"S{whole.shape[1]}"), return_index=True, return_inverse=True)
+    return first, which.reshape(-1)
 
 
 def _situation(view: View, exists: Bools, relations: list[int], unary: list[int]) -> _Hashes:

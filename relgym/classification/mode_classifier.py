@@ -188,6 +188,23 @@ class ModeClassifier:
         self._update_pairs(unchanged)
         self._reset_caches()
 
+    def widen(self, vocabulary: Vocabulary, own: Floats) -> None:
+        """Other own features from here on; everything is learned again of the examples that are remembered.
+
+        Parameters
+        ----------
+        vocabulary
+            The new names; those of relations and pairs stay.
+        own
+            Values of the own features for every slot of `exemplars`, shape ``(n, len(vocabulary.own))``.
+        """
+        self.vocabulary = vocabulary
+        self.exemplars.widen(vocabulary, own)
+        self._pairs, self._view = {}, None
+        self._reset_caches()
+        self._update_pairs(())
+        self._reset_caches()
+
     def refresh(self, budget: float = math.inf) -> int:
         """Learn stale pairs anew, the most contradicted first, until the budget is spent; the work spent.
 

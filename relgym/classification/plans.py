@@ -15,7 +15,7 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 
 from relgym.classification.binary import BinaryClassifier
-from relgym.classification.examples import Bools, Example, Vocabulary, difference, mode_value
+from relgym.classification.examples import Bools, Example, Vocabulary, consequence, difference, mode_value
 from relgym.classification.views import Context
 from relgym.logic.clause import ANY, Clause, Literal
 from relgym.logic.csp import World, solutions
@@ -111,7 +111,11 @@ class Planner:
         places = {mode: first + at for at, mode in enumerate(modes)}
         single = {mode_value(mode): (place, -1) for mode, place in places.items()}
         both = {difference(i, j): (places[i], places[j]) for i in modes for j in modes if i < j}
-        self._scalars: dict[str, tuple[int, int]] = own | single | both
+        self._follows = tuple((vocabulary.own.index(name), k) for name, k in vocabulary.follows)
+        ahead = [consequence(name, k, mode) for name, k in vocabulary.follows for mode in modes]
+        behind = first + len(modes)
+        known = {name: (behind + at, -1) for at, name in enumerate(ahead)}
+        self._scalars: dict[str, tuple[int, int]] = own | single | both | known
         self._pairs: list[_Pair] = []
         self._version = 0
         self._everything = False
@@ -142,6 +146,8 @@ class Planner:
     def run(self, plan: Plan, example: Example, values: Sequence[float]) -> list[int]:
         """The same, for a caller that has the example's plan already."""
         scalars = [*example.own.tolist(), *values]
+        if self._follows:
+            scalars += [scalars[column] + k * value for column, k in self._follows for value in values]
         pair = example.pair.tolist()
         return [stage if isinstance(stage, int) else _run(stage, scalars, pair) for stage in plan.stages]
 

@@ -14,6 +14,7 @@ from relgym.classification.examples import (
     ExampleBatch,
     Floats,
     Vocabulary,
+    consequence,
     difference,
     mode_value,
 )
@@ -41,6 +42,8 @@ class Scope:
         (name, column in the example's arrays).
     modes
         Ids of the two modes if their functions are features, else none.
+    follows
+        (name, column among the own features, k): see `Vocabulary.follows`.
     """
 
     relations: tuple[tuple[str, int], ...]
@@ -48,6 +51,7 @@ class Scope:
     pair: tuple[tuple[str, int], ...]
     own: tuple[tuple[str, int], ...]
     modes: tuple[int, ...] = ()
+    follows: tuple[tuple[str, int, float], ...] = ()
 
     @classmethod
     def of(cls, vocabulary: Vocabulary, config: ClassificationConfig, modes: Sequence[int] = ()) -> Scope:
@@ -59,7 +63,8 @@ class Scope:
 
         v = vocabulary
         shown = tuple(modes) if config.mode_function_features else ()
-        return cls(offered(v.relations), offered(v.unary), offered(v.pair), offered(v.own), shown)
+        follows = tuple((name, v.own.index(name), k) for name, k in v.follows)
+        return cls(offered(v.relations), offered(v.unary), offered(v.pair), offered(v.own), shown, follows)
 
     @property
     def scalars(self) -> tuple[str, ...]:
@@ -71,7 +76,8 @@ class Scope:
         if not self.modes:
             return ()
         i, j = self.modes
-        return mode_value(i), mode_value(j), difference(i, j)
+        ahead = [consequence(name, k, mode) for name, _, k in self.follows for mode in self.modes]
+        return mode_value(i), mode_value(j), difference(i, j), *ahead
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +165,8 @@ class View:
         parts = [self.own[:, [column for _, column in scope.own]]]
         if scope.modes:
             i, j = (self.values[:, self.modes.index(mode)] for mode in scope.modes)
-            parts.append(np.column_stack([i, j, i - j]))
+            ahead = [self.own[:, column] + k * value for _, column, k in scope.follows for value in (i, j)]
+            parts.append(np.column_stack([i, j, i - j, *ahead]))
         return np.concatenate(parts, axis=1)
 
 

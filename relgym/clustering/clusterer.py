@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.approximation import LEFT, LEFT_LINEAR, approximate
 from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import Scale, find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
@@ -24,6 +25,12 @@ __all__ = ["ClusterReport", "ModeClusterer"]
 
 ESTIMATE_AT = (64, 512, 4096)
 """Numbers of examples after which the noise is estimated anew."""
+
+APPROXIMATE_AT = (256, 1024, 4096, 16384)
+"""Numbers of examples after which an approximation is sought, if most of them are unexplained."""
+
+MOST_ROWS, MANY_FEATURES = 1500, 200
+"""At most so many rows determine an approximation; it may have twice as many terms if there are so many columns."""
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
@@ -74,6 +81,17 @@ class ModeClusterer:
     seed
         Seed of the random draws; the same examples and seed give the same modes.
 
+    Attributes
+    ----------
+    clusters
+        The modes at work, by id.
+    scale
+        Noise as assumed at present, and the tolerances that follow from it.
+    approximate
+        Whether the noise assumed is what an approximation leaves, for want of an exact law.
+    floor
+        Rounding noise, the least that is possible, in units of the target.
+
     Notes
     -----
     Cost per example: one evaluation of every mode, O(modes * terms * assignments). A search runs only when an
@@ -86,11 +104,15 @@ class ModeClusterer:
         self.config = config
         self.clusters: dict[int, Cluster] = {}
         self.scale = Scale(1e-12, config.inlier_stds, config.tail_stds)
+        self.floor = 1e-12
+        self.approximate = False
         self._rng = np.random.default_rng(seed)
         self._log = AssignmentLog()
         self._next_id = 1
         self._searches: dict[int, _Search] = {}
-        self._largest = 0.0
+        self._largest = 0.0  # number among the columns and the target's values
+        self._reach = 0.0  # value of the target
+        self._spread = 0.0  # noise found in the data, rounding apart
         self._known_noise = 0  # of a model that was loaded without its examples
 
     # ------------------------------------------------------------------ what is known
@@ -115,12 +137,26 @@ class ModeClusterer:
         if not len(self._log):
             return tuple(c.mode for _, c in sorted(self.clusters.items()))
         counts = np.bincount(self.labels, minlength=self._next_id)
-        return tuple(c.mode.with_examples(int(counts[i])) for i, c in sorted(self.clusters.items()))
+        dropped = self._log.forgotten
+        return tuple(
+            c.mode.with_examples(int(counts[i]) + dropped[i]) for i, c in sorted(self.clusters.items())
+        )
 
     @property
     def noise_examples(self) -> int:
         """Number of examples no mode explains."""
-        return int((self.labels == NOISE).sum()) if len(self._log) else self._known_noise
+        if not len(self._log):
+            return self._known_noise
+        return int((self.labels == NOISE).sum()) + self._log.forgotten[NOISE]
+
+    @property
+    def seen(self) -> int:
+        """Number of examples that ever came, forgotten ones included."""
+        return self._log.seen
+
+    def keep(self, rows: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Forget the examples of dropped rows of the example table; see `AssignmentLog.keep`."""
+        return self._log.keep(rows)
 
     def fits(
         self, table: ExampleTable, examples: NDArray[np.intp]
@@ -156,6 +192,8 @@ class ModeClusterer:
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
             self._discover(table, example)
+        if self._hopeless():
+            self._approximate(table)
         after = set(self.clusters)
         if after != set(errors):
             ids, fits = self.fits(table, np.array([example]))
@@ -167,8 +205,8 @@ class ModeClusterer:
         example = self._log.append(row, y)
         core = table.signatures[table.signature_ids[row]].core
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
-        if largest > self._largest or len(self._log) in ESTIMATE_AT:
-            self._largest = max(largest, self._largest)
+        if largest > self._largest or abs(y) > self._reach or self._log.seen in ESTIMATE_AT:
+            self._largest, self._reach = max(largest, self._largest), max(abs(y), self._reach)
             self._rescale(table)
         return example
 
@@ -210,20 +248,25 @@ class ModeClusterer:
         if self.config.noise_std != "auto":
             self.scale = replace(self.scale, sigma=float(self.config.noise_std))
             return
-        floor = rounding_noise(np.array([[self._largest]]), self.y[:256])
-        if len(self._log) in ESTIMATE_AT and 2 * self.noise_examples > len(self._log):
+        recent = self.rows[-256:]
+        own = table.x[recent][:, : table.signatures[table.signature_ids[recent[-1]]].core]
+        floor = rounding_noise(np.array([[self._largest]]), np.append(self.y[-256:], self._reach), own)
+        self.floor = floor
+        if self._log.seen in ESTIMATE_AT and 2 * self.noise_examples > self._log.seen:
             estimate = self._estimate(table, floor)
-            explained = 1.0 - self.noise_examples / len(self._log)
+            explained = 1.0 - self.noise_examples / self._log.seen
             if refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
-                self.scale = replace(self.scale, sigma=estimate)
+                self._spread, self.approximate = estimate, False
                 self._start_over()
-        self.scale = replace(self.scale, sigma=max(floor, self.scale.sigma))
+        self.scale = replace(self.scale, sigma=max(floor, self._spread))
 
     def _estimate(self, table: ExampleTable, floor: float) -> float:
         """Noise among examples of the newest example's signature."""
         ids = table.signature_ids[self.rows]
         part = np.flatnonzero(ids == ids[-1])
-        order, stages = table.signatures[ids[-1]].preference(self.target)
+        slots = table.signatures[ids[-1]]
+        order, stages = slots.preference(self.target)
+        order = order[order < len(slots.columns)]
         rows = self.rows[part]
         return estimate_noise(
             table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor, own=stages[0]
@@ -233,24 +276,77 @@ class ModeClusterer:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""
         self.clusters.clear()
         self._searches.clear()
+        total = self._log.forgotten.total()
+        self._log.forgotten.clear()
+        self._log.forgotten[NOISE] = total
         self.labels[:] = NOISE
 
+    def retarget(self, target: Target) -> None:
+        """Be given other next values: the examples stay, modes are searched again."""
+        self.target = target
+        self._spread, self.approximate = 0.0, False
+        self.scale = replace(self.scale, sigma=self.floor)
+        self._start_over()
+
     # ------------------------------------------------------------------ discovery (§3.2.2)
+    @property
+    def _needed(self) -> int:
+        """Examples that found a mode: each verifies it by as many bits as tell it from all values seen."""
+        return least_examples(self.y, self.scale, self.config)
+
     def _discover(self, table: ExampleTable, example: int) -> None:
         signature = int(table.signature_ids[self.rows[example]])
         search = self._searches.setdefault(signature, _Search())
         search.waiting += 1
-        if search.waiting <= search.failures // 6:
+        if search.waiting <= self._patience(search, bool(table.signatures[signature].features)):
             return
         for _ in range(MOST_DISCOVERIES):
             pool = self._pool(table, signature)
-            if len(pool) < least_examples(self.y[pool], self.scale, self.config):
+            if len(pool) < self._needed:
                 break  # not a failure: nothing was searched
             if not self._search_once(table, signature, pool, fresh=search.waiting):
                 search.failures += 1
                 break
             search.failures = 0
         search.waiting = 0
+
+    def _patience(self, search: _Search, wide: bool) -> int:
+        """News to wait for until the next search: the more, the oftener it was in vain and the dearer it is."""
+        if self.approximate:  # what an approximation leaves is mostly its own tail
+            return search.failures * search.failures
+        return search.failures if wide else search.failures // 6
+
+    def _hopeless(self) -> bool:
+        """Whether it is time to look for an approximation, since exact laws explain too little."""
+        if (
+            not self.config.approximate
+            or self.config.noise_std != "auto"
+            or self._log.seen not in APPROXIMATE_AT
+        ):
+            return False
+        # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
+        return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
+
+    def _approximate(self, table: ExampleTable) -> None:
+        recent = np.arange(max(0, len(self._log) - MOST_ROWS), len(self._log))
+        signature = int(table.signature_ids[self.rows[-1]])
+        recent = recent[table.signature_ids[self.rows[recent]] == signature]
+        slots = table.signatures[signature]
+        order, stages = slots.preference(self.target)
+        order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
+        terms = self.config.max_terms * (2 if len(order) > MANY_FEATURES else 1)
+        x, y = slots.matrix(table.x[self.rows[recent]], order), self.y[recent]
+        left = LEFT if slots.features else LEFT_LINEAR
+        stds = self.scale.inlier_stds
+        present = slots.present(table.x[self.rows[recent]], self.target)
+        found = approximate(x, y, present, floor=self.floor, terms=terms, stds=stds, left=left)
+        explained = 2 * self.noise_examples <= self._log.seen
+        if found is None or (explained and found.sigma > 0.5 * self.scale.sigma):
+            return
+        self._spread, self.approximate = found.sigma, True
+        self.scale = replace(self.scale, sigma=max(self.floor, found.sigma))
+        self._start_over()
+        self._adopt(table, signature, reordered(found.fit, order), recent[found.inliers])
 
     def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
         """Noise examples of one signature that aren't some mode's tail, oldest first."""
@@ -271,7 +367,7 @@ class ModeClusterer:
         order, stages = slots.preference(self.target)
         rows = self.rows[pool]
         found = find_mode(
-            table.x[rows][:, order],
+            slots.matrix(table.x[rows], order),
             y,
             table.strata[rows],
             stages=stages,
@@ -279,6 +375,7 @@ class ModeClusterer:
             scale=self.scale,
             config=self.config,
             rng=self._rng,
+            needed=self._needed,
         )
         if found is None:
             return False
@@ -293,11 +390,13 @@ class ModeClusterer:
         cluster = known.cluster(fit, signature)
         members = self._explained(table, cluster, self._noise())
         cluster, absorbed = generalise(known, cluster, members, rng=self._rng)
+        inherited = sum(self._log.forgotten.pop(i, 0) for i in absorbed)
         for i in absorbed:
             self._remove(i)
         new = self._next_id
         self._next_id += 1
         self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
+        self._log.forgotten[new] += inherited
         self._reassign(table, new)
 
     def _noise(self) -> NDArray[np.intp]:
@@ -312,6 +411,7 @@ class ModeClusterer:
     def _remove(self, mode: int) -> None:
         """A deleted mode gives its examples back to the noise, from where others take them."""
         del self.clusters[mode]
+        self._log.forgotten[NOISE] += self._log.forgotten.pop(mode, 0)
         self.labels[self.labels == mode] = NOISE
 
     def _reassign(self, table: ExampleTable, new: int) -> None:
@@ -351,6 +451,10 @@ class ModeClusterer:
             "sigma": self.scale.sigma,
             "next_id": self._next_id,
             "largest": self._largest,
+            "reach": self._reach,
+            "spread": self._spread,
+            "rounding": self.floor,
+            "approximate": self.approximate,
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
@@ -366,7 +470,9 @@ class ModeClusterer:
         """Take over what `to_json` and `to_arrays` wrote; without arrays there are no examples."""
         self.scale = replace(self.scale, sigma=float(data["sigma"]))
         self._next_id = int(data["next_id"])
-        self._largest = float(data["largest"])
+        self._largest, self._reach = float(data["largest"]), float(data["reach"])
+        self.approximate = bool(data["approximate"])
+        self._spread, self.floor = float(data["spread"]), float(data["rounding"])
         self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}
         self.clusters = {int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]}

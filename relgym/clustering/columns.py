@@ -4,25 +4,31 @@ The target object's properties come first. The other objects go into *slots* ``(
 canonical order, never by name. Examples whose slots have the same types share a `SlotSignature` and with it
 the meaning of their columns. Columns stand in order of preference: what the target itself has, then what
 bodiless objects say (actions), then the target's pose, then other objects; of two columns that explain
-equally well the earlier wins.
+equally well the earlier wins. Non-linear features, where they are offered, are columns behind these, worked out
+when they are read.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.scene.objects import ObjectType, SceneLayout, Target
+from relgym.clustering.features import NO_FEATURES, Feature, Library
+from relgym.scene.objects import TASK, ObjectType, SceneLayout, Target
 
 __all__ = ["Column", "SlotSignature", "slot_order"]
 
 PRIME = "'"
 
-_STAGE = (0, 0, 2, 1, 2)
+_STAGE = (0, 0, 3, 2, 3, 1)
 """When columns of each rank are tried: poses last, since few laws depend on where things are (R2)."""
+
+_FEATURE = 5
+"""Rank of non-linear features."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,29 +50,56 @@ class SlotSignature:
         Type of each slot; slot 0 is the target object. Bodiless objects come next, then bodies.
     given
         (type, property) pairs whose next values are columns too (`Target.given`).
+    chained
+        The same for pairs among which the order is still to be found: columns only of the target itself, of bodiless
+        objects, and, for reward and termination, of any object that is alone of its type.
+    library
+        Non-linear features offered.
     """
 
     types: tuple[ObjectType, ...]
     given: tuple[tuple[str, str], ...] = ()
+    chained: tuple[tuple[str, str], ...] = ()
+    library: Library = NO_FEATURES
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.types, self.given))
+        return hash((self.types, self.given, self.chained, self.library))
 
     def __hash__(self) -> int:
         return self._hash
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """All columns, in order of preference."""
-        found = []
+        """All columns that a row holds, in order of preference."""
+        found, task = [], self.types[0].name == TASK
         for slot, t in enumerate(self.types):
             supplied = {own for own in t.pose_columns() if own >= 0}
             for k, prop in enumerate(t.properties):
                 found.append(Column(slot, prop, self._rank(slot, k in supplied)))
-            primes = [prop for name, prop in self.given if name == t.name]
+            alone = slot == 0 or (self.singleton(slot) and (task or not t.has_body))
+            pairs = dict.fromkeys((*self.given, *(self.chained if alone else ())))
+            primes = [prop for name, prop in pairs if name == t.name]
             found.extend(Column(slot, prop + PRIME, self._rank(slot, posed=False)) for prop in primes)
         return tuple(sorted(found, key=lambda c: (c.rank, c.slot)))
+
+    @cached_property
+    def features(self) -> tuple[Feature, ...]:
+        """Non-linear features, columns behind those that a row holds."""
+        task = self.types[0].name == TASK
+        offered = [
+            k
+            for k in range(self.core)
+            if (self.types[self.columns[k].slot].name != TASK) and (self.columns[k].slot or not task)
+        ]
+        own = [self.columns[k].slot == 0 or task for k in offered]
+        found = self.library.features([self.named(k) for k in offered], own)
+        return tuple(feature.moved(offered) for feature in found)
+
+    def named(self, index: int) -> str:
+        """A column's name, that of another object's property with its type in front."""
+        column = self.at(index)
+        return column.property if column.slot == 0 else f"{self.types[column.slot].name}.{column.property}"
 
     def _rank(self, slot: int, posed: bool) -> int:
         if slot == 0:
@@ -77,7 +110,9 @@ class SlotSignature:
 
     @cached_property
     def _index(self) -> dict[tuple[int, str], int]:
-        return {(c.slot, c.property): k for k, c in enumerate(self.columns)}
+        index = {(c.slot, c.property): k for k, c in enumerate(self.columns)}
+        width = len(self.columns)
+        return {(0, f.name): width + k for k, f in enumerate(self.features)} | index
 
     @cached_property
     def core(self) -> int:
@@ -99,27 +134,85 @@ class SlotSignature:
         return sum(t.name == name for t in self.types[1:]) == 1
 
     def column(self, slot: int, prop: str) -> int:
-        """Index of a column."""
+        """Index of a column; `KeyError` when this signature has none of that name."""
         return self._index[slot, prop]
+
+    def has(self, slot: int, prop: str) -> bool:
+        """Whether there is a column of that name."""
+        return (slot, prop) in self._index
+
+    def offers(self, props: Iterable[str]) -> bool:
+        """Whether the target's own slot has columns of these names."""
+        return all((0, prop) in self._index for prop in props)
+
+    def at(self, index: int) -> Column:
+        """The column of an index, a feature being one of slot 0."""
+        if index < len(self.columns):
+            return self.columns[index]
+        return Column(0, self.features[index - len(self.columns)].name, _FEATURE)
+
+    def values(self, x: NDArray[np.float64], index: int) -> NDArray[np.float64]:
+        """One column, features included, on rows ``(n, d)``; shape ``(n,)``."""
+        width = len(self.columns)
+        return x[:, index] if index < width else self.features[index - width].values(x)
+
+    def matrix(
+        self, x: NDArray[np.float64], indices: Sequence[int] | NDArray[np.intp]
+    ) -> NDArray[np.float64]:
+        """Some columns, features included, on rows ``(n, d)``; shape ``(n, len(indices))``."""
+        indices = np.asarray(indices, dtype=np.intp)
+        plain = indices < len(self.columns)
+        if plain.all():
+            return x[:, indices]
+        found = np.empty((len(x), len(indices)))
+        found[:, plain] = x[:, indices[plain]]
+        for k in np.flatnonzero(~plain):
+            found[:, k] = self.values(x, int(indices[k]))
+        return found
 
     def preference(self, target: Target) -> tuple[NDArray[np.intp], tuple[int, ...]]:
         """Columns that a target's functions may use, in order of preference, and where its stages end.
 
-        The target property's own column comes first. The stages are the numbers of leading columns that are
-        tried together: what the target and bodiless objects have; then what other objects have; then poses as
-        well. Next values are left out unless the target is given them.
+        The target property's own column comes first, except for the task's: its present values are no columns of its
+        functions at all. The stages are the numbers of leading columns that are
+        tried together: what the target and bodiless objects have; non-linear features of these; then what other
+        objects have; then poses as well. Next values are left out unless the target is given them.
         """
+        if (known := self._preferences.get(target)) is None:
+            known = self._preferences[target] = self._prefer(target)
+        return known
+
+    @cached_property
+    def _preferences(self) -> dict[Target, tuple[NDArray[np.intp], tuple[int, ...]]]:
+        return {}
+
+    def _prefer(self, target: Target) -> tuple[NDArray[np.intp], tuple[int, ...]]:
         first = self._index[0, target.property]
-        rest = [k for k, c in enumerate(self.columns) if k != first and self._allowed(c, target)]
-        rest.sort(key=lambda k: (_STAGE[self.columns[k].rank], k))
-        stage = [_STAGE[self.columns[k].rank] for k in rest]
-        ends = tuple(dict.fromkeys(1 + sum(s <= last for s in stage) for last in (0, 1, 2)))
+        every = range(len(self.columns) + len(self.features))
+        rest = [k for k in every if k != first and self._allowed(k, target)]
+        rest.sort(key=lambda k: (_STAGE[self.at(k).rank], k))
+        stage = [_STAGE[self.at(k).rank] for k in rest]
+        ends = tuple(dict.fromkeys(1 + sum(s <= last for s in stage) for last in range(4)))
+        if target.type == TASK:  # what a step is worth doesn't depend on what the last one was
+            return np.array(rest, dtype=np.intp), tuple(max(0, end - 1) for end in ends)
         return np.array([first, *rest], dtype=np.intp), ends
 
-    def _allowed(self, column: Column, target: Target) -> bool:
-        if not column.property.endswith(PRIME):
-            return True
-        return (self.types[column.slot].name, column.property.rstrip(PRIME)) in target.given
+    def present(self, x: NDArray[np.float64], target: Target) -> NDArray[np.float64]:
+        """What changes count from, shape ``(n,)``: the property's present value; 0 for reward and termination."""
+        if target.type == TASK:
+            return np.zeros(len(x))
+        return x[:, self._index[0, target.property]]
+
+    def _allowed(self, index: int, target: Target) -> bool:
+        width = len(self.columns)
+        parts = (index,) if index < width else self.features[index - width].columns
+        return all(self._open(self.columns[k], target) for k in parts)
+
+    def _open(self, column: Column, target: Target) -> bool:
+        name = self.types[column.slot].name
+        if name == TASK:
+            return False  # the world goes on whatever it is worth
+        return not column.property.endswith(PRIME) or (name, column.property.rstrip(PRIME)) in target.given
 
     def gather(self, layout: SceneLayout, order: tuple[int, ...]) -> NDArray[np.intp]:
         """Where each column lies in the concatenation of a scene's vector and its next vector.

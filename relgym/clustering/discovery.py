@@ -10,12 +10,24 @@ from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus, consensus, refine
-from relgym.numeric.stepwise import LinearFit, least_squares
+from relgym.numeric.stepwise import LinearFit, least_squares, varying_columns
 
 __all__ = ["Scale", "find_mode", "identified", "least_examples", "plans"]
 
 SEARCH = 400
 """At most this many rows are searched at a time."""
+
+NEAR, MOST_NEAR = 16.0, 0.5
+"""Rows that miss a function by up to so many tails are near misses; so many per inlier are too many."""
+
+QUIET, MOST_LIKE = 0.25, 0.5
+"""Residuals below so many sigma are rounding; above, those of neighbours may be alike by so much."""
+
+WIDE = 40
+"""Searches of more columns than this draw fewer and larger samples."""
+
+CHANGES = 0.2
+"""A column that changes between so large a share of successive rows is no constant of a scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +69,7 @@ def find_mode(
     scale: Scale,
     config: ClusteringConfig,
     rng: np.random.Generator,
+    needed: int | None = None,
 ) -> Consensus | None:
     """Search rows of one slot signature for a function that enough of them obey.
 
@@ -69,8 +82,10 @@ def find_mode(
         smaller samples and is the simpler law.
     fresh
         Number of rows at the end that no earlier search has seen: each sample holds one of them.
+    needed
+        Examples that found a mode; default: `least_examples` of these responses.
     """
-    needed = least_examples(y, scale, config)
+    needed = least_examples(y, scale, config) if needed is None else needed
     rows = _recent(len(y), fresh, rng)
     for columns, terms, size in plans(stages, config):
         if len(rows) < max(needed, size):
@@ -82,17 +97,66 @@ def find_mode(
             tolerance=scale.tolerance,
             terms=terms,
             size=size,
-            draws=max(32, config.draws // (1 if columns == stages[0] else 3)),
+            draws=max(32, config.draws // (1 if columns == stages[0] else 3 if columns <= WIDE else 12)),
             rng=rng,
             strata=strata[rows],
             anchors=np.flatnonzero(rows >= len(y) - fresh),
+            limit=48 if columns <= WIDE else 6,
         )
         if found is None or found.size < min(needed, 6):
             continue
         found = identified(x, y, found.fit, scale=scale, support=config.support)
-        if found is not None and found.size >= needed:
+        if found is not None and found.size >= needed and is_law(x, y, found, stages[0], scale):
             return found
     return None
+
+
+def is_law(x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, own: int, scale: Scale) -> bool:
+    """Whether a function is a law of some rows rather than the tangent of a curve.
+
+    Two things give a tangent away. Where it stops to fit within the tolerance, errors grow little by little, so that
+    it has nearly as many near misses as examples; laws of different kinds of behaviour leave a gap. And what it leaves
+    of its examples is no noise: rows that lie close together have like residuals.
+
+    Parameters
+    ----------
+    x, y, found
+        All rows, and the function with those it explains.
+    own
+        Number of leading columns that say how close rows lie: those of the target and of bodiless objects.
+    scale
+        Noise and tolerances.
+    """
+    error = np.abs(y - found.fit.predict(x))
+    near = (error > scale.tail) & (error <= NEAR * scale.tail)
+    if int(near.sum()) > MOST_NEAR * found.size:
+        return False
+    rows = np.flatnonzero(found.inliers)
+    left = y[rows] - found.fit.predict(x[rows])
+    if float(np.sqrt(np.square(left).mean())) <= QUIET * scale.sigma:
+        return True
+    return likeness(x[rows][:, :own], left) <= MOST_LIKE
+
+
+def likeness(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
+    """Correlation of residuals between rows that lie next to each other: 0 for noise, 1 for a smooth rest.
+
+    Parameters
+    ----------
+    x, left
+        Rows ``(n, d)`` and residuals ``(n,)``; at most `SEARCH` of them, evenly spread, are looked at.
+    """
+    columns = varying_columns(x)
+    if not len(columns) or len(left) < 2:
+        return 0.0
+    pick = np.unique(np.linspace(0, len(left) - 1, SEARCH).astype(np.intp))
+    scaled = x[pick][:, columns]
+    scaled = scaled / scaled.std(axis=0)
+    distance = np.square(scaled[:, None] - scaled[None]).sum(axis=2)
+    np.fill_diagonal(distance, np.inf)
+    rest = left[pick] - left[pick].mean()
+    variance = float(np.square(rest).mean())
+    return float((rest * rest[distance.argmin(axis=1)]).mean()) / variance if variance > 0.0 else 0.0
 
 
 def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, int, int]]:
@@ -100,6 +164,9 @@ def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, 
     found = []
     most = config.max_terms
     for width in stages[:1] if config.own_only else stages:
+        if width > WIDE:  # among so many columns a small sample finds some that fit it by chance
+            found += [(width, min(t, most), 4 * min(t, most) + 8) for t in (3, most)]
+            continue
         if width <= 6:  # few enough to fit them all and drop what is needless
             found.append((width, min(width, most), min(width, most) + 3))
         else:
@@ -174,13 +241,22 @@ def _own_part(x: NDArray[np.float64], fit: LinearFit, column: int) -> NDArray[np
     return part
 
 
+def _lively(column: NDArray[np.float64]) -> bool:
+    """Whether a column changes often, as an agent's choice among a few actions does."""
+    return bool((np.diff(column) != 0.0).mean() >= CHANGES)
+
+
 def _enough_combinations(
     x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, tolerance: float
 ) -> bool:
     """Whether slowly changing columns take enough combinations of values to support their weights."""
     if fit.terms == 1 and fit.weights and abs(fit.weights[0] - 1.0) < 1e-9:
         return True  # persistence has no free parameter
-    slow = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3]
+    few = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3]
+    lively = [c for c in few if _lively(x[:, c])]
+    if len(lively) > 1 and len(np.unique(x[:, lively], axis=0)) < len(lively) + 2:
+        return False
+    slow = [c for c in few if c not in lively]
     if not slow:
         return True
     combinations = len(np.unique(x[:, slow], axis=0))

@@ -66,7 +66,8 @@ class Cluster:
             part = np.flatnonzero(table.signature_ids[rows] == signature)
             slots = table.signatures[int(signature)]
             for prop, weight in self.mode.roles[0].terms:
-                still[part] &= np.abs(weight * table.x[rows[part], slots.column(0, prop)]) <= tolerance
+                column = slots.values(table.x[rows[part]], slots.column(0, prop))
+                still[part] &= np.abs(weight * column) <= tolerance
         return still
 
 
@@ -110,7 +111,7 @@ def role_matrix(
                 for slot, role in zip(played, mode.roles, strict=True)
                 for prop, _ in role.terms
             ]
-            x[part] = table.x[rows[part]][:, columns]
+            x[part] = slots.matrix(table.x[rows[part]], columns)
     return x
 
 

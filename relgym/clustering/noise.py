@@ -33,14 +33,24 @@ EXPLAINED = 0.1
 FEW = 128
 """Fewer examples than this can't tell noise as large as the signal from laws not seen yet."""
 
+MANY = 8
+"""So many different fractions that float32 represents exactly are no coincidence."""
+
+SINGLES = 2.0
+"""The same for numbers that were rounded to single precision when they were observed."""
+
 ROUNDINGS = 32.0
 """A function of a few terms on differences of stored numbers carries at most about this many roundings."""
 
 
-def rounding_noise(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+def rounding_noise(
+    x: NDArray[np.float64], y: NDArray[np.float64], recent: NDArray[np.float64] | None = None
+) -> float:
     """Standard deviation that mere rounding leaves, in units of y.
 
-    Numbers that float32 represents exactly are taken to have been rounded to it.
+    Responses that float32 represents exactly are taken to have been rounded to it, as observations are. What counts
+    then is their own size: a law's terms are rarely much larger than its value, and where they cancel, the estimate
+    from the data says so later. In double precision the columns count too, since the room is there.
 
     Parameters
     ----------
@@ -48,11 +58,23 @@ def rounding_noise(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
         The target object's own columns, shape ``(n, d)``.
     y
         Responses, shape ``(n,)``.
+    recent
+        Recent rows of the target object's own columns. Where one that varies was rounded to single precision, so
+        were the responses, even if something was worked out from them since (an angle from its sine and cosine).
     """
-    scale = max(float(np.abs(x).max(initial=0.0)), float(np.abs(y).max(initial=0.0)), 1e-3)
-    single = bool((y.astype(np.float32).astype(np.float64) == y).all()) and bool(np.any(y != np.round(y)))
-    step = float(np.finfo(np.float32).eps) * 0.25 if single else float(np.finfo(np.float64).eps)
-    return (4.0 if single else ROUNDINGS) * step * scale
+    largest = float(np.abs(y).max(initial=0.0))
+    if bool((y.astype(np.float32).astype(np.float64) == y).all()) and bool(np.any(y != np.round(y))):
+        return SINGLES * float(np.finfo(np.float32).eps) * largest
+    if recent is not None and any(_rounded(column) for column in recent.T):
+        return SINGLES * float(np.finfo(np.float32).eps) * max(largest, 1.0)
+    scale = max(float(np.abs(x).max(initial=0.0)), largest, 1e-3)
+    return ROUNDINGS * float(np.finfo(np.float64).eps) * scale
+
+
+def _rounded(column: NDArray[np.float64]) -> bool:
+    """Whether float32 represents all values of a column exactly, and there are enough of them to tell."""
+    exact = bool((column.astype(np.float32).astype(np.float64) == column).all())
+    return exact and len(np.unique(column[column != np.round(column)])) >= MANY
 
 
 def estimate_noise(

@@ -23,7 +23,7 @@ def identify_roles(fit: LinearFit, signature: SlotSignature) -> tuple[Role, ...]
     """Cut a weight vector into one segment per slot; one with a non-zero weight is a role (Figure 3.3)."""
     terms: dict[int, list[tuple[str, float]]] = {0: []}
     for column, weight in zip(fit.columns, fit.weights, strict=True):
-        where = signature.columns[column]
+        where = signature.at(column)
         terms.setdefault(where.slot, []).append((where.property, weight))
     others = [Role(signature.types[s].name, tuple(sorted(t))) for s, t in terms.items() if s]
     own = Role(signature.types[0].name, tuple(terms[0]))
@@ -47,6 +47,7 @@ class Binding:
         Slot of every role but the target's where it is the only one possible, -1 for open roles.
     """
 
+    signature: SlotSignature
     intercept: float
     fixed: tuple[tuple[int, float], ...]
     open: tuple[tuple[tuple[dict[int, int], float], ...], ...]
@@ -57,7 +58,7 @@ class Binding:
         """The function under every assignment, rows ``(n, d)`` → ``(n, a)``; sums in a fixed order."""
         total = np.full(len(x), self.intercept)
         for column, weight in self.fixed:
-            total = total + weight * x[:, column]
+            total = total + weight * self.signature.values(x, column)
         every = np.repeat(total[:, None], len(self.assignments), axis=1)
         for k, terms in enumerate(self.open):
             for places, weight in terms:
@@ -67,19 +68,22 @@ class Binding:
 
     def value(self, x: list[float], slots: tuple[int, ...] = ()) -> float:
         """The function on one row with the open roles played by `slots`; the same bits as `values`."""
-        total = self.intercept
+        total, width = self.intercept, len(self.signature.columns)
         for column, weight in self.fixed:
-            total = total + weight * x[column]
+            total = total + weight * (x[column] if column < width else self._feature(x, column))
         for terms, slot in zip(self.open, slots, strict=True):
             for places, weight in terms:
                 total = total + weight * x[places[slot]]
         return total
 
+    def _feature(self, x: list[float], column: int) -> float:
+        return float(self.signature.values(np.array([x]), column)[0])
+
     def values_as(self, x: NDArray[np.float64], slots: tuple[int, ...]) -> NDArray[np.float64]:
         """`value` on n rows with the open roles played by the same slots; the same bits."""
         total = np.full(len(x), self.intercept)
         for column, weight in self.fixed:
-            total = total + weight * x[:, column]
+            total = total + weight * self.signature.values(x, column)
         for terms, slot in zip(self.open, slots, strict=True):
             for places, weight in terms:
                 total = total + weight * x[:, places[slot]]
@@ -109,8 +113,10 @@ class Binding:
 
 
 def bind(mode: Mode, signature: SlotSignature) -> Binding | None:
-    """Lay a mode over a signature; None when some role has no object that could play it."""
+    """Lay a mode over a signature; None when some role has no object that could play it, or a feature lacks one."""
     by_type = signature.slots_by_type
+    if not signature.offers(prop for prop, _ in mode.roles[0].terms):
+        return None
     fixed = [(signature.column(0, prop), weight) for prop, weight in mode.roles[0].terms]
     forced: list[int] = []
     open_roles: list[Role] = []
@@ -134,7 +140,7 @@ def bind(mode: Mode, signature: SlotSignature) -> Binding | None:
     )
     rows = list(itertools.islice(_assignments(open_roles, by_type), MAX_ASSIGNMENTS))
     table = np.array(rows, dtype=np.intp).reshape(len(rows), len(open_roles))
-    return Binding(mode.intercept, tuple(fixed), places, table, tuple(forced))
+    return Binding(signature, mode.intercept, tuple(fixed), places, table, tuple(forced))
 
 
 def _assignments(roles: list[Role], by_type: dict[str, tuple[int, ...]]) -> Iterator[tuple[int, ...]]:

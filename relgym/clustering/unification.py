@@ -75,15 +75,16 @@ def unified(
     pooled = np.concatenate(sides)
     allowed = simpler_than[0].parameters + simpler_than[1].parameters
     everyone = [side[signatures[side] == signature] for side in (new, old)]
-    if _persist(table.x[:, order[0]], rows, y, everyone, scale, config):
-        return signature, LinearFit((int(order[0]),), (1.0,), 0.0, 0.0)
+    own = slots.column(0, target.property)
+    if own in order and _persist(table.x[:, own], rows, y, everyone, scale, config):
+        return signature, LinearFit((own,), (1.0,), 0.0, 0.0)
     for width in stages[:1] if config.own_only else stages:
-        x = table.x[rows[pooled]][:, order[:width]]
+        x = slots.matrix(table.x[rows[pooled]], order[:width])
         fit = forward_stepwise(x, y[pooled], sigma=scale.sigma, max_terms=min(config.max_terms, allowed))
         if fit.terms >= allowed or np.abs(y[pooled] - fit.predict(x)).max() > scale.tolerance:
             continue
         both = np.concatenate(everyone)
-        x = table.x[rows[both]][:, order[:width]]
+        x = slots.matrix(table.x[rows[both]], order[:width])
         found = identified(x, y[both], fit, scale=scale, support=config.support)
         if found is None or found.fit.terms >= allowed:
             continue
@@ -148,12 +149,12 @@ def unified_family(
     own = {slots.column(0, prop): weight for prop, weight in shared}
     part = middle[usable]
     x = table.x[rows[part]]
-    constants = y[part] - sum(weight * x[:, column] for column, weight in own.items())
+    constants = y[part] - sum(weight * slots.values(x, column) for column, weight in own.items())
     for width in stages[:2][-1:]:
         columns = np.array([c for c in order[:width] if c not in own], dtype=np.intp)
         for terms in range(1, min(len(columns), config.max_terms) + 1):
             found = consensus(
-                x[:, columns],
+                slots.matrix(x, columns),
                 constants,
                 sigma=scale.sigma,
                 tolerance=scale.tolerance,
@@ -167,12 +168,12 @@ def unified_family(
                 continue
             which = [int(k) for k in usable[found.inliers]]
             pooled = np.concatenate([_spread(families[k]) for k in which])
-            whole = least_squares(
-                table.x[rows[pooled]], y[pooled], (*own, *(int(columns[c]) for c in found.fit.columns))
-            )
-            checked = identified(table.x[rows[pooled]], y[pooled], whole, scale=scale, support=config.support)
+            used = np.array([*own, *(int(columns[c]) for c in found.fit.columns)], dtype=np.intp)
+            pool = slots.matrix(table.x[rows[pooled]], used)
+            whole = least_squares(pool, y[pooled], tuple(range(len(used))))
+            checked = identified(pool, y[pooled], whole, scale=scale, support=config.support)
             if checked is not None and checked.inliers.mean() >= config.unify_ratio:
-                return signature, checked.fit, which
+                return signature, reordered(checked.fit, used), which
     return None
 
 

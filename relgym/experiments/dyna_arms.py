@@ -48,18 +48,24 @@ class Course:
         For files, and for people.
     env_id, arguments
         What `gymnasium.make` is asked for.
+    mover
+        Name of the object whose path is drawn.
     repeat
         Env steps that a decision lasts.
     horizon
         Decisions that an episode lasts at most.
+    dreams
+        How to dream there, where it isn't as by default: parameters of `DynaConfig`.
     """
 
     name: str
     title: str
     env_id: str
+    mover: str
     arguments: Mapping[str, Any] = field(default_factory=dict)
     repeat: int = 1
     horizon: int = 20
+    dreams: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,11 +95,20 @@ class Arm:
     varied: bool = False
 
 
+_BALL_DREAMS: Final[Mapping[str, Any]] = {
+    "horizon": 30,
+    "dreams": 32,
+    "every": 20,
+    "from_start": 0.3,
+    "redraw": False,
+}
+"""Episodes are long and their steps short, so dreams branch off anywhere; goals in mid-air would teach nothing."""
+
 COURSES: Final = {
     course.name: course
     for course in (
-        Course("truck", "TruckPush, task push", "relgym/TruckPush-v0", {"task": "push"}),
-        Course("ball", "BallGoal", "relgym/BallGoal-v0", {}, repeat=5, horizon=100),
+        Course("truck", "TruckPush, task push", "relgym/TruckPush-v0", "truck", {"task": "push"}),
+        Course("ball", "BallGoal", "relgym/BallGoal-v0", "ball", repeat=5, horizon=100, dreams=_BALL_DREAMS),
     )
 }
 
@@ -137,7 +152,8 @@ def make_agent(arm: Arm, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -
         ) from None
     mixing = replay_options(env.observation_space, gamma=AGENT["gamma"])
     env.action_space.seed(seed)
-    return SAC("MlpPolicy", env, seed=seed, gradient_steps=arm.updates, **{**AGENT, **mixing, **changes})
+    updates = arm.updates if arm.model == "none" else 1  # until the model is trusted
+    return SAC("MlpPolicy", env, seed=seed, gradient_steps=updates, **{**AGENT, **mixing, **changes})
 
 
 def make_dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -> Any:
@@ -165,7 +181,8 @@ def _dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **chan
         "seed": seed,
     }
     model = _model(arm, env, seed)
-    return Dyna(model, DynaConfig(**{**settings, **changes}), judge="learned" if arm.learned else None)
+    chosen = DynaConfig(**{**settings, **course.dreams, **changes})
+    return Dyna(model, chosen, judge="learned" if arm.learned else None)
 
 
 def _model(arm: Arm, env: gym.Env[Any, Any], seed: int) -> Any:

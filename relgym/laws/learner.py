@@ -9,7 +9,6 @@ over-specific, all that was derived from it is derived again from the raw contac
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
 from relgym.laws.encounters import EncounterStore
 from relgym.laws.free import FreeLearner
+from relgym.laws.ledger import Ledger
 from relgym.laws.pair import fit_pair
 from relgym.laws.records import FreeLaw, PairLaw, Share
 from relgym.laws.touching import Cast, Contacts
@@ -37,18 +37,6 @@ ESTIMATE_AT = (64, 256, 1024)
 """Numbers of free examples at which the noise is estimated, if the free law doesn't hold exactly."""
 
 FEWEST_CONTACTS = 3
-
-SETTLED = 500
-"""Transitions without a surprise after which laws count as settled."""
-
-
-@dataclass(slots=True)
-class _Tally:
-    """Transitions of one type: all; since the laws last changed, and how many of those they had wrong."""
-
-    seen: int = 0
-    wrong: int = 0
-    since: int = 0
 
 
 class LawLearner:
@@ -91,10 +79,9 @@ class LawLearner:
         self._free = {name: FreeLearner(s, seed=seed) for name, s in self.sources.items()}
         self._store = EncounterStore(schema, self.sources, seed=seed)
         self._rng = np.random.default_rng([seed, 3])
-        self._tallies = {name: _Tally() for name in self.sources}
+        self._ledger = Ledger(self.sources)
         self._news = 0
         self._stored_wrong = 0
-        self._lost = 0  # contacts that a model loaded without its history once kept
 
     # ------------------------------------------------------------------ what is known
     @property
@@ -106,31 +93,27 @@ class LawLearner:
         """Whether there are a free law of the type and a law of pairs."""
         return type_name in self.book.free and self.book.pair is not None
 
-    def unexplained(self, type_name: str) -> float:
-        """About how many of a type's transitions the present laws don't explain."""
-        tally, free = self._tallies[type_name], self._free[type_name]
-        lost = float(tally.wrong)
-        if free.law is not None:
-            lost += free.law.unexplained * free.seen / max(1, free.law.examples)
-        kept = self._kept()[0]
-        return lost + self._stored_wrong * self._store.seen / max(1, kept)
-
     def seen(self, type_name: str) -> int:
         """Number of a type's transitions."""
-        return self._tallies[type_name].seen
+        return self._ledger.seen(type_name)
 
     def settled(self, type_name: str) -> bool:
         """Whether the laws have long been as they are, and never wrong since."""
-        tally = self._tallies[type_name]
-        return tally.wrong == 0 and tally.since >= SETTLED
+        return self._ledger.settled(type_name)
 
     def bits(self, type_name: str) -> float:
-        """Description length of a type's transitions with the laws: statements, then exceptions."""
+        """Description length of a type's transitions with the laws: statements, then exceptions.
+
+        Of examples only some are kept; exceptions among those stand for more.
+        """
         if not self.ready(type_name) or self.book.pair is None:
             return float("inf")
-        stated = self.book.free[type_name].bits + self.book.pair.bits
-        d = len(self.book.components(type_name))
-        return stated + EXCEPTION_BITS * d * self.unexplained(type_name)
+        count, free, pair = len(self.book.components(type_name)), self.book.free[type_name], self.book.pair
+        forgotten = self._free[type_name].seen / max(1, free.examples) - 1.0
+        numbers = len(free.components) * free.unexplained * max(0.0, forgotten)
+        numbers += pair.unexplained * max(0.0, self._store.seen / max(1, pair.examples) - 1.0)
+        numbers += count * (self._ledger.unlearned(type_name) + self._news)
+        return free.bits + pair.bits + EXCEPTION_BITS * numbers
 
     # ------------------------------------------------------------------ learning
     def learn_one(
@@ -161,19 +144,21 @@ class LawLearner:
         motion = motion or self.book.motion(contacts, vector[None])
         after = cast.padded(following[None])[cast.velocities][..., 0]
         touching = np.flatnonzero(contacts.hits[0])
+        degree = np.zeros(len(cast.layout.bodies), dtype=np.int64)
+        np.add.at(degree, cast.first[touching], 1)
+        np.add.at(degree, cast.second[touching], 1)
         changed = False
         right = {}
         for body in cast.movers:
             if stays[cast.layout.bodies[body]]:
                 right[body] = self._judge(cast, motion, body, after)
-                self._count(cast, body, right[body])
-                if not (cast.first[touching] == body).any() and not (cast.second[touching] == body).any():
+                if degree[body] == 0:
                     changed |= self._learn_free(cast, body, motion, after[:, body], right[body])
         if changed:
             self._restate()
-        news = [
-            self._meet(contacts, pair, vector, after, right) for pair in self._single(cast, touching, stays)
-        ]
+        single = self._single(cast, touching, degree, stays)
+        self._count(cast, right, degree, single)
+        news = [self._meet(contacts, pair, vector, after, right) for pair in single]
         if any(news) or (news and _doubled(self._store.seen, len(news))):
             changed |= self._derive(sum(news))
         return changed
@@ -183,11 +168,14 @@ class LawLearner:
         off = np.abs(motion.velocity[:count, 0, body] - after[:count, body])
         return bool(motion.stated[0, body] and (off <= self.book.tolerance).all())
 
-    def _count(self, cast: Cast, body: int, right: bool) -> None:
-        tally = self._tallies[cast.sources[body][0].type.name]
-        tally.seen += 1
-        tally.since += 1
-        tally.wrong += not right
+    def _count(
+        self, cast: Cast, right: Mapping[int, bool], degree: NDArray[np.int64], single: list[int]
+    ) -> None:
+        """Enter every mover in the ledger; laws are learned from free ones and from single contacts."""
+        taught = {int(side[pair]) for pair in single for side in (cast.first, cast.second)}
+        for body, was in right.items():
+            learned = degree[body] == 0 or body in taught
+            self._ledger.count(cast.sources[body][0].type.name, right=was, learned=learned)
 
     def _learn_free(
         self, cast: Cast, body: int, motion: Motion, after: NDArray[np.float64], right: bool
@@ -202,11 +190,14 @@ class LawLearner:
             self.book.free[name] = learner.law
         return changed
 
-    def _single(self, cast: Cast, touching: NDArray[np.intp], stays: Mapping[int, bool]) -> list[int]:
+    def _single(
+        self,
+        cast: Cast,
+        touching: NDArray[np.intp],
+        degree: NDArray[np.int64],
+        stays: Mapping[int, bool],
+    ) -> list[int]:
         """Pairs whose bodies touch nothing else; what a body that never moves touches is all the same."""
-        degree = np.zeros(len(cast.layout.bodies), dtype=np.int64)
-        np.add.at(degree, cast.first[touching], 1)
-        np.add.at(degree, cast.second[touching], 1)
         found = []
         for pair in touching.tolist():
             a, b = int(cast.first[pair]), int(cast.second[pair])
@@ -260,8 +251,7 @@ class LawLearner:
 
     def _settle(self) -> None:
         self.book.forget()
-        for tally in self._tallies.values():
-            tally.wrong = tally.since = 0
+        self._ledger.start_again()
 
     # ------------------------------------------------------------------ noise
     def _rescale(self, cast: Cast, vector: NDArray[np.float64]) -> None:
@@ -294,22 +284,18 @@ class LawLearner:
             "shares": [
                 [*kind, s.property, s.power, s.constant] for kind, s in sorted(self.book.shares.items())
             ],
-            "tallies": [[name, t.seen, t.wrong, t.since] for name, t in sorted(self._tallies.items())],
+            "ledger": self._ledger.to_json(),
             "stored_wrong": self._stored_wrong,
-            "kept": self._kept(),
+            "news": self._news,
+            "seen": self._store.seen,
         }
         if history:
             data |= {
-                "news": self._news,
                 "random": self._rng.bit_generator.state,
                 "store": self._store.to_json(),
                 "learners": [[name, *f.to_json()] for name, f in sorted(self._free.items())],
             }
         return data
-
-    def _kept(self) -> list[int]:
-        """Numbers of contacts kept and seen, those of a model that was loaded without them included."""
-        return [len(self._store) or self._lost, self._store.seen]
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """The examples kept."""
@@ -326,14 +312,13 @@ class LawLearner:
         book.pair = None if data["pair"] is None else PairLaw.from_json(data["pair"])
         book.shares = {(a, b): Share(p, int(k), float(c)) for a, b, p, k, c in data["shares"]}
         book.forget()
-        self._tallies = {name: _Tally(int(n), int(w), int(s)) for name, n, w, s in data["tallies"]}
-        self._stored_wrong = int(data["stored_wrong"])
+        self._ledger.restore(data["ledger"])
+        self._stored_wrong, self._news = int(data["stored_wrong"]), int(data["news"])
         for name, learner in self._free.items():
             learner.law = book.free.get(name)
+        self._store.seen = int(data["seen"])
         if not arrays:
-            self._lost, self._store.seen = (int(n) for n in data["kept"])
             return
-        self._news = int(data["news"])
         self._rng.bit_generator.state = data["random"]
         self._store.restore(data["store"], _part(arrays, "contacts"))
         for k, (name, *state) in enumerate(data["learners"]):

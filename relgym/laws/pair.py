@@ -10,15 +10,18 @@ from numpy.typing import NDArray
 
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.frames import FRAMES, POINT, Bearings, axes_of, axis_names, turned
+from relgym.laws.kinds import KindsFit, fit_apart, fit_together
 from relgym.laws.pieces import AxisExamples
-from relgym.laws.records import ONE, AxisLaw, Kind, Operator, PairLaw, Piece
-from relgym.laws.selection import AxisFit, fit_axis, refitted
+from relgym.laws.records import ONE, Kind, PairLaw
 from relgym.scene.geometry.vectors import FloatArray, dot, norm
 
 __all__ = ["Encounters", "PairFit", "fit_pair"]
 
-JOINS = 0.98
-"""A kind of contact obeys a law of other kinds if that explains at least this share of its examples."""
+SPLIT = 2
+"""In so many of the best frames materials are told apart, should one law not be enough for all."""
+
+TIE = 1e-6
+"""Difference in bits that decides nothing."""
 
 
 TOLD = 100.0
@@ -89,69 +92,134 @@ def fit_pair(encounters: Encounters, *, rng: np.random.Generator, frames: Sequen
     frames
         Frames to compare, the preferred ones first.
     """
-    d = len(encounters.now)
-    best: PairFit | None = None
+    drafts: list[_Draft] = []
     for frame in frames:
-        if frame == "turned" and d != 2:
+        if frame == "turned" and len(encounters.now) != 2:
             continue
-        limit = np.inf if best is None else best.law.bits
-        fit = _fit_points if frame == POINT else _fit_frame
-        found = fit(frame, encounters, limit, rng=rng)
-        if found is not None and (best is None or found.law.bits < best.law.bits - 1e-6):
+        draft = _Draft.of(frame, encounters, _limit(drafts), rng=rng)
+        if draft is not None:
+            drafts.append(draft)
+    best: PairFit | None = None
+    for draft in sorted(drafts, key=_bits)[:SPLIT]:
+        found = draft.split(np.inf if best is None else best.law.bits, rng=rng)
+        if best is None or found.law.bits < best.law.bits - TIE:
             best = found
     assert best is not None, "without a limit every frame gives a law"
     return best
 
 
-def _fit_frame(
-    frame: str, encounters: Encounters, limit: float, *, rng: np.random.Generator
-) -> PairFit | None:
-    """The law in one frame, or None as soon as it needs as many bits as `limit`."""
-    axes = axes_of(frame, encounters.bearings, encounters.free)
-    letters = axis_names(frame, len(encounters.now))
-    laws: list[tuple[AxisLaw, ...]] = []
+def _bits(draft: _Draft) -> float:
+    return draft.bits
+
+
+def _limit(drafts: Sequence[_Draft]) -> float:
+    """Bits at which a further frame can't win any more, neither as it is nor by telling kinds apart."""
+    known = sorted(drafts, key=_bits)
+    if known and known[0].whole:
+        return known[0].bits
+    return known[SPLIT - 1].bits if len(known) >= SPLIT else np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class _Draft:
+    """One frame's laws as long as all kinds of contacts obey the same.
+
+    Attributes
+    ----------
+    frame
+        The frame.
+    encounters
+        The contacts as they were observed.
+    axes
+        The examples of each axis, and its law.
+    inside
+        Contacts whose change of velocity lies along the frame's axes.
+    bits
+        Description length.
+    """
+
+    frame: str
+    encounters: Encounters
+    axes: tuple[tuple[AxisExamples, KindsFit], ...]
+    inside: NDArray[np.bool_]
+    bits: float
+
+    @classmethod
+    def of(
+        cls, frame: str, encounters: Encounters, limit: float, *, rng: np.random.Generator
+    ) -> _Draft | None:
+        """Learn the laws; None where the frame isn't offered, and as soon as they need as many bits as `limit`."""
+        seen = encounters.at_points() if frame == POINT else encounters
+        if seen is None:
+            return None
+        axes = axes_of(frame, seen.bearings, seen.free)
+        letters = axis_names(frame, len(seen.now))
+        inside = _inside(axes, seen)
+        bits, known = _outside_bits(axes, seen, inside), []
+        for k in range(len(axes)):
+            examples = _axis_examples(k, letters, axes, seen)
+            fit = fit_together(examples, seen.kinds, seen.names, rng=rng)
+            known.append((examples, fit))
+            bits += fit.bits
+            if bits >= limit:
+                return None
+        return cls(frame, encounters, tuple(known), inside, bits)
+
+    @property
+    def whole(self) -> bool:
+        """Whether it explains every contact."""
+        return bool(self.inside.all()) and all(bool(fit.explained.all()) for _, fit in self.axes)
+
+    def split(self, limit: float, *, rng: np.random.Generator) -> PairFit:
+        """Tell kinds apart where that is shorter; in vain, it may stop at as many bits as `limit`."""
+        seen, explained, laws = self.encounters, self.inside.copy(), []
+        bits = self.bits
+        for examples, together in self.axes:
+            room = limit - bits + together.bits
+            fit = fit_apart(examples, seen.kinds, seen.names, together, room, rng=rng)
+            bits += fit.bits - together.bits
+            explained &= fit.explained
+            laws.append(fit.laws)
+        found = PairFit(PairLaw(self.frame, tuple(laws), bits), explained)
+        return _gripped(found, seen) if self.frame == POINT else found
+
+
+def _inside(axes: list[FloatArray], encounters: Encounters) -> NDArray[np.bool_]:
     rest = encounters.after - encounters.free
     for axis in axes:
         rest = rest - dot(rest, axis) * axis
-    explained = norm(rest) <= 2.0 * encounters.tolerance
-    # Each axis that the frame lacks, and each that its law misses, has to be stated number by number.
-    bits = EXCEPTION_BITS * max(1, len(encounters.now) - len(axes)) * float((~explained).sum())
-    for k in range(len(axes)):
-        examples = _axis_examples(k, letters, axes, encounters)
-        found, fits = _fit_kinds(examples, encounters, limit - bits, rng=rng)
-        laws.append(found)
-        explained &= fits
-        bits += sum(law.bits for law in found)
-        if bits >= limit:
-            return None
-    return PairFit(PairLaw(frame, tuple(laws), bits), explained)
+    inside: NDArray[np.bool_] = norm(rest) <= 2.0 * encounters.tolerance
+    return inside
 
 
-def _fit_points(
-    frame: str, encounters: Encounters, limit: float, *, rng: np.random.Generator
-) -> PairFit | None:
-    """The law of the points that touch, and how much of it the bodies' velocities feel."""
+def _outside_bits(axes: list[FloatArray], encounters: Encounters, inside: NDArray[np.bool_]) -> float:
+    """Each axis that the frame lacks has to be stated number by number."""
+    return EXCEPTION_BITS * max(1, len(encounters.now) - len(axes)) * float((~inside).sum())
+
+
+def _gripped(found: PairFit, encounters: Encounters) -> PairFit:
+    """The law of the points that touch, with how much of what happens there the bodies' velocities feel."""
     points = encounters.at_points()
-    found = None if points is None else _fit_frame(frame, points, limit, rng=rng)
-    if points is None or found is None:
-        return None
+    assert points is not None, "the frame was offered"
     normal, told = encounters.bearings.normal, TOLD * encounters.tolerance
-    change, whole = (e.after - e.free for e in (encounters, points))
-    felt, slid = (c - dot(c, normal) * normal for c in (change, whole))
+    felt, slid = (_across(e.after - e.free, normal) for e in (encounters, points))
     acts = found.explained & (norm(slid) > told)
-    grips, explained, bits = [], found.explained.copy(), found.law.bits
-    for k in np.unique(encounters.kinds).tolist():
+    grips, explained = [], found.explained.copy()
+    for k in np.unique(encounters.kinds[acts]).tolist():
         part = encounters.kinds == k
-        if not (part & acts).any():
-            continue
         rows = part & acts
         grip = float(np.median(dot(felt, slid)[rows] / dot(slid, slid)[rows]))
-        left = norm(felt - grip * slid)
-        explained &= ~part | (left <= 2.0 * encounters.tolerance)
+        explained &= ~part | (norm(felt - grip * slid) <= 2.0 * encounters.tolerance)
         grips.append((encounters.names[k], grip))
+    constant = CONSTANT_BITS + 0.5 * float(np.log2(len(encounters)))
+    bits = found.law.bits + constant * len({f"{grip:.6g}" for _, grip in grips})
     bits += EXCEPTION_BITS * float((found.explained & ~explained).sum())
-    bits += (CONSTANT_BITS + 0.5 * float(np.log2(len(encounters)))) * len({f"{g:.6g}" for _, g in grips})
     return PairFit(replace(found.law, bits=bits, grips=tuple(grips)), explained)
+
+
+def _across(change: FloatArray, normal: FloatArray) -> FloatArray:
+    """The part of a change across a normal."""
+    return change - dot(change, normal) * normal
 
 
 def _axis_examples(
@@ -170,86 +238,3 @@ def _axis_examples(
     return AxisExamples(
         tuple(columns), x, dot(encounters.after, axes[k]), f"u_{letters[k]}", encounters.tolerance
     )
-
-
-def _fit_kinds(
-    examples: AxisExamples, encounters: Encounters, limit: float, *, rng: np.random.Generator
-) -> tuple[tuple[AxisLaw, ...], NDArray[np.bool_]]:
-    """One law for all kinds of contacts, or several where that is shorter: materials differ.
-
-    Several are given up as soon as they need as many bits as `limit`.
-    """
-    present = np.unique(encounters.kinds)
-    whole = fit_axis(examples, rng=rng)
-    everyone = tuple(encounters.names[k] for k in present)
-    pooled = _law(whole, everyone, examples)
-    if whole.explained.all() or len(present) == 1:
-        return (pooled,), whole.explained
-    groups = _alike(examples, _groups(examples, encounters.kinds, present, limit, rng=rng))
-    if len(groups) < 2:
-        return (pooled,), whole.explained
-    explained = np.zeros(len(examples), dtype=bool)
-    laws = []
-    for fit, members, rows in groups:
-        explained[rows] = fit.explained
-        laws.append(_law(fit, tuple(encounters.names[k] for k in members), examples.rows(rows)))
-    naming = float(len(present) * np.log2(len(groups)))
-    if sum(law.bits for law in laws) + naming >= pooled.bits:
-        return (pooled,), whole.explained
-    return tuple(laws), explained
-
-
-def _groups(
-    examples: AxisExamples,
-    kinds: NDArray[np.intp],
-    present: NDArray[np.intp],
-    limit: float,
-    *,
-    rng: np.random.Generator,
-) -> list[tuple[AxisFit, list[int], NDArray[np.intp]]]:
-    """Kinds that share a law: the fit, the kinds and their rows, the most frequent kinds first.
-
-    None at all as soon as they need as many bits as `limit`.
-    """
-    groups: list[tuple[AxisFit, list[int], NDArray[np.intp]]] = []
-    for kind in sorted(present.tolist(), key=lambda k: (-int((kinds == k).sum()), k)):
-        rows = np.flatnonzero(kinds == kind)
-        for g, (fit, members, theirs) in enumerate(groups):
-            # Separate fits know different pieces: the larger group's form is tried on both together.
-            both = np.concatenate([theirs, rows])
-            joint = refitted(examples.rows(both), fit.operator, fit.pieces)
-            if joint.explained[len(theirs) :].mean() >= JOINS:
-                groups[g] = (joint, [*members, kind], both)
-                break
-        else:
-            groups.append((fit_axis(examples.rows(rows), rng=rng), [kind], rows))
-            if sum(fit.bits for fit, _, _ in groups) >= limit:
-                return []
-    return groups
-
-
-def _alike(
-    examples: AxisExamples, groups: list[tuple[AxisFit, list[int], NDArray[np.intp]]]
-) -> list[tuple[AxisFit, list[int], NDArray[np.intp]]]:
-    """Decide ties by analogy: a form that a law without rivals has needs to be stated only once."""
-    settled = {_form(fit.operator, fit.pieces) for fit, _, _ in groups if not fit.rivals}
-    result = []
-    for fit, members, rows in groups:
-        every = [(fit.operator, fit.pieces), *fit.rivals]
-        familiar = [each for each in every if _form(*each) in settled]
-        if fit.rivals and len(familiar) == 1:
-            fit = refitted(examples.rows(rows), *familiar[0])
-        result.append((fit, members, rows))
-    return result
-
-
-def _form(operator: Operator, pieces: tuple[Piece, ...]) -> tuple[Operator, tuple[tuple[str, ...], ...]]:
-    """A law without its numbers."""
-    return operator, tuple(sorted(tuple(name for name, _ in piece.terms) for piece in pieces))
-
-
-def _law(fit: AxisFit, kinds: tuple[Kind, ...], examples: AxisExamples) -> AxisLaw:
-    # Sides of 0 on which no velocity was ever seen: what ends there would be outside experience.
-    signs = (bool((examples.y < -examples.tolerance).any()), bool((examples.y > examples.tolerance).any()))
-    unexplained = int((~fit.explained).sum())
-    return AxisLaw(fit.pieces, fit.operator, kinds, fit.rivals, signs, len(examples), unexplained, fit.bits)

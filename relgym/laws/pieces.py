@@ -70,7 +70,11 @@ class AxisExamples:
 
     def explains(self, piece: Piece) -> NDArray[np.bool_]:
         """Which examples a piece explains."""
-        fits: NDArray[np.bool_] = np.abs(self.y - self.values(piece)) <= self.tolerance
+        return self.near(piece, 1.0)
+
+    def near(self, piece: Piece, factor: float) -> NDArray[np.bool_]:
+        """Which examples a piece explains within so many tolerances."""
+        fits: NDArray[np.bool_] = np.abs(self.y - self.values(piece)) <= factor * self.tolerance
         return fits
 
 
@@ -110,13 +114,18 @@ def _search(part: AxisExamples, everything: AxisExamples, *, rng: np.random.Gene
     best: tuple[float, Piece] | None = None
     for base, columns in _subsets(part):
         for weights in _promising(sample, base, columns, rng=rng):
-            piece = _refined(_piece(part, base, columns, weights), base, part)
+            rough = _piece(part, base, columns, weights)
+            loose = part.near(rough, LOOSE)
+            least = 0.0 if best is None else best[0] + 1.0
+            if EXCEPTION_BITS * int(loose.sum()) <= least:
+                continue  # no fit would save more
+            piece = _refined(rough, loose, base, part)
             if piece is None:
                 continue
             saved = EXCEPTION_BITS * int(part.explains(piece).sum())
             saved -= (CONSTANT_BITS + 0.5 * np.log2(len(everything))) * piece.free_parameters()
             saved -= 2.0 * len(piece.terms)
-            if saved > 0.0 and (best is None or saved > best[0] + 1.0):
+            if saved > least:
                 best = (saved, piece)
     return None if best is None else best[1]
 
@@ -144,10 +153,13 @@ def _promising(
     if not solved.any():
         return []
     weights = weights[solved]
-    contributions = weights[:, None, :] * x
-    acts = (np.abs(contributions) > ACTING * sample.tolerance).all(axis=2)
-    close = np.abs(y - contributions.sum(axis=2)) <= LOOSE * sample.tolerance
-    counts = (acts & close).sum(axis=1)
+    hits, left = np.ones((len(weights), n), dtype=bool), y
+    for k in range(p):
+        contribution = weights[:, k, None] * x[:, k]
+        hits &= np.abs(contribution) > ACTING * sample.tolerance
+        left = left - contribution
+    hits &= np.abs(left) <= LOOSE * sample.tolerance
+    counts = np.count_nonzero(hits, axis=1)
     best = int(counts.argmax())
     return [weights[best]] if counts[best] >= p + 2 else []
 
@@ -193,11 +205,8 @@ def _piece(
     return Piece(((examples.free, 1.0), *terms) if base else tuple(terms))
 
 
-def _refined(piece: Piece, base: bool, examples: AxisExamples) -> Piece | None:
-    """The piece fitted to what it explains, as far as that determines it."""
-    loose = AxisExamples(
-        examples.names, examples.x, examples.y, examples.free, LOOSE * examples.tolerance
-    ).explains(piece)
+def _refined(piece: Piece, loose: NDArray[np.bool_], base: bool, examples: AxisExamples) -> Piece | None:
+    """The piece fitted to what it explains, `loose` at first, as far as that determines it."""
     for _ in range(3):
         if loose.sum() < len(piece.terms) + 1:
             return None

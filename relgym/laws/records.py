@@ -176,6 +176,16 @@ class PairLaw:
         known = next((law for law in laws if kind in law.kinds), None)
         return laws[0] if known is None and len(laws) == 1 else known
 
+    @property
+    def examples(self) -> int:
+        """Contacts that it was learned from."""
+        return sum(law.examples for law in self.axes[0])
+
+    @property
+    def unexplained(self) -> int:
+        """Numbers among them, one for each axis of a contact, that it doesn't explain."""
+        return sum(law.unexplained for laws in self.axes for law in laws)
+
     def grip(self, kind: Kind) -> float:
         """The grip of a kind of contact; that of all kinds, if they agree, for one never seen; else NaN."""
         known = dict(self.grips)

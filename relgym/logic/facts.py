@@ -6,8 +6,9 @@ The thesis adds a time argument to every relation; here it is the first axis of 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -63,13 +64,16 @@ class Facts:
     def __post_init__(self) -> None:
         if self.exists.ndim != 2 or self.exists.dtype != np.bool_:
             raise ConfigError(f"exists: expected booleans of shape (W, K), got {_kind(self.exists)}.")
+        for name, relation in self.relations.items():
+            self._check(name, relation, np.dtype(np.bool_))
+        self._check_numeric()
+
+    def _check_numeric(self) -> None:
         both = sorted(set(self.relations) & set(self.numeric))
         if both:
             raise ConfigError(
                 f"{both[0]!r} names both a relation and a numeric function; rename one of them."
             )
-        for name, relation in self.relations.items():
-            self._check(name, relation, np.dtype(np.bool_))
         for name, values in self.numeric.items():
             self._check(name, values, np.dtype(np.float64))
 
@@ -101,7 +105,11 @@ class Facts:
 
     def with_numeric(self, numeric: Mapping[str, Float], relative: frozenset[str] | None = None) -> Facts:
         """Return the same relations with other numeric functions; nothing is copied."""
-        return replace(self, numeric=numeric, relative=self.relative if relative is None else relative)
+        found = copy.copy(self)  # the relations have been checked
+        object.__setattr__(found, "numeric", numeric)
+        object.__setattr__(found, "relative", self.relative if relative is None else relative)
+        found._check_numeric()
+        return found
 
     def relation(self, name: str) -> Bool:
         """Return a relation, shape (W, K, …), that is false wherever an argument doesn't exist."""

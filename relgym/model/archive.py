@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.model.motion import Laws
 from relgym.model.parts import Parts
 from relgym.model.storage import schema_from_json, schema_to_json, target_from_json, target_to_json
 
@@ -50,13 +49,11 @@ def parts_from_json(body: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     """Read what `parts_to_json` and `parts_to_arrays` wrote; without arrays it can only predict."""
     schema = schema_from_json(body["schema"])
     targets = [target_from_json(part["target"]) for part in body["targets"]]
-    parts = Parts(schema, ModelConfig.from_json(body["config"]), targets)
-    parts.open = bool(body["open"])
-    if parts.laws is not None and parts.open:
-        parts.laws = Laws(schema, None, parts.config)
-    types = {t.name: t for t in schema.types}
+    parts = Parts(schema, ModelConfig.from_json(body["config"]), None if body["open"] else targets)
+    for target in targets if parts.open else ():
+        parts.add_target(target)
     for k, type_name in enumerate(sorted(parts.tables) if arrays is not None else ()):
-        parts.tables[type_name].restore(body["tables"][k], _of(arrays, f"table{k}."), types)
+        parts.tables[type_name].restore(body["tables"][k], _of(arrays, f"table{k}."), parts.signature_of)
     for k, target in enumerate(targets):
         parts.models[target].restore(body["targets"][k]["model"], _of(arrays, f"target{k}."))
     if parts.laws is not None and body["laws"] is not None:

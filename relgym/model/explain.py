@@ -166,7 +166,7 @@ def _reasons(
     model: WorldModel, part: PropertyModel, scene: Scene, index: int, following: Scene, chosen: int
 ) -> tuple[Reason, ...]:
     percept = model.percept(scene)
-    example = percept.situation(index).examples[0]
+    example = part.example(percept, index, following.vector)
     values = part.mode_values(percept, index, following.vector)
     names = [scene.layout.names[i] for i in scene.layout.bodies if index in scene.layout.bodies]
     by_mode = dict(zip(part.classifier.modes, values, strict=True))

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
+from relgym.model.chaining import CHECK_AT, revise
+from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.property_model import bodies_of
-from relgym.model.scenes import next_values
+from relgym.model.scenes import next_values, unwrapped
 from relgym.scene.objects import Transition
 
 __all__ = ["LearnReport", "finish", "learn"]
@@ -43,7 +45,7 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
     before, after = transition.before, transition.after
     if parts.open:
         parts.discover_targets(before, after)
-    following = next_values(before, after)
+    following = unwrapped(before.layout, before.vector, next_values(before, after))
     reports: dict[tuple[str, str], ClusterReport] = {}
     for type_name in dict.fromkeys(t.type for t in parts.targets):
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
@@ -51,6 +53,10 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
         for index in before.layout.of_type(type_name):
             if before.layout.names[index] in after:
                 _learn_object(parts, percept, index, following, reports)
+    for type_name, table in parts.tables.items():
+        if parts.open and table.seen in CHECK_AT:
+            revise(parts, type_name)
+        forget(table, [m for t, m in parts.models.items() if t.type == type_name], parts.config.history)
     if parts.laws is not None:
         stays = {i: name in after for i, name in enumerate(before.layout.names)}
         parts.laws.learn_one(percept, following, stays, parts.models)

@@ -20,7 +20,7 @@ from relgym.model.prediction import OUTCOMES, Outcome, Prediction
 from relgym.model.property_model import PropertyModel, Verdict
 from relgym.scene.objects import ACTION, SceneSchema, Target
 
-__all__ = ["FREE", "TOUCHING", "Laws", "mode_bits"]
+__all__ = ["FREE", "TOUCHING", "Laws", "mode_bits", "possible_targets"]
 
 FREE, TOUCHING = 1, 2
 """What predictions by laws name in place of a mode: the free law, or laws of touching pairs on top of it."""
@@ -53,7 +53,7 @@ class Laws:
 
     def __init__(self, schema: SceneSchema, targets: tuple[Target, ...] | None, config: ModelConfig) -> None:
         noise = config.clustering.noise_std
-        known = _possible(schema) if targets is None else targets
+        known = possible_targets(schema) if targets is None else targets
         self.learner = LawLearner(schema, known, seed=config.seed, noise_std=noise)
         self.governed: frozenset[str] = frozenset()
         self._components = {
@@ -203,7 +203,7 @@ def mode_bits(part: PropertyModel, columns: int) -> float:
     return stated + labels + EXCEPTION_BITS * noise
 
 
-def _possible(schema: SceneSchema) -> tuple[Target, ...]:
+def possible_targets(schema: SceneSchema) -> tuple[Target, ...]:
     """Everything that may become a target when a model finds its targets itself."""
     derived = {(k.type, k.property) for k in schema.kinematics}
     return tuple(

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
-from relgym.model.motion import Laws
+from relgym.model.chaining import in_order
+from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch
-from relgym.scene.objects import ACTION, Scene, SceneLayout, SceneSchema, Target
+from relgym.scene.objects import ACTION, TASK, Scene, SceneLayout, SceneSchema, Target
 
 __all__ = ["Parts"]
 
@@ -54,8 +57,14 @@ class Parts:
         self.open = targets is None
         self.targets: tuple[Target, ...] = ()
         given = tuple(dict.fromkeys(pair for t in targets or () for pair in t.given))
+        chained = tuple((t.type, t.property) for t in possible_targets(schema)) if self.open else ()
         self.perception = Perception(
-            schema, given, config.geometry, parting=config.classification.contact_facts
+            schema,
+            given,
+            config.geometry,
+            chained=chained,
+            features=config.features,
+            parting=config.classification.contact_facts,
         )
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}
@@ -110,8 +119,10 @@ class Parts:
             raise ConfigError(
                 f"target {target} can't be learned: it comes from outside the world; leave it out"
             )
-        self.targets = (*self.targets, target)
-        self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config)
+        if self.open and t.name == TASK:  # worth is a function of what was, what was done and what came of it
+            target = replace(target, given=tuple(p for p in self.perception.chained if p[0] != TASK))
+        self.targets = in_order((*self.targets, target)) if self.open else (*self.targets, target)
+        self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config, self.schema)
         self.tables.setdefault(target.type, ExampleTable())
 
     def discover_targets(self, before: Scene, after: Scene) -> None:
@@ -126,6 +137,22 @@ class Parts:
                 known = any(x.type == t.name and x.property == prop for x in self.targets)
                 if not known and (t.name, prop) not in derived and prop not in t.exogenous:
                     self.add_target(Target(t.name, prop))
+
+    def retarget(self, target: Target, other: Target) -> None:
+        """Put another target of the same property in a target's place; it begins anew, order included."""
+        model = self.models.pop(target)
+        model.retarget(other, self.tables[target.type])
+        self.models[other] = model
+        self.targets = in_order(other if t == target else t for t in self.targets)
+
+    def lead(self, rate: tuple[str, str], prop: str, step: float) -> None:
+        """Take note that a property follows a rate: ``prop' = prop + step * rate'``."""
+        model = self.property_model(*rate)
+        model.lead(prop, step, self.tables[rate[0]])
+
+    def signature_of(self, names: tuple[str, ...]) -> SlotSignature:
+        """The slot signature of types of these names."""
+        return self.perception.signature_of(tuple(self.schema.type(name) for name in names))
 
     def property_model(self, type_name: str, prop: str) -> PropertyModel:
         """The model of one target; `QueryError` when there is none."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
-from relgym.model.grouping import distinct, members
+from relgym.clustering.features import library_of
+from relgym.model.grouping import distinct
 from relgym.scene.contacts import APPROACH_EPS
 from relgym.scene.context import canonical_order, signature, slots
 from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, poses
@@ -71,18 +72,25 @@ class Situation:
     @cached_property
     def examples(self) -> ExampleBatch:
         """Relations and numbers for classifiers."""
-        return self._percept.examples(self._target, self._body, None)
+        return replace(self._bare, table=self._percept.relations.table) if self._body >= 0 else self._bare
 
     def glimpse(self, relations: Collection[str]) -> ExampleBatch:
         """`examples` in which only these binary relations can be told; the others hold nowhere."""
-        if "examples" in self.__dict__:
-            return self.examples
-        return self._percept.examples(self._target, self._body, relations)
+        if self._body < 0:
+            return self._bare
+        return replace(self._bare, table=self._percept.relations.table_of(relations))
+
+    @cached_property
+    def _bare(self) -> ExampleBatch:
+        """`examples` without binary relations."""
+        return self._percept.bare_examples(self._target, self._body)
 
     @cached_property
     def _numbers(self) -> NDArray[np.intp]:
         percept = self._percept
-        return canonical_order(percept.relations, self._body, poses(percept.layout, percept.vectors))
+        return canonical_order(
+            percept.relations, self._body, lambda rows: poses(percept.layout, percept.vectors[rows])
+        )
 
 
 class Perception:
@@ -96,6 +104,10 @@ class Perception:
         (type, property) pairs whose next values some target may use.
     geometry
         ``"arrays"`` (default) or ``"fcl"``.
+    chained
+        The same for pairs whose causal order is still to be found.
+    features
+        Non-linear features, as in `ModelConfig.features`.
     parting
         Whether a body that the target is leaving is left out of its close set, if it touches another one (default).
         It is a contact fact: the thesis knew none, and there such a body is as close as any that is touched.
@@ -107,11 +119,15 @@ class Perception:
         given: tuple[tuple[str, str], ...] = (),
         geometry: Literal["arrays", "fcl"] = "arrays",
         *,
+        chained: tuple[tuple[str, str], ...] = (),
+        features: tuple[str, ...] = (),
         parting: bool = True,
     ) -> None:
         self.schema = schema
         self.parting = parting
         self.given = given
+        self.chained = chained
+        self.libraries = {t.name: library_of(features, t.name, t.angles) for t in schema.types}
         self.extractor = Extractor(schema, geometry=geometry)
         self._contact_names = self.extractor.features
         self._pair_names = tuple(sorted({p for t in schema.types if t.has_body for p in _free(t)}))
@@ -156,7 +172,8 @@ class Perception:
     def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:
         """The slot signature of these types."""
         if (known := self._signatures.get(types)) is None:
-            known = self._signatures[types] = SlotSignature(types, self.given)
+            library = self.libraries[types[0].name]
+            known = self._signatures[types] = SlotSignature(types, self.given, self.chained, library)
         return known
 
     def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
@@ -241,21 +258,19 @@ class Percept:
         if not ordered or len(self) == 1:
             order = place.order[0] if ordered else place.plain
             return both[:, self.perception.gather(self.layout, place.signature, tuple(order.tolist()))]
-        rows = np.empty((len(self), len(place.signature.columns)))
         first, which = distinct(place.order)
-        for order, part in zip(place.order[first], members(which), strict=True):
-            columns = self.perception.gather(self.layout, place.signature, tuple(order.tolist()))
-            rows[part] = both[part][:, columns]
-        return rows
+        orders = [tuple(order) for order in place.order[first].tolist()]
+        columns = [self.perception.gather(self.layout, place.signature, order) for order in orders]
+        return np.take_along_axis(both, np.array(columns)[which], axis=1)
 
-    def examples(self, target: int, body: int, relations: Collection[str] | None) -> ExampleBatch:
-        """What classifiers are shown of an object; `Situation` says more."""
-        return self._bodiless(target) if body < 0 else self._embodied(body, target, relations)
+    def bare_examples(self, target: int, body: int) -> ExampleBatch:
+        """What classifiers are shown of an object, its binary relations left aside; `Situation` says more."""
+        return self._bodiless(target) if body < 0 else self._embodied(body, target)
 
     def _padded(self) -> NDArray[np.float64]:
         return np.concatenate([self.vectors, np.full((len(self), 1), np.nan)], axis=1)
 
-    def _embodied(self, body: int, target: int, names: Collection[str] | None) -> ExampleBatch:
+    def _embodied(self, body: int, target: int) -> ExampleBatch:
         perception, relations, n = self.perception, self.relations, len(self)
         padded = self._padded()
         own = padded[:, perception.own_columns(self.layout, target)]
@@ -270,11 +285,11 @@ class Percept:
         pair[:, body] = np.nan
         table = perception.unary_table(self.layout)
         every = np.broadcast_to(table, (n, *table.shape))
-        shown = relations.table if names is None else relations.table_of(names)
+        nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
         close = relations.context(body)
         if perception.parting:
             close = _without(close, parting)
-        return ExampleBatch(shown, every, close, pair, own, body)
+        return ExampleBatch(nothing, every, close, pair, own, body)
 
     def _bodiless(self, target: int) -> ExampleBatch:
         """An object without a body stands alone: no relations, only numbers."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import enum
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,9 @@ class Outcome(enum.Enum):
 
     PREDICTED = "predicted by a mode"
     NO_MODE = "no mode learned yet: learn from more transitions"
+    UNEXPLAINED = (
+        "unexplained: no law of the form that is looked for describes it; the report says what might"
+    )
     NO_ROLES = "no mode's roles could be filled by the objects in the scene"
     OUTSIDE = "outside experience: nothing like this situation was seen in training"
     DEPENDS = "depends on another property that could not be predicted"
@@ -53,6 +57,9 @@ class Prediction:
     frame
         Axes in which what predicted it is stated: ``"world"`` for modes; laws of touching pairs name their own
         (`relgym.laws.frames`), and then the roles are the target and all that it touches.
+    spread
+        Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
+        among a few) left, in units of the property; NaN where no mode predicts.
     """
 
     object: str
@@ -63,6 +70,7 @@ class Prediction:
     roles: tuple[str, ...] = ()
     margin: float = 0.0
     frame: str = "world"
+    spread: float = math.nan
 
     @builtins.property  # `property` is a field here
     def ok(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,23 +14,32 @@ from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.mode_classifier import ModeClassifier
 from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
-from relgym.clustering.columns import SlotSignature
+from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
+from relgym.model.conditions import Conditions
 from relgym.model.grouping import distinct, members
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
-from relgym.scene.objects import SceneLayout, Target
+from relgym.model.spread import Spreads, action_columns, measure
+from relgym.scene.objects import SceneLayout, SceneSchema, Target
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
-_PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE = (
-    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE)
+_PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
+    OUTCOMES.index(o)
+    for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
 )
+
+MEASURE_EVERY = 256
+"""Spreads are measured after so many examples, and whenever the modes change."""
+
+HOPELESS, DOUBTFUL = 200, 500
+"""Without a mode after so many examples there is no law; with most of so many recent ones unexplained, hardly one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,29 +60,67 @@ class PropertyModel:
     target
         What it predicts.
     vocabulary
-        Names of what its classifiers are shown.
+        Names of what its classifiers are shown, next values left aside.
     config
         Free parameters.
+    schema
+        The scenes' schema.
 
     Attributes
     ----------
     clusterer, classifier, casting
         The learners of modes, of their preconditions and of who plays their roles.
+    spreads
+        How far examples scatter about their modes.
     limits
         Which modes are limits: they take no part in the vote but cut off what its winner predicts.
     """
 
-    def __init__(self, target: Target, vocabulary: Vocabulary, config: ModelConfig) -> None:
+    def __init__(
+        self, target: Target, vocabulary: Vocabulary, config: ModelConfig, schema: SceneSchema
+    ) -> None:
         self.target = target
         self.config = config
+        self.schema = schema
+        self.conditions = Conditions(schema, target)
+        self._base = vocabulary
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
-        self.classifier = ModeClassifier(vocabulary, config.classification)
+        self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classification)
         self.casting = Casting(vocabulary, config.classification)
+        self.spreads = Spreads()
+        self._unexplained = False
         self.limits = Limits()
         self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_bindings": {}}  # keyed by identity, which a copy doesn't share
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether it is known by now that modes don't describe the target, or just some of its examples."""
+        return self._unexplained
+
+    def _judge(self) -> bool:
+        seen = self.clusterer.seen
+        if not self.clusterer.clusters:
+            return seen >= HOPELESS
+        return seen >= DOUBTFUL and bool((self.clusterer.labels[-DOUBTFUL:] == NOISE).mean() > 0.5)
+
+    @property
+    def needs(self) -> frozenset[tuple[str, str]]:
+        """(type, property) pairs whose next values a mode's function reads or a clause tests."""
+        if not self.target.given:
+            return frozenset()
+        names = {
+            name for c in self.clusterer.clusters.values() for role in c.mode.roles for name, _ in role.terms
+        }
+        for c in self.classifier.classifiers:
+            names |= {literal.relation for clause in c.definition.clauses for literal in clause}
+            trees = [tree for tree in (*c.clause_trees, c.fall_through_tree) if tree is not None]
+            names |= {tree.columns[k] for tree in trees for k in tree.column if k >= 0}
+        words = {word for name in names for word in re.findall(r"[\w.]+'", name)}
+        bare = {word.rpartition(".")[2] for word in words}
+        return frozenset(pair for pair in self.target.given if pair[1] + PRIME in bare)
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -104,12 +152,17 @@ class PropertyModel:
             How the target object is situated, in a single scene.
         """
         report = self.clusterer.learn_one(table, row, y)
+        self._unexplained = self._judge()
+        if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
+            self.spreads = measure(self.clusterer, table)
         if report.changed or self.limits.overstepped(y, self.clusterer.scale.tolerance):
             self._follow(table)
         number = len(self.clusterer.y) - 1
-        seen = replace(example, row=number)
+        x = table.x[row : row + 1]
+        own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
+        seen = replace(example, row=number, own=own)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
-        values = np.array(self._values_one(situation.signature, table.x[row].tolist()))
+        values = np.array(self._values_one(situation.signature, x[0].tolist()))
         assigned = UNKNOWN if report.mode == NOISE or report.mode in self.limits else report.mode
         played = self._played(table, np.array([number]), report.mode)[0].tolist()
         self.classifier.observe(seen, assigned, fits, values, roles=played)
@@ -117,11 +170,42 @@ class PropertyModel:
             self.casting.observe(self.mode(report.mode), seen, played)
         return report
 
+    def keep(self, rows: NDArray[np.bool_]) -> None:
+        """Forget the examples of dropped rows of the example table, shape ``(rows,)``."""
+        numbers = self.clusterer.keep(rows)
+        exemplars = self.classifier.exemplars.columns["row"]
+        exemplars[:] = numbers[exemplars]
+
     def refresh(self, budget: int | None) -> int:
         """Re-learn stale classifiers within a budget of work (None: all); returns the work spent."""
         left = float("inf") if budget is None else budget
         spent = self.classifier.refresh(left)
         return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
+
+    def retarget(self, target: Target, table: ExampleTable) -> None:
+        """Be given other next values: modes and classifiers are learned again, from what is remembered."""
+        self.target = target
+        self.conditions = Conditions(self.schema, target)
+        self.clusterer.retarget(target)
+        self.casting = Casting(self._base, self.config.classification)
+        self._follow(table)
+        self._widen(table, self.classifier.vocabulary.follows)
+
+    def lead(self, prop: str, step: float, table: ExampleTable) -> None:
+        """Take note that ``prop' = prop + step * target'``: clauses may test where that leads to."""
+        others = tuple(pair for pair in self.classifier.vocabulary.follows if pair[0] != prop)
+        self._widen(table, (*others, (prop, step)))
+
+    def _widen(self, table: ExampleTable, follows: tuple[tuple[str, float], ...]) -> None:
+        exemplars = self.classifier.exemplars
+        rows = self.clusterer.rows[exemplars.rows.astype(np.intp)]
+        ahead = np.full((len(rows), len(self.conditions.pairs)), np.nan)
+        for number in np.unique(table.signature_ids[rows]):
+            part = np.flatnonzero(table.signature_ids[rows] == number)
+            ahead[part] = self.conditions.values(table.signatures[int(number)], table.x[rows[part]])
+        own = exemplars.columns["own"][:, : len(self._base.own)]
+        vocabulary = self.conditions.vocabulary(self._base, follows)
+        self.classifier.widen(vocabulary, np.concatenate([own, ahead], axis=1))
 
     def _follow(self, table: ExampleTable) -> None:
         """The set of modes changed: what the classifiers remember is labelled anew."""
@@ -238,6 +322,23 @@ class PropertyModel:
         x = percept.rows(index, following[None])[0].tolist()
         return self._values_one(percept.situation(index).signature, x)
 
+    def example(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Example:
+        """What the classifiers are shown of a single scene; arguments as of `predict_one`."""
+        situation = percept.situation(index)
+        x = percept.rows(
+            index, following[None], ordered=False
+        )  # conditions are of objects alone of their type
+        return replace(self._shown(situation, x), key=situation.keys[0])
+
+    def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
+        """`example` without the key, by which examples are kept and not classified."""
+        first = situation.examples[0]
+        if not self.conditions.pairs:
+            return first
+        return replace(
+            first, own=np.concatenate([first.own, self.conditions.values(situation.signature, x)[0]])
+        )
+
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
 
@@ -251,22 +352,24 @@ class PropertyModel:
             Next values predicted so far, shape ``(width,)``.
         """
         situation = percept.situation(index)
-        nothing = Prediction("", "", float("nan"), Outcome.NO_MODE)
-        if not self.classifier.modes:
+        outcome = Outcome.UNEXPLAINED if self._unexplained else Outcome.NO_MODE
+        nothing = Prediction("", "", float("nan"), outcome)
+        if self._unexplained or not self.classifier.modes:
             return nothing
-        x = percept.rows(index, following[None])[0].tolist()
-        example = replace(situation.examples[0], key=situation.keys[0])
+        casts = self._casts(situation.signature)
+        row = percept.rows(index, following[None], ordered=casts)
+        x, example = row[0].tolist(), self._shown(situation, row)
         ranking = self.classifier.rank(example, self._values_one(situation.signature, x))
         if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
             return replace(nothing, outcome=Outcome.OUTSIDE)
-        layout = percept.layout
+        layout, order = percept.layout, situation.order[0] if casts else situation.plain
         for place, mode in enumerate(ranking.modes):
             binding = self._binding(situation.signature, mode)
             if binding is None:
                 continue
             slots: tuple[int, ...] | None = ()
             if binding.open:
-                slots = self._cast(mode, binding, example, situation.order[0], layout)
+                slots = self._cast(mode, binding, example, order, layout)
             if slots is None:
                 if not self.config.abstain:
                     continue
@@ -274,10 +377,12 @@ class PropertyModel:
                 return replace(nothing, outcome=Outcome.OUTSIDE)
             rest = iter(slots)
             played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
-            roles = tuple(layout.names[situation.order[0, s]] for s in played)
+            roles = tuple(layout.names[order[s]] for s in played)
             margin = ranking.margin if place == 0 else 0.0
             found = Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
-            return self.limits.cut_off(found)
+            found = self.limits.cut_off(found)
+            action = tuple(x[k] for k in action_columns(situation.signature).tolist())
+            return replace(found, spread=self.spreads.of(found.mode, action))
         return replace(nothing, outcome=Outcome.NO_ROLES)
 
     def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
@@ -297,7 +402,9 @@ class PropertyModel:
             np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.full(n, _NO_MODE, dtype=np.int8), np.zeros(n)
         )
         modes = self.classifier.modes
-        if not modes:
+        if self._unexplained:
+            verdict.outcomes[:] = _UNEXPLAINED
+        if self._unexplained or not modes:
             return verdict
         situation = percept.situation(index)
         x = percept.rows(index, following, ordered=self._casts(situation.signature))
@@ -360,6 +467,9 @@ class PropertyModel:
             sure = np.ones(n, dtype=np.bool_)
             return RankingBatch(np.full((n, 1), modes[0]), np.zeros((n, 1)), np.full(n, np.inf), sure, sure)
         shown = situation.glimpse(self.classifier.relations)
+        if self.conditions.pairs:
+            ahead = self.conditions.values(situation.signature, x)
+            shown = replace(shown, own=np.concatenate([shown.own, ahead], axis=1))
         return self.classifier.rank_batch(shown, self._values(situation.signature, x, modes))
 
     # ------------------------------------------------------------------ saving
@@ -367,6 +477,8 @@ class PropertyModel:
         """Plain data: modes, classifiers and roles; exemplars only with history."""
         return {
             "clusterer": self.clusterer.to_json(),
+            "unexplained": self._unexplained,
+            "spreads": self.spreads.to_json(),
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
             "limits": self.limits.to_json(),
@@ -379,6 +491,8 @@ class PropertyModel:
     def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         """Take over what `to_json` and `to_arrays` wrote."""
         self.clusterer.restore(data["clusterer"], arrays)
+        self._unexplained = bool(data["unexplained"])
+        self.spreads = Spreads.from_json(data["spreads"])
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))

@@ -12,6 +12,7 @@ from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.property_model import Verdict
+from relgym.model.scenes import wrap
 from relgym.scene.objects import Scene, SceneLayout, SceneSchema, Target
 
 __all__ = ["predict", "predict_many"]
@@ -33,7 +34,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 one = parts.laws.prediction(motion, percept, index, target)
             else:
                 one = parts.models[target].predict_one(percept, index, following)
-            if not lost.isdisjoint(target.given):
+            if not lost.isdisjoint(target.given) and not lost.isdisjoint(parts.models[target].needs):
                 one = Prediction("", "", np.nan, Outcome.DEPENDS)
             column = layout.column(index, target.property)
             if not np.isfinite(one.value):
@@ -45,6 +46,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 lost.add((target.type, target.property))
             found.append(replace(one, object=layout.names[index], property=target.property))
     _derive(parts.schema, layout, scene.vector[None], following[None])
+    wrap(layout, following)
     return ScenePrediction(Scene(scene.schema, layout, following), tuple(found))
 
 
@@ -64,7 +66,7 @@ def predict_many(
                 verdict = parts.laws.verdict(motion, percept, index, target)
             else:
                 verdict = parts.models[target].predict_batch(percept, index, following)
-            for pair in target.given:
+            for pair in parts.models[target].needs if lost else ():
                 verdict.values[lost.get(pair, nowhere)] = np.nan
                 verdict.outcomes[lost.get(pair, nowhere)] = _DEPENDS
             known = np.isfinite(verdict.values)
@@ -76,6 +78,7 @@ def predict_many(
             keys.append((layout.names[index], target.property))
             verdicts.append(verdict)
     _derive(parts.schema, layout, vectors, following)
+    wrap(layout, following)
     frames = tuple(_frame(parts, target) for target in parts.targets for _ in layout.of_type(target.type))
     return _stacked(layout, following, tuple(keys), verdicts, frames)
 

@@ -11,6 +11,7 @@ from relgym.classification.role_classifier import RoleKind
 from relgym.clustering.mode import Mode
 from relgym.errors import ConfigError
 from relgym.laws.text import LEGEND, LawRow, WorldRow, law_rows, world_rows
+from relgym.model.advice import Advice
 from relgym.model.text import Cell, amount, indented, table, wrapped
 
 if TYPE_CHECKING:
@@ -34,6 +35,9 @@ _CLAUSE_WIDTH = 62
 _FUNCTION_WIDTH = 76
 """The same for functions: a report fits a terminal of 100 columns."""
 
+_ROUNDING = 0.1
+"""A spread below this fraction of the noise assumed is not worth telling."""
+
 _OTHERWISE = "otherwise"
 
 
@@ -49,11 +53,14 @@ class ModeRow:
         Training examples that it explains and that were assigned to it.
     function
         Such as ``vx' = -0.9 vx``.
+    spread
+        How far examples scatter about it, where that is more than rounding; empty otherwise.
     """
 
     mode: int
     examples: int
     function: str
+    spread: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,6 +145,8 @@ class TargetReport:
         Training examples that no mode explains.
     modes, pairs, roles
         The tables' rows. Roles without a body (the action) are left out: there is only one such object.
+    advice
+        What the target lacks, if modes don't explain it.
     """
 
     target: str
@@ -146,6 +155,7 @@ class TargetReport:
     modes: tuple[ModeRow, ...]
     pairs: tuple[PairTable, ...]
     roles: tuple[RoleRow, ...]
+    advice: Advice | None = None
 
     @property
     def examples(self) -> int:
@@ -154,14 +164,20 @@ class TargetReport:
 
     def __str__(self) -> str:
         if not self.modes:
-            return f"{self.target}: no mode learned yet, {amount(self.examples, 'example')}"
+            return f"{self.target}: no mode learned yet, {amount(self.examples, 'example')}{self._advice()}"
         head = f"{self.target}: {amount(len(self.modes), 'mode')}, {amount(self.examples, 'example')}"
         parts = [head, indented(_mode_table(self))]
         if self.pairs:
             parts.append(indented(_clause_table(self.pairs)))
         if self.roles:
             parts.append(indented(_role_table(self.roles)))
-        return "\n\n".join(parts)
+        return "\n\n".join(parts) + self._advice()
+
+    def _advice(self) -> str:
+        if self.advice is None:
+            return ""
+        first, *rest = wrapped(str(self.advice), _FUNCTION_WIDTH, "+-")
+        return "\n\n" + "\n".join([f"  advice: {first}", *(f"          {line}" for line in rest)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,6 +218,7 @@ def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
     digits
         Significant digits of coefficients.
     """
+    advice = {a.target: a for a in model.advice()}
     parts = [
         model.property_model(target.type, target.property)
         for target in model.targets
@@ -210,7 +227,9 @@ def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
     laws: tuple[LawRow, ...] = ()
     if model.laws is not None and model.governed:
         laws = law_rows(model.laws, model.governed, digits)
-    return ModelReport(model.seen, tuple(_target_report(part, digits) for part in parts), laws)
+    return ModelReport(
+        model.seen, tuple(_target_report(part, digits, advice.get(str(part.target))) for part in parts), laws
+    )
 
 
 def describe(
@@ -265,11 +284,17 @@ def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
     return table([f"{name} touching a surface at {incline:g} degrees, along the world's axes"], lines)
 
 
-def _target_report(part: PropertyModel, digits: int) -> TargetReport:
-    modes = tuple(ModeRow(m.id, m.examples, _function(part, m, digits)) for m in part.modes)
+def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> TargetReport:
+    modes = tuple(ModeRow(m.id, m.examples, _function(part, m, digits), _spread(part, m)) for m in part.modes)
     pairs = tuple(_pair_table(c) for c in part.classifier.classifiers)
     return TargetReport(
-        str(part.target), part.target.type, part.clusterer.noise_examples, modes, pairs, _role_rows(part)
+        str(part.target),
+        part.target.type,
+        part.clusterer.noise_examples,
+        modes,
+        pairs,
+        _role_rows(part),
+        advice,
     )
 
 
@@ -278,6 +303,17 @@ def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
         return mode.formula(digits)
     side = "least" if mode.id == part.limits.low else "most"
     return f"{mode.formula(digits)} at {side}: a limit to what the others predict"
+
+
+def _spread(part: PropertyModel, mode: Mode) -> str:
+    """A mode's spread in words, action by action where they differ much."""
+    known = part.spreads.by_mode.get(mode.id)
+    if known is None or known.whole <= max(part.clusterer.floor, _ROUNDING * part.clusterer.scale.sigma):
+        return ""
+    if not known.uneven():
+        return f"± {known.whole:.2g}"
+    texts = (f"± {s:.2g} after {', '.join(f'{x:g}' for x in a)}" for a, s in known.by_action.items())
+    return "; ".join(texts)
 
 
 def _pair_table(classifier: BinaryClassifier) -> PairTable:
@@ -317,6 +353,7 @@ def _mode_table(target: TargetReport) -> str:
         first, *rest = wrapped(m.function, _FUNCTION_WIDTH, "+-")
         rows.append([m.mode, m.examples, first])
         rows += [["", "", f"      {line}"] for line in rest]
+        rows += [["", "", f"      {line}"] for line in wrapped(m.spread, _FUNCTION_WIDTH, "a") if line]
     return table(["mode", "examples", "function"], rows)
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ObservationError
-from relgym.scene.objects import ACTION, Scene, SceneSchema
+from relgym.scene.objects import ACTION, Scene, SceneLayout, SceneSchema
 
-__all__ = ["mismatch", "next_values", "with_action"]
+__all__ = ["angle_columns", "mismatch", "next_values", "unwrapped", "with_action", "wrap"]
+
+TURN = 2.0 * math.pi
+"""A full turn, in radians."""
 
 
 def with_action(scene: Scene, values: Sequence[float] | NDArray[np.float64]) -> Scene:
@@ -37,6 +41,37 @@ def mismatch(schema: SceneSchema, known: SceneSchema) -> str:
         if t != types[t.name]:
             return f"type {t.name!r} has another shape, parent, pose or velocity"
     return ""
+
+
+def angle_columns(layout: SceneLayout) -> NDArray[np.intp]:
+    """Columns of a state vector that hold angles; cached on the layout."""
+    found: NDArray[np.intp] | None = layout.__dict__.get("_angle_columns")
+    if found is None:
+        places = [layout.column(i, p) for i, t in enumerate(layout.types) for p in t.angles]
+        found = layout.__dict__["_angle_columns"] = np.array(places, dtype=np.intp)
+    return found
+
+
+def unwrapped(
+    layout: SceneLayout, now: NDArray[np.float64], following: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The next values with every angle turned to within half a turn of the present one.
+
+    So that an angle that goes round at π obeys the same law there as everywhere.
+    """
+    columns = angle_columns(layout)
+    if not len(columns):
+        return following
+    turned = following.copy()
+    turned[..., columns] -= TURN * np.round((following[..., columns] - now[..., columns]) / TURN)
+    return turned
+
+
+def wrap(layout: SceneLayout, following: NDArray[np.float64]) -> None:
+    """Bring all angles into [-π, π], in place."""
+    columns = angle_columns(layout)
+    if len(columns):
+        following[..., columns] -= TURN * np.round(following[..., columns] / TURN)
 
 
 def next_values(before: Scene, after: Scene) -> NDArray[np.float64]:

@@ -193,6 +193,7 @@ def _type_to_json(t: ObjectType) -> dict[str, Any]:
         "velocity": list(t.velocity),
         "exogenous": list(t.exogenous),
         "optional": t.optional,
+        "angles": list(t.angles),
     }
 
 
@@ -206,6 +207,7 @@ def _type_from_json(data: dict[str, Any]) -> ObjectType:
         velocity=tuple(data["velocity"]),
         exogenous=tuple(data["exogenous"]),
         optional=data["optional"],
+        angles=tuple(data.get("angles", ())),
     )
 
 

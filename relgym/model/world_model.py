@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError
 from relgym.laws.book import LawBook
+from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
 from relgym.model.learning import LearnReport, finish, learn
 from relgym.model.parts import Parts
@@ -90,6 +91,11 @@ class WorldModel:
     def targets(self) -> tuple[Target, ...]:
         """What is learned, in causal order."""
         return self._parts.targets
+
+    @property
+    def history(self) -> int:
+        """Number of examples remembered of the type that has most; see `ModelConfig.history`."""
+        return max((len(table) for table in self._parts.tables.values()), default=0)
 
     def property_model(self, type_name: str, prop: str) -> PropertyModel:
         """The model of one target; `QueryError` when there is none."""
@@ -228,6 +234,13 @@ class WorldModel:
         """What laws of motion say of an object: its free law, then every contact, a line each."""
         laws = self._parts.laws
         return () if laws is None else laws.lines(self._perceive(scene), index, digits)
+
+    def advice(self) -> tuple[Advice, ...]:
+        """What isn't explained, target by target, and which features would explain it (`ModelConfig.features`).
+
+        Empty for a model that was loaded without its history.
+        """
+        return () if self.frozen else advices(self._parts)
 
     def explain(self, scene: Scene) -> str:
         """Why this prediction: mode, function, roles, clause and rival of every target."""

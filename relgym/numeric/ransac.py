@@ -78,6 +78,7 @@ def consensus(
     rng: np.random.Generator,
     strata: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
+    limit: int = 48,
 ) -> Consensus | None:
     """The function with the largest consensus among random samples; None if no sample verified itself.
 
@@ -95,6 +96,8 @@ def consensus(
         Number of samples.
     strata, anchors
         See `draw_samples`.
+    limit
+        Most samples that are tried on all rows.
 
     Notes
     -----
@@ -107,7 +110,7 @@ def consensus(
     samples = draw_samples(n, size, draws, rng=rng, strata=strata, anchors=anchors)
     chosen = _forward_batch(x[:, columns][samples], y[samples], terms=terms, sigma=sigma)
     best: Consensus | None = None
-    for sample, picked in _distinct(samples, chosen):
+    for sample, picked in _distinct(samples, chosen, limit):
         fit = least_squares(x[sample], y[sample], tuple(int(columns[c]) for c in picked))
         found = Consensus(fit, np.abs(y - fit.predict(x)) <= LOOSE * tolerance)
         if best is None or (found.size, -found.fit.terms) > (best.size, -best.fit.terms):
@@ -176,7 +179,7 @@ def _best_columns(
 
 
 def _distinct(
-    samples: NDArray[np.intp], chosen: NDArray[np.intp], limit: int = 48
+    samples: NDArray[np.intp], chosen: NDArray[np.intp], limit: int
 ) -> list[tuple[NDArray[np.intp], list[int]]]:
     """Verified samples with their columns: fewest terms first, at most `limit`, few per set of columns."""
     kept: list[tuple[NDArray[np.intp], list[int]]] = []

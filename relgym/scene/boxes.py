@@ -96,4 +96,5 @@ class BoxRelations:
 
     def _offset(self, axis: int) -> FloatArray:
         # Differences of positions first: far from the origin no precision is lost.
-        return self._position[axis][:, None] - self._position[axis][None]
+        offset: FloatArray = self._position[axis][:, None] - self._position[axis][None]
+        return offset

@@ -7,7 +7,8 @@ reordering and shifting leave alone.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +23,14 @@ __all__ = ["Slots", "canonical_order", "close_set", "signature", "slots"]
 _SAME_DISTANCE = 1e-9
 """Distances within this, in units of length, count as equal: rounding must not decide an order."""
 
+_FEW = 512
+"""Codes of fewer bodies than this are summed at once."""
+
 Slots: TypeAlias = tuple[tuple[str, NDArray[np.intp]], ...]
 """Type names, alphabetical, each with the numbers of its bodies."""
 
 _Order: TypeAlias = NDArray[np.intp]
+_Poses: TypeAlias = Callable[[NDArray[np.intp]], NDArray[np.float64]]
 
 
 def close_set(touching: NDArray[np.bool_], distance: NDArray[np.float64], body: int) -> NDArray[np.bool_]:
@@ -63,7 +68,7 @@ def slots(layout: SceneLayout, body: int) -> Slots:
     return known[body]
 
 
-def canonical_order(relations: Relations, body: int, pose: NDArray[np.float64] | None = None) -> _Order:
+def canonical_order(relations: Relations, body: int, pose: _Poses | None = None) -> _Order:
     """Return the other bodies in canonical order.
 
     Grouped by type, types alphabetical. Within a type: first by the relations to the target (those for
@@ -77,8 +82,8 @@ def canonical_order(relations: Relations, body: int, pose: NDArray[np.float64] |
     body
         The target's number.
     pose
-        Poses of the bodies, shape ``(n, K, 9)``: the last resort between bodies that are alike in all else.
-        Without it the numbers of the bodies decide.
+        From numbers of scenes, shape ``(m,)``, to poses of the bodies, shape ``(m, K, 9)``: the last resort between
+        bodies that are alike in all else. Without it the numbers of the bodies decide.
 
     Returns
     -------
@@ -92,24 +97,26 @@ def canonical_order(relations: Relations, body: int, pose: NDArray[np.float64] |
     return order
 
 
-def _sort_groups(
-    relations: Relations, body: int, groups: Slots, order: _Order, pose: NDArray[np.float64] | None
-) -> None:
+def _sort_groups(relations: Relations, body: int, groups: Slots, order: _Order, pose: _Poses | None) -> None:
     table = relations.table
     toward = _codes(table[:, :, :, body], table[:, :, body])
-    around: NDArray[np.uint64] | None = None
-    at = 0
+    tied, spans, at = np.zeros(len(order), dtype=np.bool_), [], 0
     for _, members in groups:
         if len(members) > 1:
             codes = ~toward[:, members]  # what touches the target has the highest codes, and comes first
-            keys: list[NDArray[Any]] = [np.round(relations.distances(body)[:, members] / _SAME_DISTANCE)]
-            if _ties(codes):
-                around = _around(relations, body, groups, toward) if around is None else around
-                keys.append(around[:, members])
-            if pose is not None:
-                keys = [*pose[:, members].transpose(2, 0, 1)[::-1], *keys]
-            order[:, at : at + len(members)] = members[np.lexsort([*keys, codes], axis=-1)]
+            spans.append((slice(at, at + len(members)), members, codes))
+            order[:, spans[-1][0]] = members[np.argsort(codes, axis=1, kind="stable")]
+            tied |= _ties(codes)
         at += len(members)
+    rows = np.flatnonzero(tied)
+    if not len(rows):
+        return
+    near = np.round(relations.distances(body)[rows] / _SAME_DISTANCE)
+    around = _around(table[rows], body, groups, toward[rows])
+    last = [] if pose is None else list(pose(rows).transpose(2, 0, 1)[::-1])
+    for span, members, codes in spans:
+        keys = [key[:, members] for key in (*last, near, around)]
+        order[rows, span] = members[np.lexsort([*keys, codes[rows]], axis=-1)]
 
 
 def signature(relations: Relations, body: int, order: _Order | None = None) -> list[bytes]:
@@ -143,27 +150,36 @@ def signature(relations: Relations, body: int, order: _Order | None = None) -> l
 
 def _codes(there: NDArray[np.bool_], back: NDArray[np.bool_]) -> NDArray[np.uint64]:
     """Which relations (second axis) hold either way round, as bits; the first relation's are the highest."""
-    relations = there.shape[1]
-    weights = np.uint64(1) << np.arange(2 * relations, dtype=np.uint64)[::-1]
-    shape = (relations, *(1 for _ in there.shape[2:]))
-    both = there * weights[0::2].reshape(shape) + back * weights[1::2].reshape(shape)
-    codes: NDArray[np.uint64] = both.sum(axis=1, dtype=np.uint64)
+    codes = np.zeros((len(there), *there.shape[2:]), dtype=np.uint64)
+    if codes.size < _FEW:  # one sum costs less than many steps
+        weights = np.uint64(1) << np.arange(2 * there.shape[1], dtype=np.uint64)[::-1]
+        shape = (there.shape[1], *(1 for _ in there.shape[2:]))
+        both = there * weights[0::2].reshape(shape) + back * weights[1::2].reshape(shape)
+        return np.asarray(both.sum(axis=1, dtype=np.uint64))
+    one = np.uint64(1)
+    for r in range(there.shape[1]):
+        for bits in (there[:, r], back[:, r]):
+            codes <<= one
+            codes |= bits
     return codes
 
 
-def _ties(codes: NDArray[np.uint64]) -> bool:
+def _ties(codes: NDArray[np.uint64]) -> NDArray[np.bool_]:
+    """In which scenes some bodies have the same code, shape ``(n,)``."""
     ordered = np.sort(codes, axis=1)
-    return bool((ordered[:, 1:] == ordered[:, :-1]).any())
+    return np.asarray((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
 
 
-def _around(relations: Relations, body: int, groups: Slots, toward: NDArray[np.uint64]) -> NDArray[np.uint64]:
+def _around(
+    table: NDArray[np.bool_], body: int, groups: Slots, toward: NDArray[np.uint64]
+) -> NDArray[np.uint64]:
     """Codes of how the others lie about each body and what they are to the target, shape ``(n, K)``."""
-    codes = _codes(relations.table, relations.table.swapaxes(2, 3))
+    codes = _codes(table, table.swapaxes(2, 3))
     kind = np.zeros(codes.shape[1], dtype=np.uint64)
     for number, (_, members) in enumerate(groups):
         kind[members] = number + 1
     # A sum of mixed codes is the same in whatever order the others come (one round of colour refinement).
-    about = _mix(_mix(codes + (kind << np.uint64(2 * len(relations.names)))) + toward[:, None, :])
+    about = _mix(_mix(codes + (kind << np.uint64(2 * table.shape[1]))) + toward[:, None, :])
     about[:, :, body] = 0
     about[:, np.arange(len(kind)), np.arange(len(kind))] = 0
     around: NDArray[np.uint64] = about.sum(axis=2, dtype=np.uint64)

@@ -49,6 +49,8 @@ class ObjectType:
     velocity
         The three properties that form the velocity along the x, y and z axis, ``None`` where there is none
         (``("vx", "vy", None)``). Empty: the type has no velocity and counts as resting.
+    angles
+        Properties that are angles in radians: they go round at ±π, and π and -π are the same place.
     exogenous
         Properties redrawn from outside the world; the model never predicts them (they persist in roll-outs).
     optional
@@ -63,15 +65,16 @@ class ObjectType:
     velocity: tuple[str | None, ...] = ()
     exogenous: tuple[str, ...] = ()
     optional: bool = False
+    angles: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if len(set(self.properties)) != len(self.properties):
             raise SchemaError(f"type {self.name!r}: property names must differ, got {self.properties}")
-        named = [*self.pose.values(), *(v for v in self.velocity if v), *self.exogenous]
+        named = [*self.pose.values(), *(v for v in self.velocity if v), *self.exogenous, *self.angles]
         for name in named:
             if name not in self.properties:
                 raise SchemaError(
-                    f"type {self.name!r}: {name!r} is named as a pose, velocity or exogenous property but "
+                    f"type {self.name!r}: {name!r} is named as a pose, velocity, angle or exogenous property but "
                     f"is not among its properties {self.properties}; add it or correct the name"
                 )
         for component in self.pose:

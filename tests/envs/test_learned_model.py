@@ -13,7 +13,16 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from carts import CartEnv, run
-from dreams import CART_SCHEMA, Errand, cart_model, cart_step, lost_model, room_model
+from dreams import (
+    CART_SCHEMA,
+    Errand,
+    FlatCart,
+    cart_model,
+    cart_step,
+    flat_model,
+    lost_model,
+    room_model,
+)
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
@@ -22,6 +31,7 @@ from worlds import ROOM_TARGETS, room, scene, schema_of
 from relgym.envs import LearnedModelEnv
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.spaces_json import space_from_json, space_to_json
+from relgym.envs.views import NumbersView
 from relgym.errors import ActionError, ConfigError, ModelFileError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Target
@@ -67,6 +77,14 @@ def test_the_checker_has_nothing_to_say(model_file: Path, horizon: int | None) -
 
 def test_the_checker_has_nothing_to_say_of_a_model_in_memory(cart: ModelLearner) -> None:
     check_env(gym.make(ID, model=cart.model, like=CartEnv()).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.sb3
+@pytest.mark.parametrize("horizon", [None, 40])
+def test_sb3s_checker_has_nothing_to_say(model_file: Path, horizon: int | None) -> None:
+    from stable_baselines3.common import env_checker
+
+    env_checker.check_env(gym.make(ID, model=str(model_file), horizon=horizon))  # warnings are errors
 
 
 def test_same_seed_same_dream(model_file: Path) -> None:
@@ -296,6 +314,38 @@ def test_objects_of_unknown_bounds_are_refused(truck: ModelLearner) -> None:
     ).to_json()["spaces"]
     with pytest.raises(ConfigError, match="no bounds are known for object 'truck'"):
         LearnedModelEnv(model, like=boxed)
+
+
+# ---------------------------------------------------------------------- learned through a view
+def test_a_dream_shows_what_the_real_env_shows(tmp_path: Path) -> None:
+    model, real = flat_model(), FlatCart()
+    model.save(tmp_path / "flat.json")
+    for dream in (LearnedModelEnv(tmp_path / "flat.json"), LearnedModelEnv(model, like=real)):
+        check_env(dream, skip_render_check=True)
+        assert (dream.observation_space, dream.action_space) == (real.observation_space, real.action_space)
+    expected, _ = real.reset(seed=5)
+    seen, _ = dream.reset(seed=5)
+    np.testing.assert_array_equal(seen, expected)
+    for push in (1.0, -0.5, 0.25):
+        action = np.array([push], np.float32)
+        expected, gained, *_ = real.step(action)
+        seen, reward, _, truncated, info = dream.step(action)
+        np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-9)
+        assert not truncated, info
+        assert reward == pytest.approx(gained, abs=1e-9)
+
+
+def test_a_view_must_fit_the_dream() -> None:
+    with pytest.raises(
+        ConfigError, match="expected the action_space of the env that the model was learned in"
+    ):
+        other = FlatCart()
+        other.action_space = spaces.Box(-2.0, 2.0, (1,), np.float32)
+        LearnedModelEnv(flat_model(), like=other)
+    with pytest.raises(ConfigError, match="bounds are known of observations only"):
+        LearnedModelEnv(flat_model(), like=LearnedModelEnv(flat_model()).reset(seed=0)[1]["scene"])
+    with pytest.raises(ConfigError, match="the view's scenes"):
+        LearnedModelEnv(cart_model(), view=NumbersView(FlatCart().observation_space, FlatCart().action_space))
 
 
 # ---------------------------------------------------------------------- reward and end

@@ -14,13 +14,16 @@ import pytest
 from dreams import (
     CART_SCHEMA,
     Errand,
+    FlatCart,
     cart_model,
+    flat_model,
     line_model,
     lost_model,
     room_model,
     starts_of,
     vectors_of,
 )
+from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from hypothesis import given, settings
@@ -29,6 +32,8 @@ from worlds import line, room
 
 import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv, drawn_from, in_batches
+from relgym.envs.learned_model_shown import ViewShown
+from relgym.envs.views import NumbersView
 from relgym.errors import ActionError, ConfigError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
@@ -157,6 +162,34 @@ def test_resets_of_a_real_env_are_those_of_single_dreams() -> None:
         expected, together = alone.step(action)[0], many.step(action)[0]
         for name, values in together.items():
             np.testing.assert_array_equal(values, expected[name])
+
+
+def test_dreams_through_a_view_are_single_dreams_too() -> None:
+    alone = SyncVectorEnv([lambda: LearnedModelEnv(flat_model(), like=FlatCart(), horizon=3)] * 3)
+    many = LearnedModelVectorEnv(flat_model(), 3, like=FlatCart(), horizon=3)
+    expected, together = alone.reset(seed=2)[0], many.reset(seed=2)[0]
+    assert together in many.observation_space
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        np.testing.assert_array_equal(together, expected)
+        action = pushes(3, rng)
+        expected, *flags, _ = alone.step(action)
+        together, *found, _ = many.step(action)
+        for a, b in zip(flags, found, strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert found[2].all()
+
+
+@pytest.mark.parametrize("space", [spaces.Discrete(3), spaces.Box(-1, 1, (2,)), spaces.MultiDiscrete([2, 3])])
+def test_actions_through_a_view_are_those_of_single_scenes(space: spaces.Space) -> None:
+    view = NumbersView(spaces.Box(-9, 9, (2,), np.float64), space)
+    deeds = ViewShown(view, spaces.Box(-9, 9, (2,), np.float64), space).deeds()
+    space.seed(0)
+    vectors, actions = np.arange(10.0).reshape(5, 2), np.array([space.sample() for _ in range(5)])
+    joined = deeds.joined(vectors, deeds.checked(actions, 5))
+    for vector, action, both in zip(vectors, actions, joined, strict=True):
+        np.testing.assert_array_equal(view.with_action(view.scene(vector), action).vector, both)
+    np.testing.assert_array_equal(deeds.parted(joined), vectors)
 
 
 # ---------------------------------------------------------------------- what Gymnasium asks

@@ -14,16 +14,42 @@ RUNS = {
     "read_the_laws.py": (["--steps", "400"], "vy' = vy - 0.00098"),
     "live_in_a_dream.py": (["--blocks", "8", "--trials", "1"], "trial 0: the trucks were never more than"),
     "grandparents.py": ([], "grandparent(A, B) ← parent(A, C) ∧ parent(C, B)"),
+    "vector_envs.py": (["--transitions", "400"], "8 envs: "),
+    "view_dict.py": (["--steps", "120"], "lower.x: x' = 0.85 x + 0.1 upper.x"),
+    "view_function.py": (["--steps", "40"], "wrong in the latest steps"),
+    "view_numbers.py": (["--steps", "80"], "cart.x: x' = x + 0.02 x_dot"),
+    "view_table.py": (["--steps", "300"], "vx' = -0.99 vx"),
 }
+
+NEED_SB3 = {
+    "dyna_ball.py": (
+        ["--decisions", "120", "--warm_up", "118", "--episodes", "1"],
+        "of 1 test episodes reach the goal",
+    ),
+    "dyna_truck.py": (
+        ["--steps", "400", "--warm_up", "390", "--episodes", "2"],
+        "of 2 test episodes end on the goal after 400 real steps",
+    ),
+}
+"""Likewise for those that need Stable-Baselines3."""
 
 
 def test_every_example_is_run() -> None:
-    assert {path.name for path in EXAMPLES.glob("*.py")} == set(RUNS)
+    assert {path.name for path in EXAMPLES.glob("*.py")} == {*RUNS, *NEED_SB3}
 
 
 @pytest.mark.parametrize("name", sorted(RUNS))
 def test_example(name: str) -> None:
-    options, expected = RUNS[name]
+    _run(name, *RUNS[name])
+
+
+@pytest.mark.sb3
+@pytest.mark.parametrize("name", sorted(NEED_SB3))
+def test_example_with_stable_baselines3(name: str) -> None:
+    _run(name, *NEED_SB3[name])
+
+
+def _run(name: str, options: list[str], expected: str) -> None:
     script = EXAMPLES / name
     assert len(script.read_text(encoding="utf-8").splitlines()) < 120
     command = [sys.executable, "-X", "utf8", "-W", "error", str(script), *options]

@@ -1,10 +1,9 @@
-"""Laws from streams: the thesis' rooms, materials, moving balls, space."""
+"""Laws from streams: the thesis' rooms, materials, moving balls, noise."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from bouncing import closed_room, episode, schema_of_blocks
 from law_streams import Stream, errors, formulas, learn, taught
 from numpy.typing import NDArray
 
@@ -131,28 +130,6 @@ def test_every_material_has_its_own_law() -> None:
     assert errors(learner.book, episodes(env, 6, seed=2))[0] == 0
 
 
-SPACE = schema_of_blocks(10)
-
-
-def space(count: int, seed: int, steps: int = 250, **world: object) -> list[Stream]:
-    rng = np.random.default_rng(seed)
-    return [
-        Stream(SPACE, SPACE.layout(), episode(closed_room(rng), rng, steps=steps, **world))  # type: ignore[arg-type]
-        for _ in range(count)
-    ]
-
-
-def test_space_has_the_same_laws_and_obeys_those_of_the_plane() -> None:
-    test = space(4, 2, friction=0.2)
-    learner = taught(space(3, 1, friction=0.2))
-    assert formulas(learner.book) == [["max(u_n, -0.9 v_n)"], ["max(0, u_t - 0.2 J_n)"]]
-    assert errors(learner.book, test) == (0, 0, 1000)
-    plane = taught(blocks(BallExperiment(30.0, 0.9, (0.2,), 8), 8))
-    learner.book.pair = plane.book.pair
-    learner.book.forget()
-    assert errors(learner.book, test) == (0, 0, 1000)
-
-
 @pytest.mark.parametrize("sd", [1e-6, 1e-4])
 def test_noisy_positions(sd: float, rng: np.random.Generator) -> None:
     noisy = []
@@ -170,11 +147,3 @@ def test_noisy_positions(sd: float, rng: np.random.Generator) -> None:
     weights = {name: weight for law in (normal, tangent) for p in law.pieces for name, weight in p.terms}
     assert weights["v_n"] == pytest.approx(-0.95, rel=0.01)
     assert weights["J_n"] == pytest.approx(-0.2, rel=0.01)
-
-
-def test_what_the_form_cannot_say_is_left_unsaid() -> None:
-    soft = {"friction": 0.0, "restitution": lambda speed: 0.9 - 4.0 * speed}
-    learner = taught(space(4, 1, **soft))
-    wrong, silent, _ = errors(learner.book, space(2, 2, **soft))
-    assert wrong == 0
-    assert silent > 0

@@ -63,9 +63,9 @@ def test_rounding_does_not_decide_between_equally_far_objects() -> None:
     schema, found = stacks((0, 0), (3, 0), (3, 2e-13))
     pose = poses(schema.layout(), np.zeros((1, schema.layout().width)))
     pose[0, 1:, 0] = 2.0, 1.0
-    assert canonical_order(found, 0, pose)[0].tolist() == [2, 1]
+    assert canonical_order(found, 0, pose.__getitem__)[0].tolist() == [2, 1]
     pose[0, 1:, 0] = 1.0, 2.0
-    assert canonical_order(found, 0, pose)[0].tolist() == [1, 2]
+    assert canonical_order(found, 0, pose.__getitem__)[0].tolist() == [1, 2]
 
 
 def test_groups_are_types_in_alphabetical_order() -> None:

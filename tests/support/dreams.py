@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from relgym.scene.objects import (
     Target,
     Transition,
 )
+from relgym.wrappers import ModelLearner
 
 ROOM_STEPS = room(0, 260)
 LINE_STEPS = line(0, 300, ("light", "heavy", "light"))
@@ -114,6 +116,43 @@ def lost_model() -> WorldModel:
     model.finish()
     assert not model.modes("cart", "v") and model.modes("cart", "x")
     return recorded(model, [CART_SCHEMA.scene({"cart": [0.0, 1.0]})], spaces.Box(-1.0, 1.0, (1,), np.float32))
+
+
+class FlatCart(gym.Env[Any, Any]):
+    """The cart with flat numbers, x and v."""
+
+    def __init__(self) -> None:
+        self.observation_space = spaces.Box(-1e3, 1e3, (2,), np.float64)
+        self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
+        self._state = np.zeros(2)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        self._state = self.np_random.uniform(-1.0, 1.0, 2)
+        return self._state.copy(), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        x, v = self._state
+        v = 0.9 * v + 0.5 * float(action[0])
+        self._state = np.array([x + v, v])
+        return self._state.copy(), 2.0 * v, False, False, {}
+
+
+@cache
+def flat_model() -> WorldModel:
+    """What a learner around the flat cart learned."""
+    speed = (("self", "x1"),)
+    targets = [Target("self", "x1"), Target("self", "x0", speed), Target(TASK, "reward", speed)]
+    env = ModelLearner(FlatCart(), learn_reward=True, targets=targets)
+    env.action_space.seed(0)
+    for episode in range(8):
+        env.reset(seed=episode)
+        for _ in range(25):
+            env.step(env.action_space.sample())
+    env.model.finish()
+    return env.model
 
 
 def vectors_of(scenes: Sequence[Scene]) -> NDArray[np.float64]:

@@ -49,9 +49,10 @@ def learn(
             learner.learn_one(contacts, now, after, stays)
 
 
-def taught(streams: Iterable[Stream], *, seed: int = 0, **settings: float) -> LawLearner:
-    """A learner that has seen some streams of one schema."""
-    learner: LawLearner | None = None
+def taught(
+    streams: Iterable[Stream], *, seed: int = 0, learner: LawLearner | None = None, **settings: float
+) -> LawLearner:
+    """A learner, a new one unless one is handed in, that has seen some streams of one schema."""
     for stream in streams:
         schema = stream.schema
         learner = learner or LawLearner(schema, schema.targets or (), seed=seed, **settings)
@@ -69,7 +70,8 @@ def errors(book: LawBook, streams: Iterable[Stream], tolerance: float = 1e-9) ->
         after = cast.padded(stream.vectors[1:])[cast.velocities]
         for body in cast.movers:
             known = motion.known[:, body]
-            off = np.abs(motion.velocity[:, :, body] - after[:, body]).max(axis=0)
+            count = len(book.components(cast.layout.types[cast.layout.bodies[body]].name))
+            off = np.abs(motion.velocity[:count, :, body] - after[:count, body]).max(axis=0)
             wrong += int((known & ~(off <= tolerance)).sum())
             silent += int((~known).sum())
             total += len(known)

@@ -15,6 +15,7 @@ from relgym.envs.scripted import ball_home
 from relgym.experiments.seeds import TUNING_SEEDS
 from relgym.scene.objects import Scene
 from relgym.wrappers.action_repeat import ActionRepeat
+from relgym.wrappers.flat import FlatView
 from relgym.wrappers.model_learner import ModelLearner
 
 
@@ -41,6 +42,20 @@ def test_a_dream_of_pushing_is_judged_as_the_world() -> None:
         if terminated:
             break
     assert terminated  # over the goal
+
+
+def test_dreams_are_seen_as_the_world_is() -> None:
+    pytest.importorskip("pygame")
+    env = gym.make("relgym/BallGoal-v0")
+    learner = ModelLearner(env, predict=False)
+    learner.reset(seed=0)
+    for _ in range(40):
+        learner.step(learner.action_space.sample())
+    dream = LearnedModelEnv(learner.model, like=env, render_mode="rgb_array")
+    dream.reset(seed=0)
+    picture = dream.render().astype(int)
+    assert (np.abs(picture - np.array([255, 214, 92])).max(axis=2) < 3).mean() > 0.0005  # the goal
+    assert FlatView(dream).flattener.names == FlatView(env).flattener.names
 
 
 @pytest.mark.slow

@@ -12,17 +12,18 @@ _HOMES = {
     "DreamVecEnv": "relgym.wrappers.sb3.dreaming",
     "Dyna": "relgym.wrappers.sb3.dyna",
     "DynaConfig": "relgym.wrappers.sb3.settings",
-    "PermutedReplay": "relgym.wrappers.sb3.permuting",
     "Imagination": "relgym.wrappers.sb3.imagination",
     "LearnedTask": "relgym.wrappers.sb3.judges",
     "MixedDictReplayBuffer": "relgym.wrappers.sb3.replay",
     "MixedNStepReplayBuffer": "relgym.wrappers.sb3.replay",
     "MixedReplayBuffer": "relgym.wrappers.sb3.replay",
     "ModelCallback": "relgym.wrappers.sb3.callback",
+    "PermutedReplay": "relgym.wrappers.sb3.permuting",
     "SceneStock": "relgym.wrappers.sb3.stock",
     "TransitionRecorder": "relgym.wrappers.sb3.recorder",
     "TrustGate": "relgym.wrappers.sb3.gate",
     "explore": "relgym.wrappers.sb3.dreaming",
+    "VectorAsVecEnv": "relgym.wrappers.sb3.vec_env",
     "replay_options": "relgym.wrappers.sb3.replay",
 }
 """Where each public name lives; loaded on first use."""
@@ -43,6 +44,7 @@ __all__ = [
     "SceneStock",
     "TransitionRecorder",
     "TrustGate",
+    "VectorAsVecEnv",
     "explore",
     "replay_options",
 ]

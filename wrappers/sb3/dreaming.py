@@ -224,7 +224,8 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
         """One real episode with the agent's best actions: whether it succeeded, and the sum of rewards."""
         seen, _ = self.env.reset(seed=self._seed)
         self._seed += 1
-        total, over, info = 0.0, False, {}
+        total, over = 0.0, False
+        info: dict[str, Any] = {}
         while not over:
             action, _ = self.model.predict(seen, deterministic=True)
             seen, reward, terminated, truncated, info = self.env.step(action)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from time import perf_counter
 from typing import Any, Literal, cast
 
@@ -110,7 +111,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
             self.buffer.hold(self.config.capacity)
         self.buffer.real_ratio = self.config.real_ratio
         self._imagination = Imagination(self.world, lens, judge)
-        self._usual = self.model.gradient_steps
+        self._usual = int(self.model.gradient_steps)
+        self._dreamed_at = min(self._dreamed_at, int(self.model.num_timesteps))
 
     def _on_step(self) -> bool:
         for steps in self.training_env.env_method("take"):
@@ -119,7 +121,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         trusted = self.apprentice.gate.open
         if self.buffer.trusted and not trusted:  # what a model dreamed that is wrong by now is worth nothing
             self.buffer.hold(self.config.capacity)
-        if trusted and (not self.buffer.trusted or self._due()):
+        if trusted and not self._awake() and (self.buffer.imagined.size() == 0 or self._due()):
             self._dream()
         self.buffer.trusted = trusted
         self.model.gradient_steps = self._gradient_steps(trusted)
@@ -138,9 +140,15 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     def _due(self) -> bool:
         return bool(self.num_timesteps - self._dreamed_at >= self.config.every)
 
+    def _awake(self) -> bool:
+        """Whether the algorithm still gathers its first steps, and what is dreamed would be stale before use."""
+        return bool(self.num_timesteps + self.config.every < self.model.learning_starts)
+
     def _gradient_steps(self, trusted: bool) -> int:
         each = self.config.updates if trusted else self.config.updates_alone
-        return each * int(self.training_env.num_envs)
+        if each is None:
+            return self._usual
+        return each * int(self.training_env.num_envs * self.model.train_freq.frequency)
 
     def _dream(self) -> None:
         started = perf_counter()
@@ -171,7 +179,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
             return actions, actions
         scaled = self.model.policy.scale_action(actions)
         if self.model.action_noise is not None:
-            noise = np.stack([self.model.action_noise().ravel()[: scaled.shape[1]] for _ in scaled])
+            draw = copy.deepcopy(self.model.action_noise)  # its state is that of the real exploration
+            noise = np.stack([draw().ravel()[: scaled.shape[1]] for _ in scaled])
             scaled = np.clip(scaled + noise, -1.0, 1.0)
         return self.model.policy.unscale_action(scaled), scaled
 
@@ -239,6 +248,10 @@ def check_algorithm(algorithm: Any) -> None:
         raise ConfigError(
             f"a {type(algorithm.replay_buffer).__name__} can't mix in what was imagined: make the algorithm with "
             f"{type(algorithm).__name__}(..., **replay_options(env.observation_space))"
+        )
+    if algorithm.train_freq.unit.value != "step":
+        raise ConfigError(
+            f"train_freq={tuple(algorithm.train_freq)}: expected steps, since updates are counted per real step"
         )
 
 

@@ -31,7 +31,8 @@ class DynaConfig:
         How many imagined transitions are kept, the latest. Small enough that those of old policies and
         models are soon forgotten.
     updates, updates_alone
-        Gradient steps per real step while the model is trusted, and while it isn't.
+        Gradient steps per real step while the model is trusted, and while it isn't; the latter none: as many as
+        the algorithm was made for.
     permute
         Whether dreams exchange the roles of objects of one type. The model licenses that, a net doesn't.
     redraw
@@ -56,7 +57,7 @@ class DynaConfig:
     every: int = 10
     capacity: int = 20_000
     updates: int = 20
-    updates_alone: int = 1
+    updates_alone: int | None = None
     permute: bool = True
     redraw: bool = True
     shuffle: int = 150
@@ -72,6 +73,8 @@ class DynaConfig:
                 raise ConfigError(f"{name}={getattr(self, name)!r}: expected a share from 0 to 1")
         for name, low in _LEAST.items():
             value = getattr(self, name)
+            if value is None and name == "updates_alone":
+                continue
             if not isinstance(value, int) or isinstance(value, bool) or value < low:
                 raise ConfigError(f"{name}={value!r}: expected a whole number, at least {low}")
         if self.least > self.window:

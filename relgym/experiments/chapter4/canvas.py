@@ -1,4 +1,4 @@
-"""What all figures share: a canvas without a window system, colours of learners, a floor for logarithms."""
+"""What tables and figures share: names and colours of learners, a canvas without windows, a floor for logarithms."""
 
 from __future__ import annotations
 
@@ -8,10 +8,22 @@ from typing import Any, Final
 
 from relgym.experiments.plots import require_matplotlib
 
-__all__ = ["COLOURS", "FLOOR", "TITLES", "above", "canvas", "error_axis", "save"]
+__all__ = ["COLOURS", "FLOOR", "PRINTED", "TITLES", "above", "canvas", "error_axis", "save", "text_figure"]
 
 FLOOR: Final = 1e-18
 """Errors of 0 are drawn here."""
+
+TITLES: Final[Mapping[str, str]] = {
+    "original": "original()",
+    "thesis": "thesis()",
+    "one polarity": "thesis(), one polarity",
+    "world": "world axes",
+    "default": "default",
+}
+"""Learners as headings and legends name them."""
+
+PRINTED: Final = "printed"
+"""Heading of what the thesis printed."""
 
 COLOURS: Final[Mapping[str, str]] = {
     "original": "#8c8c8c",
@@ -19,14 +31,6 @@ COLOURS: Final[Mapping[str, str]] = {
     "world": "#6aa879",
     "default": "#c44e52",
 }
-
-TITLES: Final[Mapping[str, str]] = {
-    "original": "original()",
-    "thesis": "thesis()",
-    "world": "modes, world axes",
-    "default": "relgym as it comes",
-}
-"""Learners as legends name them."""
 
 _DOTS: Final = 80
 
@@ -39,6 +43,17 @@ def canvas(width: float, height: float, rows: int = 1, columns: int = 1, **optio
     # No pyplot: it would choose a window system and keep global state.
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def text_figure(path: Path, text: str) -> None:
+    """A picture of a text, line by line as it is."""
+    lines = text.split("\n")
+    figure, panels = canvas(0.085 * max(map(len, lines)) + 0.4, 0.17 * len(lines) + 0.4)
+    panels[0][0].set_axis_off()
+    panels[0][0].text(
+        0.0, 1.0, text, va="top", family="monospace", fontsize=9, transform=panels[0][0].transAxes
+    )
+    save(figure, path)
 
 
 def save(figure: Any, path: Path) -> None:

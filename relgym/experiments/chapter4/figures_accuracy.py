@@ -37,7 +37,7 @@ def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown
     heading = ["target", "learner", "blocks", "p50", "p95", "p99.9", "mean change", "wrong %"]
     found = {t: {name: scores_by_blocks(runs, t) for name, runs in values.items()} for t in targets}
     lines: list[list[Cell]] = [
-        [target, learner, blocks, *_figures(score)]
+        [target, TITLES[learner], blocks, *_figures(score)]
         for target, learners in found.items()
         for learner, scores in learners.items()
         for blocks, score in scores.items()
@@ -46,13 +46,16 @@ def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown
     def draw(path: Path) -> None:
         figure, panels = canvas(5.5 * len(targets), 4.2, 1, len(targets), sharey=True)
         for panel, (target, learners) in zip(panels[0], found.items(), strict=True):
-            for learner, scores in learners.items():
+            for k, (learner, scores) in enumerate(learners.items()):
                 colour = COLOURS[learner]
                 at = list(scores)
+                thick = max(1.2, 6.0 - 1.6 * k)  # later lines are thinner: where two agree, both can be seen
                 p95 = [above(quantile(s["errors"], 0.95)) for s in scores.values()]
                 p999 = [above(quantile(s["errors"], 0.999)) for s in scores.values()]
-                panel.plot(at, p95, "o-", color=colour, lw=2.5, ms=4, label=f"{TITLES[learner]}, 95 %")
-                panel.plot(at, p999, "o:", color=colour, lw=1, ms=3, label=f"{TITLES[learner]}, 99.9 %")
+                panel.plot(at, p95, "o-", color=colour, lw=thick, ms=4, label=f"{TITLES[learner]}, 95 %")
+                panel.plot(
+                    at, p999, "o:", color=colour, lw=0.4 * thick, ms=3, label=f"{TITLES[learner]}, 99.9 %"
+                )
             _dash(panel, next(iter(learners.values())))
             error_axis(panel, label=panel is panels[0][0])
             panel.set(title=f"{_axis(target)} velocity", xlabel="training blocks")
@@ -86,7 +89,7 @@ def by_mode_shown(_: Protocol, values: Values, target: str) -> Shown:
             for blocks, score in modes.get(name, {}).items():
                 boxes = [f"{quantile(score['errors'], q):.0e}" for q in _QUANTILES]
                 wrong = round(100 * score["wrong"] / max(score["examples"], 1), 2)
-                lines.append([name, learner, blocks, score["examples"], *boxes, wrong])
+                lines.append([name, TITLES[learner], blocks, score["examples"], *boxes, wrong])
 
     def draw(path: Path) -> None:
         columns = min(3, len(names))
@@ -99,7 +102,7 @@ def by_mode_shown(_: Protocol, values: Values, target: str) -> Shown:
             panel.set_axis_off()
         figure.supxlabel("training blocks", fontsize=9)
         handles, labels = panels.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
+        figure.legend(handles, labels, loc="outside upper center", ncols=4, fontsize=8)
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)
@@ -156,7 +159,7 @@ def rates_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown:
     heading = ["target", "learner", "blocks", "wrong %", "not learned %", "misclassified %"]
     found = {t: {n: scores_by_blocks(runs, t, "counted") for n, runs in values.items()} for t in targets}
     lines: list[list[Cell]] = [
-        [target, learner, blocks, *_split(score)]
+        [target, TITLES[learner], blocks, *_split(score)]
         for target, learners in found.items()
         for learner, scores in learners.items()
         for blocks, score in scores.items()
@@ -219,7 +222,7 @@ def perfect_shown(_: Protocol, values: Values, target: str, mode: str) -> Shown:
         for blocks, score in scores.items():
             chosen = [f"{quantile(score['errors'], q):.0e}" for q in (0.5, 0.75)]
             best = [f"{quantile(score['best'], q):.0e}" for q in (0.5, 0.75, 0.95)]
-            lines.append([learner, blocks, *chosen, *best])
+            lines.append([TITLES[learner], blocks, *chosen, *best])
 
     def draw(path: Path) -> None:
         figure, panels = canvas(9.0, 3.8, 1, 2, sharey=True)

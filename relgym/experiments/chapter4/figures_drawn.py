@@ -78,7 +78,7 @@ _VALUES: Final = (
 def parameters_shown(_: Protocol, __: Values) -> Shown:
     """Table 4.1 and the env's reset options."""
     every = configurations()
-    heading = ["parameter", "thesis", "values of the env"]
+    heading = ["parameter", "printed", "values of the env"]
     lines: list[list[Cell]] = [
         [name, printed, ", ".join(dict.fromkeys(str(c[option]) for c in every))]
         for name, option, printed in _VALUES
@@ -119,7 +119,7 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
     run = best_run(values["world"])
     learned = next(t for t in run["report"]["targets"] if t["target"] == "ball.vy")
     heading = ["source", "mode", "relations", "function"]
-    lines: list[list[Cell]] = [["thesis", *row] for row in _PUBLISHED]
+    lines: list[list[Cell]] = [["printed", *row] for row in _PUBLISHED]
     clauses = {
         mode["mode"]: [p["rows"][0]["clause"] for p in learned["pairs"] if p["mode"] == mode["mode"]]
         for mode in learned["modes"]
@@ -129,14 +129,17 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
         lines.append(["learned", f"{mode['mode']}, {mode['examples']} examples", said, mode["function"]])
 
     def draw(path: Path) -> None:
-        figure, panels = canvas(13.0, 4.2, 1, 2, width_ratios=(2, 3))
-        block = next(iter(ball_blocks(1, seed=TRAINING_SEEDS[0], blocks=13, order=0)))
+        figure, panels = canvas(13.0, 4.0, 1, 2, width_ratios=(2, 3))
+        *_, block = ball_blocks(
+            1, seed=TRAINING_SEEDS[0], blocks=8, order=None
+        )  # the ball begins above an object
         _picture(panels[0][0], block, 0, "path, coloured by time", path=True)
         panels[0][1].set_axis_off()
-        text = "\n".join(
-            f"{m['function']}\n      {' | '.join(clauses[m['mode']])[:110]}" for m in learned["modes"]
+        said = (" | ".join(clauses[m["mode"]])[:80] or "otherwise" for m in learned["modes"])
+        text = "\n\n".join(
+            f"{m['function']}\n    if {clause}" for m, clause in zip(learned["modes"], said, strict=True)
         )
-        panels[0][1].text(0.0, 0.5, text, va="center", fontsize=7, family="monospace")
+        panels[0][1].text(0.0, 0.5, text, va="center", fontsize=11, family="monospace")
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)

@@ -31,7 +31,7 @@ def rollout_errors_shown(_: Protocol, values: Values, axis: int) -> Shown:
         for step in _SHOWN:
             at = errors[:, : step + 1].max(axis=1)
             quantiles = [f"{np.quantile(at, q, method='lower'):.1e}" for q in (0.5, 0.9, 1.0)]
-            lines.append([learner, step, *quantiles, int((at > 1e-2).sum())])
+            lines.append([TITLES[learner], step, *quantiles, int((at > 1e-2).sum())])
 
     def draw(path: Path) -> None:
         figure, panels = canvas(4.6 * len(values), 3.8, 1, len(values), sharey=True)
@@ -71,7 +71,7 @@ def failure_shown(_: Protocol, values: Values, causes: Sequence[str], severe: bo
     trial = values[learner][0]["trials"][number]
     error = float(np.hypot(*(np.subtract(trial["real"][-1], trial["imagined"][-1]))))
     text = (
-        f"Learner {learner}, trial {number}: {trial['cause']}, wrong from step {trial['begins']} on, "
+        f"Learner {TITLES[learner]}, trial {number}: {trial['cause']}, wrong from step {trial['begins']} on, "
         f"final distance {error:.2g}."
     )
     rows: list[list[Cell]] = [["step", "x", "y", "x imagined", "y imagined"]]

@@ -40,12 +40,14 @@ def trees_shown(_: Protocol, values: Values, number: str) -> Shown:
             if t["target"] == target and {rows.get(t["mode"]), rows.get(t["rival"])} == {first, second}
         ]
         if not found:
-            texts.append(f"{learner}: {_without(rows, first, second)}")
+            texts.append(f"{TITLES[learner]}: {_without(rows, first, second)}")
             continue
         chosen = max(found, key=lambda t: sum(t["tree"]["positive"][:1]) + sum(t["tree"]["negative"][:1]))
         trees[learner] = chosen | {"yes": rows[chosen["mode"]], "no": rows[chosen["rival"]]}
         tree = DecisionTree.from_dict(chosen["tree"])
-        texts.append(f'{learner}, behind "{chosen["stage"]}"; yes: mode {trees[learner]["yes"]}\n{tree}')
+        texts.append(
+            f'{TITLES[learner]}, behind "{chosen["stage"]}"; yes: mode {trees[learner]["yes"]}\n{tree}'
+        )
         data += [[learner, chosen["stage"], *rule.split(" -> ")] for rule in tree.rules()]
     note = f"Modes {first} and {second} of Table {modes}, {axis} velocity."
     return Shown("\n\n".join([note, *texts]), data, lambda path: _draw(path, trees, note))

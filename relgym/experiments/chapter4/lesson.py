@@ -19,7 +19,7 @@ from relgym.model.text import plain
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneSchema
 
-__all__ = ["config_of", "lesson", "taught_blocks", "test_blocks"]
+__all__ = ["config_of", "fresh_blocks", "lesson", "taught_blocks"]
 
 _BLOCKS_PER_SEED: Final = 40
 """Every configuration once (Table 4.1)."""
@@ -77,7 +77,7 @@ def lesson(
     """
     laws = BALL_EXPERIMENTS[experiment].modes()
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1], stages))
-    fresh = test_blocks(experiment, tests)
+    fresh = fresh_blocks(experiment, tests)
     model = WorldModel(blocks[0].schema, config_of(learner))
     scores, seconds = [], 0.0
     for number, block in enumerate(blocks, start=1):
@@ -124,7 +124,7 @@ def _only(
         yield replace(room, schema=whole, layout=whole.layout(room.layout.names))
 
 
-def test_blocks(experiment: int, tests: Mapping[str, Any]) -> list[Block]:
+def fresh_blocks(experiment: int, tests: Mapping[str, Any]) -> list[Block]:
     """Test blocks: from every seed equally many of the configurations, all 40 when there are enough (§4.3.3)."""
     seeds = tests["seeds"]
     each = -(-int(tests["blocks"]) // len(seeds))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from relgym.config import ModelConfig
-from relgym.experiments.chapter4.lesson import config_of, taught_blocks, test_blocks
+from relgym.experiments.chapter4.lesson import config_of, fresh_blocks, taught_blocks
 from relgym.experiments.noise import corrupted, shortfall
 from relgym.experiments.online import learned
 
@@ -44,7 +44,7 @@ def lesson(
     rng = np.random.default_rng([seed, order])
     taught = [corrupted(b, true, rng=rng) for b in taught_blocks(1, seed, order, blocks)]
     model = learned(taught, config=_config(expected))
-    fresh = [corrupted(b, true, rng=rng) for b in test_blocks(1, tests)]
+    fresh = [corrupted(b, true, rng=rng) for b in fresh_blocks(1, tests)]
     return {
         "errors": {str(t): shortfall(model, fresh, str(t)) for t in model.targets},
         "modes": {str(t): len(model.modes(t.type, t.property)) for t in model.targets},

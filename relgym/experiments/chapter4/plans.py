@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS
+from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, installed
+from relgym.baselines.tuned import setting_of
 from relgym.experiments.chapter4.job import Plan
 from relgym.experiments.chapter4.protocol import LEARNERS, Batch, Protocol
 from relgym.experiments.jobs.task import Task
@@ -113,10 +114,10 @@ def noise(protocol: Protocol) -> Plan:
 
 
 def regressions(protocol: Protocol, names: Sequence[str], shown: Sequence[str]) -> Plan:
-    """Regressors on experiment 2; groups are ``baseline/features``."""
+    """Regressors on experiment 2, all whose libraries are installed; groups are ``baseline/features``."""
     return {
         f"{name}/{seen}": [_baseline(protocol, "regress", name, seen, run) for run in _comparing(protocol)]
-        for name in names or REGRESSORS
+        for name in names or installed(REGRESSORS)
         for seen in shown
     }
 
@@ -127,7 +128,7 @@ def classifications(
     """Classifiers on experiment 2; groups are ``baseline/features``."""
     return {
         f"{name}/{seen}": [_baseline(protocol, "classify", name, seen, run) for run in _comparing(protocol)]
-        for name in names or CLASSIFIERS
+        for name in names or installed(CLASSIFIERS)
         for seen in shown
     }
 
@@ -145,6 +146,7 @@ def _baseline(protocol: Protocol, function: str, name: str, seen: str, run: Batc
         "order": run.order,
         "checkpoints": list(protocol.after(2)),
         "tests": protocol.tests(),
+        "setting": setting_of(name, seen),
     }
     return Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}")
 
@@ -153,9 +155,9 @@ def tunings(protocol: Protocol) -> Plan:
     """Every setting of every baseline on tuning seeds; groups are ``kind/baseline/features``."""
     plan: dict[str, list[Task]] = {}
     for function, known in (("regress", REGRESSORS), ("classify", CLASSIFIERS)):
-        for name, baseline in known.items():
+        for name in installed(known):
             for seen in ("thesis", "contact"):
-                for number in range(len(baseline.settings)):
+                for number in range(len(known[name].settings)):
                     arguments = {
                         "baseline": name,
                         "shown": seen,

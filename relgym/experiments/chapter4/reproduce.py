@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from relgym.errors import StoreError
+from relgym.experiments.chapter4.canvas import TITLES
 from relgym.experiments.chapter4.catalogue import JOBS
 from relgym.experiments.chapter4.job import Job, Shown
 from relgym.experiments.chapter4.protocol import LEARNERS, Protocol
@@ -165,14 +166,15 @@ def _made(out: Path) -> Iterator[Made]:
 
 
 def _head(made: Sequence[Made]) -> str:
-    learners = "\n".join(f"- **{name}**: {words}" for name, words in LEARNERS.items())
+    learners = "\n".join(f"- **{TITLES[name]}**: {words}" for name, words in LEARNERS.items())
     contents = "\n".join(f"- [{each.name}: {each.title}](#{_anchor(each)})" for each in made)
     missing = [name for name in JOBS if name not in {each.name for each in made}]
     rest = f"\nNot made yet: {', '.join(missing)}.\n" if missing else ""
     return (
         "# Results\n\n"
-        "Chapter IV of the thesis again, each table and figure beside what was printed. Written by `relgym reproduce`; "
-        "nothing on this\npage is typed by hand. § is a section of the thesis; velocities are in units per step.\n\n"
+        "Chapter IV of the thesis again, each table and figure beside what was printed. `relgym reproduce` wrote this "
+        "page; nothing\non it is typed by hand. *printed* is what the thesis says, § one of its sections; velocities "
+        "are in units per step.\n\n"
         f"Learners:\n\n{learners}\n\n{contents}\n{rest}"
     )
 

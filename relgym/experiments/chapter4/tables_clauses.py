@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from relgym.experiments.chapter4.canvas import PRINTED, TITLES, text_figure
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import MODES, PublishedPair, published_pairs
@@ -77,23 +78,25 @@ def _pairs_shown(sections: Sequence[PublishedPair], named: Mapping[str, _Pairs])
         ]
         parts = [
             (
-                f"thesis: mode {section.mode} vs. {section.rival} (train perf. {section.performance:.4f})",
+                f"{PRINTED}: mode {section.mode} vs. {section.rival} (train perf. {section.performance:.4f})",
                 lines,
             )
         ]
-        data += [["thesis", section.mode, section.rival, *line] for line in lines]
+        data += [[PRINTED, section.mode, section.rival, *line] for line in lines]
         for learner, pairs in named.items():
             pair = pairs.get(frozenset((section.mode, section.rival)))
             if pair is None:
-                parts.append((f"{learner}: has not both modes", []))
+                parts.append((f"{TITLES[learner]}: has not both modes", []))
                 continue
             own = [_line(row) for row in pair["rows"]]
             right, wrong = sum(r["correct"] for r in pair["rows"]), sum(r["incorrect"] for r in pair["rows"])
             share = right / max(right + wrong, 1)
-            parts.append((f"{learner}: mode {pair['mode']} rather than {pair['rival']} ({share:.4f})", own))
+            parts.append(
+                (f"{TITLES[learner]}: mode {pair['mode']} rather than {pair['rival']} ({share:.4f})", own)
+            )
             data += [[learner, pair["mode"], pair["rival"], *line] for line in own]
         texts.append(_section(parts))
-    note = "Modes are numbered as in the thesis. Relgym as it comes needs no clauses where laws of contacts govern."
+    note = "Modes are numbered as in the thesis. The default learner needs no clauses where laws of contacts govern."
     return Shown("\n\n".join([*texts, note]), data)
 
 
@@ -122,12 +125,13 @@ _ROLES: Final = (
 def roles_shown(_: Protocol, values: Values) -> Shown:
     """Figure 3.8; its boxes as rows."""
     rows: list[list[Cell]] = [["learner", "mode", "role", "who plays it"]]
-    rows += [["thesis", *row] for row in _ROLES]
+    rows += [[PRINTED, *row] for row in _ROLES]
     for learner, runs in values.items():
         target = next(t for t in runs[0]["report"]["targets"] if t["target"] == "truck.vx")
         for role in target["roles"]:
             mode = runs[0]["stated"][str(role["mode"])] + 1
             rule = role["rule"] or f"(any {role['type']})"
-            rows.append([learner, mode, ", ".join(role["roles"]), rule])
+            rows.append([TITLES[learner], mode, ", ".join(role["roles"]), rule])
     heading, *lines = rows
-    return Shown(table([str(h) for h in heading], lines), rows)
+    text = table([str(h) for h in heading], lines)
+    return Shown(text, rows, lambda path: text_figure(path, text))

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from relgym.experiments.chapter4.canvas import PRINTED, TITLES
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import CONFUSIONS, MODES, ROLLOUT_FAILURES, Confusion
@@ -28,19 +29,24 @@ def confusion_shown(_: Protocol, values: Values, number: str) -> Shown:
     """Which mode was taken for which, a single model of each learner."""
     modes, axis = _TARGETS[number]
     target, published = f"ball.v{axis}", MODES[modes, axis]
-    texts = [f"thesis: rate of errors {CONFUSIONS[number].rate:.4f}\n\n{_published(CONFUSIONS[number])}"]
+    texts = [f"{PRINTED}: rate of errors {CONFUSIONS[number].rate:.4f}\n\n{_published(CONFUSIONS[number])}"]
     data: list[list[Cell]] = [["learner", "predicted", "correct", "count"]]
     for learner, runs in values.items():
         run = best_run(runs)
         found = run["confusions"].get(target)
         if found is None:
             score = run["scores"][-1]["targets"][target]["counted"]
-            texts.append(f"{learner}: laws, no modes; wrong {score['wrong']} of {score['examples']:,}")
+            texts.append(
+                f"{TITLES[learner]}: laws, no modes; wrong {score['wrong']} of {score['examples']:,}"
+            )
             continue
-        names = [_name(mode, run["modes"][target], published) for mode in found["modes"]]
-        texts.append(f"{learner}: {_confusion(found['table'], names)}")
+        named = [_name(mode, run["modes"][target], published) for mode in found["modes"]]
+        order = sorted(range(len(named)), key=lambda k: (len(named[k]), named[k]))  # rows of the table first
+        names = [named[k] for k in order]
+        counts = [[found["table"][i][j] for j in order] for i in (*order, len(order))]
+        texts.append(f"{TITLES[learner]}: {_confusion(counts, names)}")
         data += [
-            [learner, row, column, found["table"][i][j]]
+            [learner, row, column, counts[i][j]]
             for i, row in enumerate([*names, "none"])
             for j, column in enumerate(names)
         ]
@@ -87,7 +93,7 @@ def _confusion(counts: Sequence[Sequence[int]], names: Sequence[str]) -> str:
 def rollouts_shown(_: Protocol, values: Values) -> Shown:
     """Table 4.18: what roll-outs failed of."""
     counts = {learner: Counter(t["cause"] for t in runs[0]["trials"]) for learner, runs in values.items()}
-    heading = ["error", "thesis", *values]
+    heading = ["error", PRINTED, *(TITLES[learner] for learner in values)]
     lines: list[list[Cell]] = [
         [cause, ROLLOUT_FAILURES.get(cause, "-"), *(each[cause] for each in counts.values())]
         for cause in CAUSES
@@ -104,7 +110,7 @@ def rollouts_shown(_: Protocol, values: Values) -> Shown:
     bounces = ", ".join(f"{n} {name}" for name, n in some["bounces"].items())
     note = (
         f"A roll-out fails when a position is off by more than 0.01. Its cause is what really happened where it went "
-        f"wrong first.\nBounces in the {len(some['trials'])} trials: {bounces} (thesis: 205 vertical, 108 slant). "
+        f"wrong first.\nBounces in the {len(some['trials'])} trials: {bounces} (printed: 205 vertical, 108 slant). "
         "The thesis corrected 22 bad resolutions by hand."
     )
     return Shown(f"{table(heading, lines)}\n\n{note}", [heading, *lines])
@@ -136,7 +142,7 @@ def rates_shown(_: Protocol, values: Values) -> Shown:
         "strict %",
         "p95",
         "p99.9",
-        "thesis' range %",
+        "printed range %",
     ]
     lines = []
     for group, runs in values.items():
@@ -144,7 +150,9 @@ def rates_shown(_: Protocol, values: Values) -> Shown:
         for target in ("ball.vx", "ball.vy"):
             score = pooled_scores(run["scores"][-1]["targets"][target]["counted"] for run in runs)
             low, high = _EXPECTED[int(experiment), target]
-            lines.append([int(experiment), target, learner, *_shares(score), f"{100 * low:g}-{100 * high:g}"])
+            lines.append(
+                [int(experiment), target, TITLES[learner], *_shares(score), f"{100 * low:g}-{100 * high:g}"]
+            )
     lines.sort(key=lambda line: (line[0], line[1]))
     note = (
         "wrong: off by more than 1e-9, or no prediction. not learned: no learned mode is right. strict: the thesis' "

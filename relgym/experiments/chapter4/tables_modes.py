@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from relgym.experiments.chapter4.canvas import PRINTED, TITLES
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import MODES, PublishedMode
@@ -51,22 +52,26 @@ def modes_shown(_: Protocol, values: Values, experiment: int) -> Shown:
     number = _TABLES[experiment]
     axes = ("x",) if experiment == 3 else ("x", "y")
     texts: list[str] = []
-    rows: list[list[Cell]] = [["axis", "number", "behaviour", "function", "thesis", *values]]
+    rows: list[list[Cell]] = [["axis", "number", "behaviour", "function", PRINTED, *_titles(values)]]
     runs = {learner: best_run(each) for learner, each in values.items()}
     for axis in axes:
         published = MODES[number, axis]
         counts = {learner: _counts(run, f"ball.v{axis}", published) for learner, run in runs.items()}
         lines = _mode_lines(axis, published, counts)
-        heading = ["#", "behaviour (thesis)", "function", "thesis", *values]
+        heading = ["#", "behaviour (printed)", "function", PRINTED, *_titles(values)]
         texts.append(f"{axis} velocity: training examples of each mode\n\n{table(heading, lines)}")
         rows += [[axis, *line] for line in lines]
     note = (
         "A dash: no learned mode states this function. Each column is the batch that errs least; "
-        f"thesis: {amount(BALL_EXPERIMENTS[experiment].blocks * 200, 'example')}.\n"
-        "relgym as it comes has laws of contacts instead of these modes; the functions that follow from them:"
+        f"printed: of {amount(BALL_EXPERIMENTS[experiment].blocks * 200, 'example')}.\n"
+        "The default learner has laws of contacts instead of these modes; the functions that follow from them:"
     )
     law_text = next((run["text"] for name, run in runs.items() if name == "default"), "")
     return Shown("\n\n".join([*texts, note, law_text]), rows)
+
+
+def _titles(values: Values) -> list[str]:
+    return [TITLES[learner] for learner in values]
 
 
 def _mode_lines(
@@ -100,9 +105,15 @@ def _counts(run: Mapping[str, Any], target: str, published: Sequence[PublishedMo
 def _function(axis: str, row: PublishedMode) -> str:
     if row.weights is None:
         return "-"
-    terms = [f"{w:+g} v{name}" for w, name in zip(row.weights, "xy", strict=True) if w]
-    terms += [f"{row.intercept:+g}"] if row.intercept else []
-    return f"v{axis}' = " + (" ".join(terms).lstrip("+") or "0")
+    terms = [
+        ("" if abs(w) == 1.0 else f"{abs(w):g} ") + f"v{n}"
+        for w, n in zip(row.weights, "xy", strict=True)
+        if w
+    ]
+    signs = [w for w in (*row.weights, row.intercept) if w]
+    terms += [f"{abs(row.intercept):g}"] if row.intercept else []
+    text = " ".join(f"{'-' if w < 0 else '+'} {term}" for w, term in zip(signs, terms, strict=True))
+    return f"v{axis}' = " + (text.removeprefix("+ ").replace("- ", "-", text.startswith("- ")) or "0")
 
 
 # ------------------------------------------------------------------ box pushing
@@ -123,7 +134,7 @@ def pushing_modes_shown(_: Protocol, values: Values) -> Shown:
     ]
     noise: list[Cell] = [0, "noise", "-", 0, *(runs[0]["noise"] for runs in values.values())]
     extra: list[Cell] = ["", "modes that are no row", "", "", *(c[-1] for c in counts.values())]
-    heading = ["#", "configuration", "function", "thesis", *values]
+    heading = ["#", "configuration", "function", PRINTED, *_titles(values)]
     lines = [noise, *lines, extra]
     return Shown(f"Training examples of each mode\n\n{table(heading, lines)}", [heading, *lines])
 

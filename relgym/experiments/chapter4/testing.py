@@ -17,7 +17,7 @@ from relgym.model.perception import Perception
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.world_model import WorldModel
 
-__all__ = ["TARGETS", "confusions", "scores_of"]
+__all__ = ["TARGETS", "confusions", "scores_of", "true_modes"]
 
 TARGETS: Final = ("ball.vx", "ball.vy")
 
@@ -62,7 +62,7 @@ def _columns(
         if model.governs(model.property_model(*target.split(".")).target):
             best = np.full(len(actual), np.nan)
         found[target] = (
-            np.concatenate([b.truth.mode[target] for b in part]),
+            np.concatenate([true_modes(b, target, laws) for b in part]),
             np.concatenate([c[target] for c in counted]),
             np.abs(prediction.vectors[:, column] - actual),
             prediction.outcomes[:, k] != _SPOKE,
@@ -70,6 +70,24 @@ def _columns(
             actual - before[:, column],
         )
     return found
+
+
+def true_modes(block: Block, target: str, laws: AnalyticModes) -> NDArray[np.int64]:
+    """Number of each transition's analytic mode; where several contacts act at once, of the simplest that explains it.
+
+    A ball that slides into a wall is touched twice, and each coordinate follows one of the two. Shape ``(n,)``; -1
+    where no mode explains the step.
+    """
+    numbers = block.truth.mode[target].copy()
+    v = block.columns("ball", "vx", "vy")
+    explaining = laws.explaining(target[-1], v[:-1], v[1:], TOLERANCE)
+    unlabelled = (numbers < 0) & explaining.any(axis=1)
+    sizes = [
+        sum(w != 0.0 for w in (*m.weights, m.intercept)) for m in (laws.x if target[-1] == "x" else laws.y)
+    ]
+    simplest = np.argsort(sizes, kind="stable")
+    numbers[unlabelled] = simplest[explaining[unlabelled][:, simplest].argmax(axis=1)]
+    return numbers
 
 
 def _mode_values(

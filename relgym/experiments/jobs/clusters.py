@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
 from relgym.errors import ClusterError, ConfigError
 
-__all__ = ["BACKENDS", "cluster"]
+__all__ = ["BACKENDS", "STREAMING", "cluster"]
 
 BACKENDS: Final = ("local", "dask", "ray")
+
+STREAMING: Final = ("local", "dask")
+"""Backends that hand over each result as it comes; joblib's Ray backend hands over all at once."""
 
 _PATIENCE: Final = 10
 """Seconds to wait for a scheduler's answer."""
@@ -65,6 +69,7 @@ def _dask(address: str) -> Iterator[None]:
 @contextmanager
 def _ray(address: str) -> Iterator[None]:
     joblib, ray = _library("joblib"), _library("ray", extra="ray")
+    _knock(address)
     try:
         ray.init(address=address, log_to_driver=False, logging_level="ERROR")
     except (OSError, ValueError, RuntimeError) as error:
@@ -75,6 +80,17 @@ def _ray(address: str) -> Iterator[None]:
             yield
     finally:
         ray.shutdown()
+
+
+def _knock(address: str) -> None:
+    """Raise `ClusterError` if nothing listens; Ray itself would go on asking for a minute, then end the process."""
+    host, _, port = address.rpartition(":")
+    if not port.isdigit():  # "auto", or a client address: Ray knows where that is
+        return
+    try:
+        socket.create_connection((host, int(port)), timeout=_PATIENCE).close()
+    except OSError as error:
+        raise _unreachable("Ray head node", address, error) from error
 
 
 def _library(name: str, extra: str = "baselines") -> Any:

@@ -31,9 +31,10 @@ _LIBRARIES: Final = {
 
 @cache
 def code_version(module: str) -> str:
-    """Hexadecimal digest of the sources behind a module, and of the versions of the libraries that they import.
+    """Hexadecimal digest of the code behind a module, and of the versions of the libraries that they import.
 
-    A change anywhere else leaves it as it is: what draws a figure isn't what measured it.
+    A change anywhere else leaves it as it is (what draws a figure isn't what measured it), and so does one of comments
+    and docstrings.
 
     Raises
     ------
@@ -43,9 +44,7 @@ def code_version(module: str) -> str:
     digest = hashlib.sha256()
     libraries: set[str] = set()
     for name in modules_behind(module):
-        source = _source(name)
-        assert source is not None, "a module behind another one exists"
-        digest.update(f"{name}\n".encode() + source + b"\0")
+        digest.update(f"{name}\n{ast.dump(_bare(name))}\0".encode())
         libraries |= {found.split(".")[0] for found in _imports(name)} & _LIBRARIES.keys()
     for library in sorted(libraries):
         digest.update(f"{library} {_version(_LIBRARIES[library])}\n".encode())
@@ -78,6 +77,23 @@ def modules_behind(module: str) -> tuple[str, ...]:
 def _imports(module: str) -> frozenset[str]:
     """Dotted names that a module imports, and those of what it takes from them: modules, or names in them."""
     return frozenset(_found(ast.parse(_source(module) or b"")))
+
+
+def _bare(module: str) -> ast.Module:
+    """A module without docstrings and other strings that nothing is done with."""
+    tree = ast.parse(_source(module) or b"")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            node.body = [line for line in node.body if not _idle(line)] or [ast.Pass()]
+    return tree
+
+
+def _idle(line: ast.stmt) -> bool:
+    return (
+        isinstance(line, ast.Expr)
+        and isinstance(line.value, ast.Constant)
+        and isinstance(line.value.value, str)
+    )
 
 
 def _found(tree: ast.Module) -> Iterator[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from relgym.errors import ConfigError, StoreError
-from relgym.experiments.jobs.clusters import cluster
+from relgym.experiments.jobs.clusters import STREAMING, cluster
 from relgym.experiments.jobs.pace import Pace
 from relgym.experiments.jobs.store import Result, ResultStore
 from relgym.experiments.jobs.task import Task
@@ -129,12 +129,26 @@ def _computed(
         if backend == "local" and (jobs == 1 or len(tasks) <= 1):
             yield from map(_compute, tasks)
             return
-        import joblib
+        yield from _streamed(tasks, jobs) if backend in STREAMING else _in_rounds(tasks, jobs)
 
-        parallel = joblib.Parallel(
-            n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs"
+
+def _streamed(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Result]]:
+    """Results in the order in which they come."""
+    import joblib
+
+    parallel = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
+    yield from parallel(joblib.delayed(_compute)(task) for task in tasks)
+
+
+def _in_rounds(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Result]]:
+    """Results round by round, as many tasks in each as there are workers: what is done is kept before all is done."""
+    import joblib
+
+    each = max(1, joblib.effective_n_jobs(jobs))
+    for k in range(0, len(tasks), each):
+        yield from joblib.Parallel(n_jobs=jobs, batch_size=1)(
+            joblib.delayed(_compute)(task) for task in tasks[k : k + each]
         )
-        yield from parallel(joblib.delayed(_compute)(task) for task in tasks)
 
 
 def _compute(task: Task) -> tuple[Task, Result]:

@@ -14,15 +14,25 @@ from relgym.experiments.jobs.store import ResultStore
 from relgym.experiments.jobs.task import Task
 
 TASKS = [
-    Task("relgym.experiments.chapter4.pushing:lesson", {"learner": "thesis", "seed": seed, "repeats": 1})
-    for seed in (100, 101)
+    Task(
+        "relgym.experiments.chapter4.lesson:lesson",
+        {
+            "learner": learner,
+            "experiment": 1,
+            "seed": 100,
+            "order": 0,
+            "checkpoints": [1, 2],
+            "tests": {"seeds": [110], "blocks": 2},
+        },
+    )
+    for learner in ("world", "default")
 ]
 
 
 def _values(folder: Path, **options: Any) -> list[Any]:
     store = ResultStore(folder)
     list(run(TASKS, store, **options))
-    return results(TASKS, store)
+    return [{**value, "seconds": None} for value in results(TASKS, store)]
 
 
 @pytest.mark.cluster
@@ -52,7 +62,7 @@ def test_nobody_answers(backend: str, tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         with pytest.raises(
-            ClusterError, match="answers at '127.0.0.1:9'.* start the cluster, or check --address"
+            ClusterError, match=r"answers at '127.0.0.1:9'.* start the cluster, or check --address"
         ):
             list(run(TASKS, ResultStore(tmp_path), backend=backend, address="127.0.0.1:9"))
     assert not list(tmp_path.iterdir())

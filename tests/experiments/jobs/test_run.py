@@ -8,6 +8,7 @@ import time
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from relgym.errors import ConfigError, StoreError
@@ -80,6 +81,35 @@ def test_a_killed_run_repeats_nothing_that_was_finished(tmp_path: Path) -> None:
     repeated = [int(line) for line in log.read_text().split()][len(begun) :]
     assert set(repeated) == set(range(12)) - finished
     assert len(list(folder.rglob("[!.]*.json"))) == 12
+
+
+@pytest.mark.slow
+def test_twenty_kills_at_random_moments_change_nothing(tmp_path: Path) -> None:
+    (tmp_path / "slow_module.py").write_text(SLOW.replace("0.02", "0.3"))
+    (tmp_path / "main.py").write_text(MAIN)
+    log, environment = tmp_path / "log", os.environ | {"PYTHONPATH": str(tmp_path)}
+    rng = np.random.default_rng(0)
+
+    def command(folder: str) -> list[str]:
+        return [sys.executable, str(tmp_path / "main.py"), str(tmp_path / folder), str(log)]
+
+    for _ in range(20):
+        kept = len(list((tmp_path / "killed").rglob("[!.]*.json")))
+        with subprocess.Popen(command("killed"), env=environment, stdout=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            process.stdout.readline()  # it has begun
+            time.sleep(float(rng.uniform(0.0, 0.6)))
+            process.kill()
+        assert len(list((tmp_path / "killed").rglob("[!.]*.json"))) >= kept
+    subprocess.run(command("killed"), env=environment, check=True, capture_output=True)
+    begun = len(log.read_text().split())
+    assert begun <= 12 + 20  # every kill costs at most the task that was running
+    subprocess.run(command("whole"), env=environment, check=True, capture_output=True)
+    values = [
+        {path.name: json.loads(path.read_text())["value"] for path in (tmp_path / folder).rglob("[!.]*.json")}
+        for folder in ("killed", "whole")
+    ]
+    assert len(values[0]) == 12 and values[0] == values[1]
 
 
 def test_unknown_backend_and_missing_address(tmp_path: Path) -> None:

@@ -62,5 +62,5 @@ def test_no_space_left_leaves_nothing_half_written(
 
 def test_a_file_in_the_way_of_the_folder(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
-    with pytest.raises(StoreError, match="can't be written .* choose another folder with --out"):
+    with pytest.raises(StoreError, match=r"can't be written .* choose another folder with --out"):
         ResultStore(tmp_path / "taken").put(TASK, Result(1, 1.0))

@@ -214,6 +214,18 @@ def refused(env: Any, model: Any = None, *, name: str = "SAC", **options: Any) -
     algorithm.learn(5, callback=Dyna(model or LineModel(), DynaConfig(**QUICK), **options))
 
 
+def test_updates_are_counted_per_real_step() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    counts = []
+    for model in (LineModel(), LineModel(off=1.0)):
+        algorithm = agent("SAC", flat(), train_freq=4, gradient_steps=3)
+        algorithm.learn(40, callback=Dyna(model, DynaConfig(**QUICK)))
+        counts.append(algorithm._n_updates)  # the only count there is
+    # After 10 first steps, training comes after steps 12, 16, ..., 40: 8 times 2 x 4 updates, or 3.
+    assert counts == [64, 24]
+
+
 def test_refusals_name_the_remedy() -> None:
     import stable_baselines3
 
@@ -229,6 +241,9 @@ def test_refusals_name_the_remedy() -> None:
         refused(Flat(LineEnv()))
     with pytest.raises(ConfigError, match=r"the algorithm's observation_space is .*dream in the wrappers"):
         refused(flat(), like=plain())
+    by_episode = agent("SAC", flat(), train_freq=(1, "episode"))
+    with pytest.raises(ConfigError, match="expected steps, since updates are counted per real step"):
+        by_episode.learn(5, callback=Dyna(LineModel()))
     taskless = flat()
     taskless.unwrapped.task = None  # type: ignore[attr-defined]
     with pytest.raises(ConfigError, match="nothing says what a dream is worth"):

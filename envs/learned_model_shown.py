@@ -1,0 +1,271 @@
+"""What dreams show of their scenes, and how actions come into them: as the env that the model was learned in."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector.utils import concatenate, create_empty_array
+from numpy.typing import NDArray
+
+from relgym.envs.actions import BatchActions, acting
+from relgym.envs.arguments import checked_actions
+from relgym.envs.views import SceneView, TaskView, View
+from relgym.errors import ConfigError
+from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
+
+__all__ = ["BoxesShown", "Deeds", "Shown", "ViewShown", "checked_boxes", "is_plain"]
+
+
+class Deeds(Protocol):
+    """Puts the actions of n dreams into their scenes."""
+
+    @property
+    def layout(self) -> SceneLayout:
+        """Layout of the scenes with what is done in them."""
+        ...
+
+    def checked(self, actions: Any, count: int) -> Any:
+        """Actions as an array of shape ``(count, …)``; `ActionError` unless all lie in the space."""
+        ...
+
+    def joined(self, vectors: Float2D, actions: Any) -> Float2D:
+        """State vectors with the actions in them, shape ``(n, layout.width)``."""
+        ...
+
+    def parted(self, vectors: Float2D) -> Float2D:
+        """State vectors without the actions."""
+        ...
+
+
+class Shown(Protocol):
+    """How scenes become observations.
+
+    Attributes
+    ----------
+    layout
+        Layout of the scenes of a batch, without an action.
+    """
+
+    layout: SceneLayout
+
+    def acting(self, scene: Scene, action: Any) -> Scene:
+        """The scene with a checked action in it."""
+        ...
+
+    def deeds(self) -> Deeds:
+        """The same for batches."""
+        ...
+
+    def observation(self, scene: Scene) -> Any:
+        """What an agent sees of a scene."""
+        ...
+
+    def observations(self, vectors: Float2D) -> Any:
+        """What an agent sees of n scenes: arrays of their own."""
+        ...
+
+    def inside(self, vectors: Float2D) -> NDArray[np.bool_]:
+        """Which of n scenes lie in the observation space, shape ``(n,)``."""
+        ...
+
+    def outside(self, scene: Scene) -> str:
+        """What of a scene lies outside the observation space, as a sentence; empty if nothing does."""
+        ...
+
+
+def is_plain(view: View) -> bool:
+    """Whether a view shows scenes as they are, so that arrays do."""
+    return isinstance(view.view if isinstance(view, TaskView) else view, SceneView)
+
+
+class BoxesShown:
+    """Scenes as they are: ``Dict``, object name -> ``Box``; no loop over scenes anywhere.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    observation_space, action_space
+        Spaces of one dream.
+
+    Raises
+    ------
+    ConfigError
+        The observation space isn't a Dict of such Boxes.
+    """
+
+    def __init__(
+        self, schema: SceneSchema, observation_space: spaces.Space[Any], action_space: spaces.Space[Any]
+    ) -> None:
+        seen = checked_boxes(observation_space, schema)
+        self._schema, self._action_space = schema, action_space
+        self.layout = schema.layout([*seen, *(name for name in (TASK,) if name in schema.order)])
+        names = self.layout.names
+        # As the real env's observations; the Dict space sorts its keys.
+        self._cuts = [
+            (name, self.layout.slice(i), seen[name].dtype) for i, name in enumerate(names) if name in seen
+        ]
+        self._low, self._high = np.full(self.layout.width, -np.inf), np.full(self.layout.width, np.inf)
+        for name, cut, _ in self._cuts:
+            self._low[cut], self._high[cut] = seen[name].low, seen[name].high
+
+    def acting(self, scene: Scene, action: Any) -> Scene:
+        """The scene with a checked action in it."""
+        return acting(scene, action)
+
+    def deeds(self) -> Deeds:
+        """The same for batches."""
+        return BatchActions(self._schema, self.layout, self._action_space)
+
+    def observation(self, scene: Scene) -> dict[str, NDArray[Any]]:
+        """Property vectors by object."""
+        return self.observations(scene.vector)
+
+    def observations(self, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+        """Property vectors by object, of one state vector or of n."""
+        return {name: vectors[..., cut].astype(dtype) for name, cut, dtype in self._cuts}
+
+    def inside(self, vectors: Float2D) -> NDArray[np.bool_]:
+        """Which of n scenes lie in the observation space, shape ``(n,)``."""
+        return np.asarray(((self._low <= vectors) & (vectors <= self._high)).all(axis=1))
+
+    def outside(self, scene: Scene) -> str:
+        """Which properties lie outside the observation space."""
+        vector, low, high = scene.vector, self._low, self._high
+        left = np.flatnonzero(~((low <= vector) & (vector <= high)))
+        if not len(left):
+            return ""
+        names = [f"{o.name}.{p}" for o in scene for p in o.type.properties]
+        return "; ".join(
+            f"{names[k]} = {vector[k]:g} left the observation space [{low[k]:g}, {high[k]:g}]" for k in left
+        )
+
+
+class ViewShown:
+    """Scenes through a view (`relgym.envs.views`): whatever the env's observations are; one scene at a time.
+
+    Parameters
+    ----------
+    view
+        Turns scenes into observations and actions into objects.
+    observation_space, action_space
+        Spaces of one dream.
+    """
+
+    def __init__(
+        self, view: View, observation_space: spaces.Space[Any], action_space: spaces.Space[Any]
+    ) -> None:
+        self._view, self._space, self._action_space = view, observation_space, action_space
+        self._schema = view.schema
+        self.layout = self._schema.layout(name for name in self._schema.order if name != ACTION)
+
+    def acting(self, scene: Scene, action: Any) -> Scene:
+        """The scene with a checked action in it."""
+        return self._view.with_action(scene, action)
+
+    def deeds(self) -> Deeds:
+        """The same for batches."""
+        return ViewDeeds(self._view, self.layout, self._action_space)
+
+    def observation(self, scene: Scene) -> Any:
+        """The observation that shows a scene."""
+        return self._view.observation(scene)
+
+    def observations(self, vectors: Float2D) -> Any:
+        """Observations of n scenes, batched as Gymnasium batches them."""
+        seen = [self.observation(self._scene(vector)) for vector in vectors]
+        empty: Any = create_empty_array(self._space, len(seen))
+        return concatenate(self._space, seen, empty)
+
+    def inside(self, vectors: Float2D) -> NDArray[np.bool_]:
+        """Which of n scenes lie in the observation space, shape ``(n,)``."""
+        return np.array([not self.outside(self._scene(vector)) for vector in vectors], dtype=np.bool_)
+
+    def outside(self, scene: Scene) -> str:
+        """The observation, if it lies outside the observation space."""
+        observation = self.observation(scene)
+        if self._space.contains(observation):
+            return ""
+        return f"the observation {observation} left the observation space {self._space}"
+
+    def _scene(self, vector: Float1D) -> Scene:
+        return Scene(self._schema, self.layout, vector.copy())
+
+
+class ViewDeeds:
+    """`Deeds` through a view: each distinct action is asked for once.
+
+    Parameters
+    ----------
+    view
+        Turns actions into objects.
+    layout
+        Layout of the scenes without an action.
+    space
+        Action space of one scene.
+    """
+
+    def __init__(self, view: View, layout: SceneLayout, space: spaces.Space[Any]) -> None:
+        self._view, self._space, self._bare = view, space, layout
+
+    @cached_property
+    def layout(self) -> SceneLayout:
+        """Layout of the scenes with what is done in them."""
+        schema = self._view.schema
+        return schema.layout(schema.order if ACTION in schema.order else self._bare.names)
+
+    def checked(self, actions: Any, count: int) -> Any:
+        """Actions as an array of shape ``(count, …)``; `ActionError` unless all lie in the space."""
+        return checked_actions(self._space, actions, count)
+
+    def joined(self, vectors: Float2D, actions: Any) -> Float2D:
+        """State vectors with the actions in them, shape ``(n, layout.width)``."""
+        if self.layout is self._bare:
+            return vectors
+        distinct, which = np.unique(
+            np.asarray(actions).reshape(len(vectors), -1), axis=0, return_inverse=True
+        )
+        shape = np.shape(actions)[1:]
+        done = np.array([self._values(action.reshape(shape)) for action in distinct])
+        both = np.empty((len(vectors), self.layout.width))
+        both[:, self._own], both[:, self._rest] = done[which.reshape(-1)], vectors
+        return both
+
+    def parted(self, vectors: Float2D) -> Float2D:
+        """State vectors without the actions."""
+        return vectors if self.layout is self._bare else vectors[:, self._rest]
+
+    @cached_property
+    def _own(self) -> NDArray[np.intp]:
+        return np.arange(self.layout.width)[self.layout.slice(self.layout.index(ACTION))]
+
+    @cached_property
+    def _rest(self) -> NDArray[np.intp]:
+        return np.delete(np.arange(self.layout.width), self._own)
+
+    def _values(self, action: Any) -> Float1D:
+        """Properties of the action object; they don't depend on the scene."""
+        empty = Scene(self._view.schema, self._bare, np.zeros(self._bare.width))
+        return self._view.with_action(empty, action[()])[ACTION].values
+
+
+def checked_boxes(space: spaces.Space[Any], schema: SceneSchema) -> dict[str, spaces.Box]:
+    """The Boxes of some objects; `ConfigError` unless the space is a Dict of them."""
+    parts = space.spaces if isinstance(space, spaces.Dict) else {}
+    boxes = {
+        name: box
+        for name, box in parts.items()
+        if isinstance(box, spaces.Box)
+        and name in schema.order
+        and box.shape == (len(schema.type_of(name).properties),)
+    }
+    if not boxes or len(boxes) < len(parts):
+        raise ConfigError(
+            f"expected a Dict observation space, object name -> Box with a number for each property, for the objects "
+            f"{[name for name in schema.order if name != ACTION]}, got {space}; wrap the dream as the env was, or "
+            "pass the view that the model was learned through"
+        )
+    return boxes

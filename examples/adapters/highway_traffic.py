@@ -1,0 +1,108 @@
+"""Traffic of highway-env as a table of cars, re-sorted at every step: what moves how, and how well it is foreseen.
+
+Run: make example-highway
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, fields
+from typing import Any
+
+import gymnasium as gym
+import highway_env  # noqa: F401 - registers the envs
+import numpy as np
+
+from relgym.wrappers import ModelLearner, Rows, TableView
+
+COLUMNS = ("presence", "x", "y", "vx", "vy", "heading")
+CARS = 6
+"""Rows of the table: the agent's own car, and the five nearest."""
+
+
+@dataclass(frozen=True)
+class Args:
+    """Settings; each is a command-line option."""
+
+    steps: int = 3000
+    """transitions to learn from"""
+    test: int = 500
+    """transitions of fresh episodes to test on"""
+    seed: int = 0
+    """seed of episodes and actions; tests begin 10,000 later"""
+
+
+def highway() -> gym.Env[Any, Any]:
+    """Five decisions a second; positions in metres, of the road and not of the car."""
+    table = {
+        "type": "Kinematics",
+        "vehicles_count": CARS,
+        "features": list(COLUMNS),
+        "absolute": True,
+        "normalize": False,
+        "clip": False,
+    }
+    return gym.make(
+        "highway-fast-v0",
+        config={"observation": table, "policy_frequency": 5, "simulation_frequency": 15, "duration": 40},
+    )
+
+
+def learner_of(env: gym.Env[Any, Any]) -> ModelLearner:
+    """The first row is the agent's own car, the others are whoever is near: matched by where they should be."""
+    view = TableView(
+        env.observation_space,
+        env.action_space,
+        columns=COLUMNS,
+        rows=[Rows("ego"), Rows("car", CARS - 1)],
+        presence="presence",
+        match={"x": 4.0, "y": 2.0, "vx": 5.0},
+        actions=("lane_left", "idle", "lane_right", "faster", "slower"),
+    )
+    return ModelLearner(env, view=view, targets=["ego.x", "car.x"])
+
+
+def live(env: ModelLearner, steps: int, seed: int) -> dict[str, tuple[list[float], list[float]]]:
+    """Random actions; per target the errors of all predictions and the changes that came."""
+    said: dict[str, tuple[list[float], list[float]]] = {str(t): ([], []) for t in env.model.targets}
+    env.action_space.seed(seed)
+    env.reset(seed=seed)
+    for _ in range(steps):
+        before = env.scene
+        *_, terminated, truncated, info = env.step(env.action_space.sample())
+        report = info["relgym"]
+        for (name, prop), residual in report.residuals.items():
+            kind = env.view.schema.type_of(name).name
+            errors, changes = said[f"{kind}.{prop}"]
+            errors.append(residual)
+            changes.append(env.scene[name][prop] - before[name][prop])
+        if terminated or truncated:
+            env.reset()
+    return said
+
+
+def main(args: Args) -> None:
+    """Learn, print the laws, then test on fresh episodes without learning."""
+    env = learner_of(highway())
+    live(env, args.steps, args.seed)
+    for target in env.model.targets:
+        for mode in env.model.modes(target.type, target.property):
+            print(f"{target}: {mode.formula(4)}   ({mode.examples} transitions)")
+    env.pause()
+    said = live(env, args.test, args.seed + 10_000)
+    for target, (errors, changes) in said.items():
+        print(
+            f"{target}: one-step error {np.sqrt(np.mean(np.square(errors))) / np.std(changes):.3f} of the change's"
+        )
+
+
+def parse() -> Args:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    for f in fields(Args):
+        parser.add_argument(f"--{f.name}", type=type(f.default), default=f.default)
+    return Args(**vars(parser.parse_args()))
+
+
+if __name__ == "__main__":
+    main(parse())

@@ -1,0 +1,99 @@
+"""Does dreaming pay where things bounce? Fly a ball with weak thrusters from place to place, and stay there.
+
+The ball acts once in five steps: the laws that the model learns are those of single steps. Needs the extra sb3.
+Run: python examples/dyna_ball.py --decisions 2000
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, fields
+from typing import Any
+
+import gymnasium as gym
+
+import relgym
+from relgym.wrappers.action_repeat import ActionRepeat
+from relgym.wrappers.flat import FlatView
+from relgym.wrappers.sb3 import Dyna, DynaConfig, TransitionRecorder, replay_options
+
+
+@dataclass(frozen=True)
+class Args:
+    """Settings; each is a command-line option."""
+
+    decisions: int = 2000
+    """real decisions, of five steps each"""
+    warm_up: int = 500
+    """of them random, at first"""
+    updates: int = 20
+    """gradient steps per decision, once the model is trusted"""
+    episodes: int = 20
+    """test episodes"""
+    seed: int = 0
+    """seed of everything random"""
+
+
+def make_env() -> gym.Env[Any, Any]:
+    """Scenes for the model, decisions and short vectors for the agent."""
+    return FlatView(ActionRepeat(TransitionRecorder(gym.make("relgym/BallGoal-v0")), 5))
+
+
+def main(args: Args) -> None:
+    """Train SAC with Dyna, test it, and print the laws it dreamed by."""
+    from stable_baselines3 import SAC
+
+    env = make_env()
+    env.action_space.seed(args.seed)
+    model = relgym.WorldModel(env.get_wrapper_attr("schema"))
+    # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals stay where they are.
+    config = DynaConfig(
+        horizon=30,
+        dreams=32,
+        every=20,
+        from_start=0.3,
+        redraw=False,
+        updates=args.updates,
+        seed=args.seed,
+    )
+    dyna = Dyna(model, config)
+    agent = SAC(
+        "MlpPolicy",
+        env,
+        learning_rate=1e-3,
+        tau=0.01,
+        learning_starts=args.warm_up,
+        policy_kwargs={"net_arch": [64, 64]},
+        seed=args.seed,
+        device="cpu",
+        **replay_options(env.observation_space),
+    )
+    agent.learn(args.decisions, callback=dyna)
+    gate = dyna.apprentice.gate
+    print(f"prequential error {gate.error:.3f}, trusted: {gate.open}, imagined: {dyna.imagined:,} decisions")
+
+    tests = make_env()
+    good = sum(play(agent, tests, seed=10_000 + k) for k in range(args.episodes))
+    print(f"{good} of {args.episodes} test episodes reach the goal after {args.decisions:,} real decisions\n")
+    print(model.describe())
+
+
+def play(agent: Any, env: gym.Env[Any, Any], *, seed: int) -> bool:
+    """One real episode; whether it ends well."""
+    seen, _ = env.reset(seed=seed)
+    while True:
+        seen, _, terminated, truncated, info = env.step(agent.predict(seen, deterministic=True)[0])
+        if terminated or truncated:
+            return bool(info["is_success"])
+
+
+def parse() -> Args:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    for f in fields(Args):
+        parser.add_argument(f"--{f.name}", type=type(f.default), default=f.default)
+    return Args(**vars(parser.parse_args()))
+
+
+if __name__ == "__main__":
+    main(parse())

@@ -1,0 +1,208 @@
+"""Non-linear features as further regression columns (§5.1's wish): products, powers, sines, users' functions.
+
+A feature is a product of *atoms*; an atom is a column as it is, its sine or cosine at a frequency, or a function that
+the user registered. Features belong to the target object (slot 0), even where an action takes part in the product.
+They are stated by name (``cos(3 x)``, ``action.force cos(th)``), and a mode that uses one is still linear in it, so
+everything that is learned of linear modes holds for them too.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.errors import ConfigError
+
+__all__ = ["NO_FEATURES", "Atom", "Feature", "Library", "library_of", "register_function"]
+
+FREQUENCIES = (1, 2, 3)
+"""Sines and cosines are offered at these multiples; only the first one enters products."""
+
+_DEGREES = {"squares": 2, "products": 2, "degree3": 3, "degree4": 4}
+_ENTRY = re.compile(r"(?:(?P<type>\w+):)?(?P<kind>\w+)(?:\((?P<names>[\w, ]+)\))?")
+
+Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+_functions: dict[str, Function] = {}
+
+
+def register_function(name: str, function: Function) -> None:
+    """Make a function of one number available as a feature by its name.
+
+    Parameters
+    ----------
+    name
+        A Python identifier; model files refer to it, so register it before loading one.
+    function
+        Maps a float64 array element by element; must be defined wherever the env goes.
+
+    Raises
+    ------
+    ConfigError
+        The name is no identifier or means something already.
+    """
+    if not name.isidentifier() or name in {"trig", "sin", "cos", *_DEGREES}:
+        raise ConfigError(f"expected a new identifier as a function's name, got {name!r}; choose another one")
+    _functions[name] = function
+
+
+@dataclass(frozen=True, slots=True)
+class Atom:
+    """A factor of a feature: column `column` as it is, or a function of `frequency` times it."""
+
+    column: int
+    function: str = ""
+    frequency: int = 1
+
+    def values(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """On rows ``(n, d)``, shape ``(n,)``."""
+        column: NDArray[np.float64] = x[:, self.column]
+        if not self.function:
+            return column
+        if self.function == "sin":
+            return np.sin(self.frequency * column)
+        if self.function == "cos":
+            return np.cos(self.frequency * column)
+        return np.asarray(_functions[self.function](column), dtype=np.float64)
+
+    def text(self, name: str) -> str:
+        """How it is printed, given the column's name."""
+        if not self.function:
+            return name
+        return f"{self.function}({name if self.frequency == 1 else f'{self.frequency} {name}'})"
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A product of atoms, and its name."""
+
+    name: str
+    atoms: tuple[Atom, ...]
+
+    @property
+    def columns(self) -> frozenset[int]:
+        """Columns it is made of."""
+        return frozenset(atom.column for atom in self.atoms)
+
+    def values(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """On rows ``(n, d)``, shape ``(n,)``; multiplied in a fixed order, hence repeatable."""
+        product = self.atoms[0].values(x)
+        for atom in self.atoms[1:]:
+            product = product * atom.values(x)
+        return product
+
+    def moved(self, places: Sequence[int]) -> Feature:
+        """The same feature of columns that lie elsewhere: column k at ``places[k]``."""
+        return replace(self, atoms=tuple(replace(a, column=places[a.column]) for a in self.atoms))
+
+
+@dataclass(frozen=True)
+class Library:
+    """Which features a type's targets are offered.
+
+    Parameters
+    ----------
+    kinds
+        Of ``"squares"``, ``"products"`` (of two atoms), ``"degree3"``, ``"degree4"``, ``"trig"`` and registered
+        functions' names. With ``"trig"``, products may hold a sine or cosine too.
+    angles
+        Properties whose sines and cosines are taken; none: all of the target's own.
+    """
+
+    kinds: tuple[str, ...] = ()
+    angles: tuple[str, ...] = ()
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.kinds, self.angles))
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def features(self, names: Sequence[str], own: Sequence[bool]) -> tuple[Feature, ...]:
+        """Features of some columns, the simplest first.
+
+        Parameters
+        ----------
+        names
+            The columns' names, in order; next values end with a prime.
+        own
+            Whether a column is a property of the target (or of another object that moves), not of an action.
+        """
+        if not self.kinds:
+            return ()
+        turning = [k for k, name in enumerate(names) if own[k] and self._turns(name)]
+        waves = [Atom(k, f, w) for k in turning for w in FREQUENCIES for f in ("sin", "cos")]
+        named = [Atom(k, f) for f in self.kinds if f in _functions for k in range(len(names))]
+        found = [Feature(atom.text(names[atom.column]), (atom,)) for atom in (*waves, *named)]
+        raw = [Atom(k) for k in range(len(names))]
+        atoms = [*raw, *(a for a in waves if a.frequency == 1), *named]
+        for degree in range(2, self._degree + 1):
+            for product in itertools.combinations_with_replacement(atoms, degree):
+                if self._offered(product, names):
+                    found.append(Feature(_product_text(product, names), product))
+        return tuple(found)
+
+    @property
+    def _degree(self) -> int:
+        return max((_DEGREES.get(kind, 1) for kind in self.kinds), default=1)
+
+    def _turns(self, name: str) -> bool:
+        return "trig" in self.kinds and (
+            not self.angles or name.rstrip("'").rpartition(".")[2] in self.angles
+        )
+
+    def _offered(self, product: Sequence[Atom], names: Sequence[str]) -> bool:
+        if "squares" in self.kinds and self._degree == 2 and "products" not in self.kinds:
+            return len(set(product)) == 1
+        # Next values enter products of two only: a library of higher degree would explode.
+        return len(product) == 2 or not any(names[a.column].endswith("'") for a in product)
+
+
+NO_FEATURES = Library()
+"""The library of those who don't ask for one: linear functions."""
+
+
+def library_of(entries: Iterable[str], type_name: str, angles: tuple[str, ...]) -> Library:
+    """What ``ModelConfig.features`` offers the targets of a type.
+
+    Parameters
+    ----------
+    entries
+        Such as ``"trig"``, ``"trig(th)"`` (only of that property) or ``"cart:products"`` (only for that type).
+    type_name, angles
+        The type, and those of its properties that are declared angles.
+
+    Raises
+    ------
+    ConfigError
+        An entry that is no known kind and no registered function.
+    """
+    kinds: list[str] = []
+    named: list[str] = []
+    for entry in entries:
+        match = _ENTRY.fullmatch(entry)
+        kind = match["kind"] if match else entry
+        if match is None or (kind != "trig" and kind not in _DEGREES and kind not in _functions):
+            raise ConfigError(
+                f"features: {entry!r} is unknown; expected 'trig', 'trig(property)', {sorted(_DEGREES)}, or a function "
+                f"registered before, of which there are {sorted(_functions)}; 'type:kind' offers it to one type only"
+            )
+        if match["type"] in (None, type_name):
+            kinds.append(kind)
+            named += [name.strip() for name in (match["names"] or "").split(",") if name.strip()]
+    return Library(tuple(dict.fromkeys(kinds)), tuple(dict.fromkeys(named)) or angles)
+
+
+def _product_text(product: Sequence[Atom], names: Sequence[str]) -> str:
+    parts = []
+    for atom, group in itertools.groupby(product):
+        power = len(list(group))
+        text = atom.text(names[atom.column])
+        parts.append(text if power == 1 else f"{text}^{power}")
+    return " ".join(parts)

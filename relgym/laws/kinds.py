@@ -1,0 +1,144 @@
+"""One axis' law for all kinds of contacts, or several where that is shorter: materials differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.laws.pieces import AxisExamples
+from relgym.laws.records import AxisLaw, Kind, Operator, Piece
+from relgym.laws.selection import AxisFit, fit_axis, refitted
+
+__all__ = ["KindsFit", "fit_apart", "fit_together"]
+
+JOINS = 0.98
+"""A kind of contact obeys a law of other kinds if that explains at least this share of its examples."""
+
+
+@dataclass(frozen=True, slots=True)
+class KindsFit:
+    """The laws of one axis, and which examples they explain."""
+
+    laws: tuple[AxisLaw, ...]
+    explained: NDArray[np.bool_]
+
+    @property
+    def bits(self) -> float:
+        """Description length of all laws, what they leave unexplained included."""
+        return sum(law.bits for law in self.laws)
+
+
+def fit_together(
+    examples: AxisExamples, kinds: NDArray[np.intp], names: Sequence[Kind], *, rng: np.random.Generator
+) -> KindsFit:
+    """One law for all kinds of contacts.
+
+    Parameters
+    ----------
+    examples
+        Examples of the axis.
+    kinds, names
+        Number of each example's kind, and what the kinds are.
+    rng
+        Source of random samples.
+    """
+    whole = fit_axis(examples, rng=rng)
+    everyone = tuple(names[k] for k in np.unique(kinds).tolist())
+    return KindsFit((_law(whole, everyone, examples),), whole.explained)
+
+
+def fit_apart(
+    examples: AxisExamples,
+    kinds: NDArray[np.intp],
+    names: Sequence[Kind],
+    together: KindsFit,
+    limit: float,
+    *,
+    rng: np.random.Generator,
+) -> KindsFit:
+    """Several laws, each for some kinds, if that is shorter than one for all; else that one.
+
+    Parameters
+    ----------
+    examples, kinds, names
+        As for `fit_together`.
+    together
+        The law of all kinds.
+    limit
+        Several laws are given up as soon as they need as many bits.
+    rng
+        Source of random samples.
+    """
+    present = np.unique(kinds)
+    if together.explained.all() or len(present) == 1:
+        return together
+    groups = _alike(examples, _groups(examples, kinds, present, min(limit, together.bits), rng=rng))
+    if len(groups) < 2:
+        return together
+    explained = np.zeros(len(examples), dtype=bool)
+    laws = []
+    for fit, members, rows in groups:
+        explained[rows] = fit.explained
+        laws.append(_law(fit, tuple(names[k] for k in members), examples.rows(rows)))
+    apart = KindsFit(tuple(laws), explained)
+    naming = float(len(present) * np.log2(len(groups)))
+    return apart if apart.bits + naming < together.bits else together
+
+
+def _groups(
+    examples: AxisExamples,
+    kinds: NDArray[np.intp],
+    present: NDArray[np.intp],
+    limit: float,
+    *,
+    rng: np.random.Generator,
+) -> list[tuple[AxisFit, list[int], NDArray[np.intp]]]:
+    """Kinds that share a law: the fit, the kinds and their rows, the most frequent kinds first.
+
+    None at all as soon as they need as many bits as `limit`.
+    """
+    groups: list[tuple[AxisFit, list[int], NDArray[np.intp]]] = []
+    for kind in sorted(present.tolist(), key=lambda k: (-int((kinds == k).sum()), k)):
+        rows = np.flatnonzero(kinds == kind)
+        for g, (fit, members, theirs) in enumerate(groups):
+            # Separate fits know different pieces: the larger group's form is tried on both together.
+            both = np.concatenate([theirs, rows])
+            joint = refitted(examples.rows(both), fit.operator, fit.pieces)
+            if joint.explained[len(theirs) :].mean() >= JOINS:
+                groups[g] = (joint, [*members, kind], both)
+                break
+        else:
+            groups.append((fit_axis(examples.rows(rows), rng=rng), [kind], rows))
+            if sum(fit.bits for fit, _, _ in groups) >= limit:
+                return []
+    return groups
+
+
+def _alike(
+    examples: AxisExamples, groups: list[tuple[AxisFit, list[int], NDArray[np.intp]]]
+) -> list[tuple[AxisFit, list[int], NDArray[np.intp]]]:
+    """Decide ties by analogy: a form that a law without rivals has needs to be stated only once."""
+    settled = {_form(fit.operator, fit.pieces) for fit, _, _ in groups if not fit.rivals}
+    result = []
+    for fit, members, rows in groups:
+        every = [(fit.operator, fit.pieces), *fit.rivals]
+        familiar = [each for each in every if _form(*each) in settled]
+        if fit.rivals and len(familiar) == 1:
+            fit = refitted(examples.rows(rows), *familiar[0])
+        result.append((fit, members, rows))
+    return result
+
+
+def _form(operator: Operator, pieces: tuple[Piece, ...]) -> tuple[Operator, tuple[tuple[str, ...], ...]]:
+    """A law without its numbers."""
+    return operator, tuple(sorted(tuple(name for name, _ in piece.terms) for piece in pieces))
+
+
+def _law(fit: AxisFit, kinds: tuple[Kind, ...], examples: AxisExamples) -> AxisLaw:
+    # Sides of 0 on which no velocity was ever seen: what ends there would be outside experience.
+    signs = (bool((examples.y < -examples.tolerance).any()), bool((examples.y > examples.tolerance).any()))
+    unexplained = int((~fit.explained).sum())
+    return AxisLaw(fit.pieces, fit.operator, kinds, fit.rivals, signs, len(examples), unexplained, fit.bits)

@@ -1,0 +1,168 @@
+"""What isn't explained, and what would explain it: which features to switch on, or that none will do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.approximation import LEFT, approximate
+from relgym.clustering.columns import SlotSignature
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.features import library_of
+from relgym.clustering.mode import NOISE, sum_text
+from relgym.model.parts import Parts
+from relgym.model.property_model import PropertyModel
+
+__all__ = ["Advice", "advices", "advise"]
+
+LIBRARIES = (("trig",), ("products",), ("trig", "products"))
+"""What is tried, from small to large."""
+
+LAST_RESORT = ("trig", "degree4")
+"""What is tried when nothing else leaves less than `GOOD`."""
+
+GOOD, BETTER, EQUAL = 0.01, 0.3, 3.0
+"""A share of the change so small is explained; so much less than before is better; within this factor is as good."""
+
+LEAST, ROWS, UNEXPLAINED = 100, 1000, 0.1
+"""Fewer examples than this say nothing; the newest so many are looked at; so large a share of noise needs advice."""
+
+_EXACT, FINE = 1e-5, 1e-3
+"""Shares of the change that count as nothing, and as nothing to be mended."""
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What one target lacks.
+
+    Attributes
+    ----------
+    target
+        Such as ``self.v``.
+    unexplained
+        Share of the recent examples that no mode explains.
+    left
+        Share of the change's standard deviation that the present modes leave; 1 if there are none.
+    features
+        What to switch on (``ModelConfig(features=...)``); empty: nothing that was tried explains it.
+    law
+        The law that was found with these features, as text; empty without any.
+    remains
+        Share of the change that it would leave.
+    """
+
+    target: str
+    unexplained: float
+    left: float
+    features: tuple[str, ...]
+    law: str
+    remains: float
+
+    def __str__(self) -> str:
+        now = (
+            "unexplained"
+            if self.left >= 1.0
+            else f"an approximation that leaves {_percent(self.left)} of the change"
+        )
+        if not self.features:
+            return f"{now}; no library of features that was tried explains it"
+        close = (
+            "explains it" if self.remains <= GOOD else f"comes closest, and leaves {_percent(self.remains)}"
+        )
+        if self.remains > GOOD:
+            now += "; no library of features that was tried explains it"
+        return f"{now}; ModelConfig(features={self.features}) {close}: {self.law}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Trial:
+    features: tuple[str, ...]
+    left: float
+    law: str
+    size: int
+
+
+def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
+    """What a target lacks; None if its modes explain it, or if too little is known yet.
+
+    Cost: several regressions on at most `ROWS` examples with up to some thousand features, about a second; nothing is
+    changed.
+    """
+    clusterer = model.clusterer
+    if len(clusterer.y) < LEAST:
+        return None
+    recent = np.arange(max(0, len(clusterer.y) - ROWS), len(clusterer.y))
+    noise = float((clusterer.labels[recent] == NOISE).mean())
+    change = clusterer.y[recent] - _present(model, table, recent)
+    left = (
+        min(1.0, clusterer.scale.sigma / max(float(change.std()), 1e-300)) if clusterer.approximate else 1.0
+    )
+    if left <= FINE or (noise <= UNEXPLAINED and not clusterer.approximate):
+        return None
+    known = frozenset(model.config.features)
+    trials = [_try(model, table, recent, kinds) for kinds in LIBRARIES if not known.issuperset(kinds)]
+    if min((t.left for t in trials if t is not None), default=1.0) > GOOD:
+        trials.append(_try(model, table, recent, LAST_RESORT))
+    best = _choose([t for t in trials if t is not None], left)
+    if best is None:
+        return Advice(str(model.target), noise, left, (), "", 1.0)
+    return Advice(str(model.target), noise, left, best.features, best.law, best.left)
+
+
+def advices(parts: Parts) -> tuple[Advice, ...]:
+    """`advise` for all targets that modes predict."""
+    found = [advise(parts.models[t], parts.tables[t.type]) for t in parts.targets if not parts.governs(t)]
+    return tuple(each for each in found if each is not None)
+
+
+def _choose(trials: Iterable[_Trial], left: float) -> _Trial | None:
+    """The smallest library that is as good as the best one, if that is better than what there is."""
+    trials = list(trials)
+    least = min((t.left for t in trials), default=1.0)
+    good = [t for t in trials if t.left <= max(EQUAL * least, _EXACT)]
+    return min(good, key=lambda t: t.size) if least <= BETTER * left else None
+
+
+def _try(
+    model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp], kinds: tuple[str, ...]
+) -> _Trial | None:
+    clusterer = model.clusterer
+    ids = table.signature_ids[clusterer.rows[rows]]
+    rows = rows[ids == ids[-1]]
+    known = table.signatures[int(ids[-1])]
+    slots: SlotSignature = replace(
+        known, library=library_of(kinds, known.types[0].name, known.types[0].angles)
+    )
+    order, stages = slots.preference(model.target)
+    order = order[: stages[min(1, len(stages) - 1)]]
+    x, y = slots.matrix(table.x[clusterer.rows[rows]], order), clusterer.y[rows]
+    most = model.config.clustering.max_terms
+    present = slots.present(table.x[clusterer.rows[rows]], model.target)
+    found = approximate(
+        x, y, present, floor=clusterer.floor, terms=most, stds=clusterer.scale.inlier_stds, left=LEFT
+    )
+    if found is None:
+        return None
+    change = float((y - present)[found.inliers].std())
+    text = [
+        (w, slots.named(int(order[c]))) for c, w in zip(found.fit.columns, found.fit.weights, strict=True)
+    ]
+    law = f"{model.target.property}' = {sum_text(text, found.fit.intercept, 4)}"
+    return _Trial(kinds, found.sigma / change, law, len(order))
+
+
+def _present(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+    """The property's present values."""
+    places = model.clusterer.rows[rows]
+    values = np.zeros(len(rows))
+    for number in np.unique(table.signature_ids[places]):
+        part = np.flatnonzero(table.signature_ids[places] == number)
+        values[part] = table.signatures[int(number)].present(table.x[places[part]], model.target)
+    return values
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"

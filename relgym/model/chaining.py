@@ -1,0 +1,144 @@
+"""The causal order in which a type's properties follow from one another: kinematics discovered, not declared.
+
+Where a target is better described with another one's *next* value, it is given that (`Target.given`) and comes after
+it: ``x' = x + k v'``. Of two properties each follows from the other (``v' = (x' - x) / k`` is as true), so something
+must decide which one goes first: what keeps what it was. A law of change builds on the property's own present value;
+a law without it is taken only where none of the former kind contradicts it. What is never given away is a circle.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.columns import PRIME, SlotSignature
+from relgym.clustering.discovery import identified, is_law
+from relgym.numeric.ransac import consensus
+from relgym.numeric.stepwise import LinearFit
+from relgym.scene.objects import TASK, Target
+
+if TYPE_CHECKING:
+    from relgym.model.parts import Parts
+
+__all__ = ["CHECK_AT", "in_order", "revise"]
+
+CHECK_AT = (48, 192, 768, 3072)
+"""Numbers of examples of a type after which the order of its targets is looked at again."""
+
+ROWS, LEAST = 300, 24
+"""At most so many examples decide, the newest; fewer than `LEAST` decide nothing."""
+
+SHARE = 0.5
+"""Least share of the examples that a law with next values must explain."""
+
+GAIN = 0.1
+"""By so much larger a share it counts as better, whatever its length."""
+
+PLANS = ((2, 5, 256), (4, 10, 128))
+"""Terms, sample size and draws of the searches for such a law."""
+
+_Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A law with next values: which ones it uses, and, for pure kinematics, the rate and its coefficient."""
+
+    given: tuple[_Pair, ...]
+    inert: bool
+    lead: tuple[str, float] | None
+
+
+def revise(parts: Parts, type_name: str) -> None:
+    """Look for laws with next values among a type's targets; give those that need them what they need.
+
+    Cost: a search of at most `ROWS` rows per target that isn't explained by a law of two terms already.
+    """
+    for inert in (True, False):
+        for target in [t for t in parts.targets if t.type == type_name and t.type != TASK]:
+            found = _search(parts, target)
+            if found is not None and found.inert >= inert:
+                parts.retarget(target, replace(target, given=found.given))
+                if found.lead is not None:
+                    rate, step = found.lead
+                    parts.lead((type_name, rate), target.property, step)
+
+
+def in_order(targets: Iterable[Target]) -> tuple[Target, ...]:
+    """Targets such that each comes after those it is given, otherwise as they are; the task's come last."""
+    left, done = sorted(targets, key=lambda t: t.type == TASK), []
+    while left:
+        waiting = {(t.type, t.property) for t in left}
+        nxt = next((t for t in left if waiting.isdisjoint(t.given)), left[0])
+        left.remove(nxt)
+        done.append(nxt)
+    return tuple(done)
+
+
+def _search(parts: Parts, target: Target) -> _Found | None:
+    """The law with next values that describes a target better than its modes do, if there is one."""
+    model, table = parts.models[target], parts.tables[target.type]
+    clusterer = model.clusterer
+    if len(clusterer.y) < LEAST:
+        return None
+    recent = np.arange(max(0, len(clusterer.y) - ROWS), len(clusterer.y))
+    ids = table.signature_ids[clusterer.rows[recent]]
+    recent = recent[ids == ids[-1]]
+    share = float((clusterer.labels[recent] != 0).mean())
+    size = max((m.parameters for m in model.modes), default=99)
+    if share >= 1.0 - GAIN and size <= 2:
+        return None
+    slots = table.signatures[int(ids[-1])]
+    free = _free(parts, target)
+    order = _columns(slots, replace(target, given=free))
+    x, y = slots.matrix(table.x[clusterer.rows[recent]], order), clusterer.y[recent]
+    scales = dict.fromkeys((replace(clusterer.scale, sigma=clusterer.floor), clusterer.scale))
+    for scale, (terms, sample, draws) in itertools.product(scales, PLANS):
+        rng = np.random.default_rng([parts.config.seed, len(y)])
+        found = consensus(
+            x, y, sigma=scale.sigma, tolerance=scale.tolerance, terms=terms, size=sample, draws=draws, rng=rng
+        )
+        if found is not None:
+            found = identified(x, y, found.fit, scale=scale, support=parts.config.clustering.support)
+        if found is None or found.size < SHARE * len(y) or not is_law(x, y, found, x.shape[1], scale):
+            continue
+        gain = found.size / len(y) - share
+        if gain > GAIN or (gain > -GAIN and found.fit.terms < size):
+            return _read(slots, order, found.fit)
+    return None
+
+
+def _free(parts: Parts, target: Target) -> tuple[_Pair, ...]:
+    """Pairs whose next values the target may be given without a circle."""
+    after = {(target.type, target.property)}
+    for _ in parts.targets:
+        after |= {(t.type, t.property) for t in parts.targets if not after.isdisjoint(t.given)}
+    every = [(t.type, t.property) for t in parts.targets if t.type == target.type]
+    return tuple(pair for pair in every if pair not in after)
+
+
+def _columns(slots: SlotSignature, target: Target) -> NDArray[np.intp]:
+    """The target's own columns and bodiless objects', features aside, next values behind; the pose too."""
+    order, _ = slots.preference(target)
+    width = slots.core
+    plain: NDArray[np.intp] = order[order < width]
+    return plain
+
+
+def _read(slots: SlotSignature, order: NDArray[np.intp], fit: LinearFit) -> _Found | None:
+    columns = [slots.at(int(order[c])) for c in fit.columns]
+    primes = [c for c in columns if c.property.endswith(PRIME)]
+    if not primes:
+        return None
+    given = tuple(dict.fromkeys((slots.types[c.slot].name, c.property.rstrip(PRIME)) for c in primes))
+    inert = 0 in fit.columns
+    lead = None
+    weights = dict(zip(fit.columns, fit.weights, strict=True))
+    if inert and len(columns) == 2 and fit.intercept == 0.0 and abs(weights[0] - 1.0) < 1e-6:
+        lead = (primes[0].property.rstrip(PRIME), next(w for c, w in weights.items() if c))
+    return _Found(given, inert, lead)

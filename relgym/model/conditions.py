@@ -1,0 +1,66 @@
+"""Predicted values as conditions: what classifiers see of the next values that a target is given.
+
+A wall is ``x + v' <= -1.2``, not a threshold on x: preconditions must be able to test what is predicted (§1.2.3 has
+actions and states only). A target that is given others' next values may test them, named with a prime; a target that
+others follow (``x' = x + k v'``) may test where they would get to if a mode held (`Vocabulary.follows`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.examples import Vocabulary
+from relgym.clustering.columns import PRIME, SlotSignature
+from relgym.scene.objects import TASK, SceneSchema, Target
+
+__all__ = ["Conditions"]
+
+
+class Conditions:
+    """Next values that a target's clauses may test.
+
+    Parameters
+    ----------
+    schema
+        The scenes' schema.
+    target
+        Its `given` pairs count where they belong to the target's own object or to a bodiless one, of which there is
+        one only; for reward and termination, of which no object is part, all count.
+    """
+
+    def __init__(self, schema: SceneSchema, target: Target) -> None:
+        own, alone = target.type, {t.name for t in schema.types if not t.has_body}
+        self.pairs = tuple(p for p in target.given if own == TASK or p[0] == own or p[0] in alone)
+        self._own = own
+        self._columns: dict[int, NDArray[np.intp]] = {}
+
+    def __getstate__(self) -> dict[str, object]:
+        return self.__dict__ | {"_columns": {}}  # keyed by identity, which a copy doesn't share
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the next values, as clauses print them."""
+        return tuple((p if t == self._own else f"{t}.{p}") + PRIME for t, p in self.pairs)
+
+    def vocabulary(self, base: Vocabulary, follows: tuple[tuple[str, float], ...]) -> Vocabulary:
+        """The vocabulary with the next values as further own features."""
+        known = tuple(pair for pair in follows if pair[0] in base.own)
+        return replace(base, own=(*base.own, *self.names), follows=known)
+
+    def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The next values on regression rows ``(n, d)``, shape ``(n, len(pairs))``; NaN where an object is missing."""
+        columns = self._columns.get(id(signature))
+        if columns is None:
+            places = [self._place(signature, name, prop) for name, prop in self.pairs]
+            columns = self._columns[id(signature)] = np.array(places, dtype=np.intp)
+        found: NDArray[np.float64] = np.where(columns >= 0, x[:, columns], np.nan)
+        return found
+
+    def _place(self, signature: SlotSignature, name: str, prop: str) -> int:
+        slots = (0,) if name == self._own else signature.slots_by_type.get(name, ())
+        if len(slots) != 1 or not signature.has(slots[0], prop + PRIME):
+            return -1
+        return signature.column(slots[0], prop + PRIME)

@@ -1,0 +1,159 @@
+"""The tasks themselves, with tiny budgets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from relgym.errors import ConfigError
+from relgym.experiments.chapter4 import comparison, pushing, rolled
+from relgym.experiments.chapter4.lesson import config_of, fresh_blocks, lesson, taught_blocks
+from relgym.experiments.chapter4.rolled import CAUSES, cause_of, trial_blocks
+from relgym.experiments.chapter4.testing import true_modes
+from relgym.experiments.data import BALL_EXPERIMENTS
+
+TESTS = {"seeds": [110], "blocks": 3}
+BATCH = {"experiment": 1, "seed": 100, "order": 0}
+
+
+@pytest.fixture(scope="module")
+def taught() -> dict[str, Any]:
+    return lesson(learner="thesis", **BATCH, checkpoints=[1, 3], tests=TESTS)
+
+
+def test_a_lesson_is_tested_on_the_way(taught: dict[str, Any]) -> None:
+    assert [each["blocks"] for each in taught["scores"]] == [1, 3]
+    for each in taught["scores"]:
+        for score in each["targets"].values():
+            assert score["all"]["examples"] == 600
+            assert score["counted"]["examples"] == sum(m["examples"] for m in score["modes"])
+            assert score["counted"]["wrong"] == (
+                score["counted"]["unlearned"] + score["counted"]["misclassified"]
+            )
+    first, last = (each["targets"]["ball.vy"]["all"]["wrong"] for each in taught["scores"])
+    assert last < first
+
+
+def test_confusions_count_what_the_scores_count(taught: dict[str, Any]) -> None:
+    for target, found in taught["confusions"].items():
+        counts = np.array(found["table"])
+        score = taught["scores"][-1]["targets"][target]["counted"]
+        assert counts.sum() == score["examples"]
+        assert counts[-1].sum() == score["silent"]
+        off = counts[:-1].sum() - np.trace(counts[:-1])
+        assert off + score["silent"] == score["strict"]
+
+
+def test_training_examples_are_counted_by_what_really_happened(taught: dict[str, Any]) -> None:
+    assert {sum(modes.values()) for modes in taught["training"].values()} == {600}
+    assert {mode["function"] for mode in taught["modes"]["ball.vx"]} == {"vx' = vx"}
+
+
+def test_laws_have_no_modes_to_confuse() -> None:
+    found = lesson(learner="default", **BATCH, checkpoints=[3], tests=TESTS)
+    assert found["confusions"] == {} and found["modes"] == {} and found["trees"] == []
+    assert "unlearned" not in found["scores"][-1]["targets"]["ball.vx"]["all"]
+    assert "along the world's axes" in found["text"]
+
+
+def test_the_same_batch_gives_the_same_result(taught: dict[str, Any]) -> None:
+    again = lesson(learner="thesis", **BATCH, checkpoints=[1, 3], tests=TESTS)
+    assert again | {"seconds": 0.0} == taught | {"seconds": 0.0}
+
+
+def test_stages_of_transfer_show_one_object_after_the_other() -> None:
+    rooms = list(taught_blocks(1, 100, 0, 5, ("box", "ramp")))
+    assert ["box" in room.layout.names for room in rooms] == [True, True, True, False, False]
+    assert ["ramp" in room.layout.names for room in rooms] == [False, False, False, True, True]
+    assert {room.schema for room in rooms} == {next(taught_blocks(1, 100, 0, 1)).schema}
+
+
+def test_test_blocks_come_from_every_seed_in_equal_parts() -> None:
+    blocks = fresh_blocks(1, {"seeds": [110, 111], "blocks": 4})
+    assert len(blocks) == 4
+    assert len({str(sorted(b.configuration.items())) for b in blocks}) == 4
+
+
+def test_unknown_learner() -> None:
+    with pytest.raises(ConfigError, match="learner 'oracle': expected one of"):
+        config_of("oracle")
+
+
+def test_box_pushing_finds_table_3_1() -> None:
+    found = pushing.lesson(learner="thesis", seed=100, repeats=1)
+    assert sorted(found["stated"].values()) == [0, 1, 2] and found["noise"] == 0
+
+
+@pytest.mark.parametrize("shown", ["thesis", "contact"])
+def test_regressors_are_scored_like_our_learner(shown: str) -> None:
+    found = comparison.regress(
+        baseline="constant-velocity", shown=shown, **BATCH, checkpoints=[1, 2], tests=TESTS
+    )
+    ours = lesson(learner="default", **BATCH, checkpoints=[1], tests=TESTS)
+    for target in ("ball.vx", "ball.vy"):
+        score = found["scores"][-1]["targets"][target]["all"]
+        assert score["sum"] == pytest.approx(score["change"])  # it errs by what changes
+        other = ours["scores"][-1]["targets"][target]["all"]
+        assert (score["examples"], score["change"]) == (other["examples"], pytest.approx(other["change"]))
+
+
+def test_a_regressor_of_changes_is_asked_for_values() -> None:
+    found = comparison.regress(
+        baseline="knn", shown="contact", **BATCH, checkpoints=[3], tests=TESTS, setting=1
+    )
+    score = found["scores"][-1]["targets"]["ball.vx"]["all"]
+    assert score["wrong"] < 0.2 * score["examples"]
+    assert found["setting"] == {"neighbours": 1, "weights": "uniform"}
+
+
+def test_classifiers_are_right_where_the_mode_explains() -> None:
+    found = comparison.classify(baseline="knn-1", shown="contact", **BATCH, checkpoints=[3], tests=TESTS)
+    for score in found["scores"][-1]["targets"].values():
+        assert score["wrong"] <= score["strict"] < 0.2 * score["examples"]
+
+
+def test_roll_outs_and_why_they_fail() -> None:
+    found = rolled.imagine(learner="world", **BATCH, blocks=3, tests=[110], trials=4)
+    assert len(found["trials"]) == 4
+    for trial in found["trials"]:
+        errors = np.array([[np.inf if e is None else e for e in axis] for axis in trial["errors"]])
+        assert errors.shape == (2, 201) and not errors[:, 0].any()
+        assert trial["failed"] == bool((errors > 1e-2).any()) == (trial["cause"] in CAUSES)
+        if trial["failed"]:
+            assert (errors[:, : trial["begins"]] <= 1e-6).all()
+
+
+def test_causes_come_from_what_really_happened() -> None:
+    causes: dict[str, list[str]] = {}
+    for block in trial_blocks(1, [110], 16):
+        names = block.truth.mode_names["ball.vx"]
+        for step in range(len(block)):
+            cause = cause_of(block, step, 1)
+            if block.truth.corner[step]:
+                assert cause == "bounce against a corner"
+            elif block.truth.active[step] > 1:
+                assert cause == "several contacts at once"
+            elif block.truth.active[step] == 1:
+                causes.setdefault(names[block.truth.mode["ball.vx"][step]], []).append(cause)
+    assert set(causes["bounce, left face"]) == set(causes["bounce, slope"]) == {"misclassified ramp bounce"}
+    assert set(causes["fly"]) == {"misclassified contact with a level surface"}
+
+
+def test_several_contacts_at_once_belong_to_the_simplest_mode_that_explains_them() -> None:
+    laws = BALL_EXPERIMENTS[1].modes()
+    found = 0
+    for block in trial_blocks(1, [110], 12):
+        for target in ("ball.vx", "ball.vy"):
+            logged, labels = block.truth.mode[target], true_modes(block, target, laws)
+            np.testing.assert_array_equal(labels[logged >= 0], logged[logged >= 0])
+            v = block.columns("ball", "vx", "vy")
+            names = block.truth.mode_names[target]
+            for step in np.flatnonzero((logged < 0) & (labels >= 0)):
+                mode = (laws.x if target == "ball.vx" else laws.y)[labels[step]]
+                assert abs(mode.predict(v[[step]])[0] - v[step + 1, int(target == "ball.vy")]) <= 1e-9
+                if target == "ball.vy" and v[step, 1] == 0.0 == v[step + 1, 1]:
+                    assert names[labels[step]] == "slide, floor"  # not a bounce at no speed
+                found += 1
+    assert found > 5

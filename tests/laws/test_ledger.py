@@ -1,0 +1,32 @@
+from __future__ import annotations
+
+from relgym.laws.ledger import SETTLED, Ledger
+
+
+def test_laws_settle_while_never_wrong() -> None:
+    ledger = Ledger(["thing"])
+    for _ in range(SETTLED - 1):
+        ledger.count("thing", right=True, learned=True)
+    assert not ledger.settled("thing")
+    ledger.count("thing", right=True, learned=False)
+    assert ledger.settled("thing")
+    ledger.count("thing", right=False, learned=True)
+    assert not ledger.settled("thing")
+    assert (ledger.seen("thing"), ledger.unlearned("thing")) == (SETTLED + 1, 0)
+
+
+def test_what_no_law_learns_from_is_counted_until_laws_change() -> None:
+    ledger = Ledger(["one", "two"])
+    ledger.count("one", right=False, learned=False)
+    ledger.count("one", right=True, learned=False)
+    ledger.count("two", right=False, learned=True)
+    assert [ledger.unlearned(name) for name in ("one", "two")] == [1, 0]
+    ledger.start_again()
+    assert (ledger.unlearned("one"), ledger.seen("one")) == (0, 2)
+
+
+def test_saved_and_restored() -> None:
+    ledger, other = Ledger(["thing"]), Ledger(["thing"])
+    ledger.count("thing", right=False, learned=False)
+    other.restore(ledger.to_json())
+    assert other.to_json() == ledger.to_json() == [["thing", 1, 1, 1, 1]]

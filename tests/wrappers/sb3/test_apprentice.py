@@ -1,0 +1,113 @@
+"""Trust is earned on real steps: a model of the same world is trusted, one of half the friction never."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import relgym
+from relgym.envs.truck_push import BOX_MASS, GRAVITY, TRUCK_MASS
+from relgym.envs.truck_scenes import loads, stacks_of
+from relgym.scene.objects import Transition
+from relgym.wrappers.sb3.apprentice import Apprentice
+from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
+from relgym.wrappers.sb3.settings import DynaConfig
+
+
+def make() -> Any:
+    return TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push", disable_env_checker=True))
+
+
+def steps(n: int, *, seed: int) -> list[Experience]:
+    env, found = make(), []
+    env.action_space.seed(seed)
+    env.reset(seed=seed)
+    while len(found) < n:
+        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        found += env.take()
+        if terminated or truncated:
+            env.reset()
+    return found
+
+
+def with_half_the_friction(real: Experience) -> Transition:
+    """What would have followed in a world that rubs half as much; all else moves as in the real one."""
+    before, after = real.transition.before, real.transition.after
+    rub = sum(load * before[name]["friction"] for name, load in loads(stacks_of(real.start)).items())
+    push = before["action"]["force"] - 0.5 * BOX_MASS * GRAVITY * rub
+    v = max(0.0, before["truck"]["vx"] + push / (TRUCK_MASS + 3 * BOX_MASS))
+    further = v - after["truck"]["vx"]
+    places = {(o.name, "px"): o["px"] + further for o in after if "px" in o.type.properties}
+    return Transition(
+        before,
+        after.replace({**places, ("truck", "vx"): v, ("goal", "ahead"): after["goal"]["ahead"] - further}),
+    )
+
+
+@pytest.mark.parametrize("halved", [False, True])
+def test_only_a_model_of_this_world_is_trusted(halved: bool, rng: np.random.Generator) -> None:
+    lessons = steps(350, seed=1)
+    model = relgym.WorldModel(lessons[0].start.schema)
+    for k in rng.permutation(len(lessons)):
+        real = lessons[k]
+        model.learn_one(with_half_the_friction(real) if halved else real.transition)
+    model.frozen = True  # as if it had been loaded without its history
+    seen = model.seen
+    apprentice = Apprentice(model, make().get_wrapper_attr("task"), DynaConfig(least=50))
+    opened = []
+    for real in steps(200, seed=2):
+        apprentice.take_up(real)
+        opened.append(apprentice.gate.open)
+    assert apprentice.gate.known > 0.95  # it speaks with as much confidence
+    assert any(opened) is not halved
+    assert (apprentice.gate.error > 0.25) is halved
+    assert model.seen == seen  # a frozen model is judged, and learns nothing
+
+
+def test_a_model_that_leaves_out_what_moves_is_not_trusted() -> None:
+    env = make()
+    model = relgym.WorldModel(env.get_wrapper_attr("schema"), targets=())
+    apprentice = Apprentice(model, env.get_wrapper_attr("task"), DynaConfig(shuffle=0, least=5))
+    for real in steps(40, seed=3):
+        apprentice.take_up(real)
+    assert apprentice.gate.known == 1.0  # nothing changes, it says
+    assert apprentice.gate.error > 0.5
+    assert not apprentice.gate.open
+
+
+def test_lessons_come_in_random_order() -> None:
+    lessons = steps(30, seed=1)
+
+    class Listening:
+        frozen = False
+        targets = ()
+
+        def __init__(self) -> None:
+            self.schema = lessons[0].start.schema
+            self.heard: list[Transition] = []
+            self._model = relgym.WorldModel(self.schema)
+
+        def learn_one(self, transition: Transition) -> None:
+            self.heard.append(transition)
+
+        def predict_one(self, scene: Any) -> Any:
+            return self._model.predict_one(scene)
+
+        def predict_batch(self, layout: Any, vectors: Any) -> Any:
+            return self._model.predict_batch(layout, vectors)
+
+    task = make().get_wrapper_attr("task")
+    order: list[list[int]] = []
+    for shuffle in (0, 10, 10):
+        model = Listening()
+        apprentice = Apprentice(model, task, DynaConfig(shuffle=shuffle))
+        for real in lessons:
+            apprentice.take_up(real)
+        order.append([[real.transition for real in lessons].index(heard) for heard in model.heard])
+    assert order[0] == list(range(30))
+    assert sorted(order[1]) != order[1]
+    assert len(set(order[1])) == len(order[1]) == 20
+    assert order[1] == order[2]
