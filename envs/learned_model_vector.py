@@ -119,6 +119,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._setting = place = Setting.of(model, like, view, snapshot=snapshot)
         self.num_envs = checked_count("num_envs", num_envs, 1, 10**7)
         self.model, self.schema, self.render_mode = place.model, place.schema, render_mode
+        self.flat_spec = place.flat_spec
         self.single_observation_space, self.single_action_space = place.observation_space, place.action_space
         self.observation_space = batch_space(place.observation_space, self.num_envs)
         self.action_space = batch_space(place.action_space, self.num_envs)

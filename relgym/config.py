@@ -254,6 +254,10 @@ class ModelConfig:
         names of functions registered with `relgym.clustering.features.register_function`. ``"cart:trig"`` offers them
         to one type only. Default none; where linear laws don't explain a property, the report says what would.
         A linear law wins where it is enough; every kind offered makes searches slower.
+    history
+        Examples kept per object type; memory stays flat beyond. Default 200,000, range >= 100. Of more, a uniform
+        choice stays, and everything rare: small modes, recent noise, and what classifiers remember. Raising it costs
+        memory (some 100 bytes an example and upwards), lowering it makes late discoveries rest on fewer examples.
     """
 
     clustering: ClusteringConfig = field(default_factory=ClusteringConfig)
@@ -264,10 +268,12 @@ class ModelConfig:
     work_per_step: int = 400_000
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()
+    history: int = 200_000
 
     def __post_init__(self) -> None:
         _one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
         _at_least(self, 0, "seed", "work_per_step")
+        _at_least(self, 100, "history")
 
     @classmethod
     def thesis(cls, **changes: Any) -> ModelConfig:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,13 @@ __all__ = ["AssignmentLog"]
 class AssignmentLog:
     """Growing record of a target's examples, numbered from 0: value, mode, and row in the example table.
 
+    Attributes
+    ----------
+    seen
+        Number of examples that ever came.
+    forgotten
+        How many examples of each mode were dropped.
+
     Notes
     -----
     Arrays are views: writing into `labels` assigns. Appending costs amortised O(1).
@@ -25,6 +33,8 @@ class AssignmentLog:
         self._label = np.zeros(256, dtype=np.int32)
         self._row = np.zeros(256, dtype=np.int64)
         self._size = 0
+        self.seen = 0
+        self.forgotten: Counter[int] = Counter()
 
     def __len__(self) -> int:
         return self._size
@@ -53,11 +63,35 @@ class AssignmentLog:
             self._row = np.pad(self._row, room)
         self._y[self._size], self._label[self._size], self._row[self._size] = y, NOISE, row
         self._size += 1
+        self.seen += 1
         return self._size - 1
+
+    def keep(self, rows: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Forget the examples of dropped rows of the example table, and follow the others' new numbers.
+
+        Parameters
+        ----------
+        rows
+            Which rows of the table stay, shape ``(rows,)``.
+
+        Returns
+        -------
+        New number of every example, -1 where it was dropped, shape ``(n,)``.
+        """
+        kept = rows[self.rows]
+        self.forgotten.update(self.labels[~kept].tolist())
+        numbers = np.where(kept, np.cumsum(kept) - 1, -1)
+        n = int(kept.sum())
+        places = np.cumsum(rows) - 1
+        self._y[:n], self._label[:n] = self.y[kept], self.labels[kept]
+        self._row[:n] = places[self.rows[kept]]
+        self._size = n
+        return numbers
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Arrays that `from_arrays` reads back."""
-        return {"y": self.y, "labels": self.labels, "rows": self.rows}
+        dropped = np.array(sorted(self.forgotten.items()), dtype=np.int64).reshape(-1, 2)
+        return {"y": self.y, "labels": self.labels, "rows": self.rows, "forgotten": dropped}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> AssignmentLog:
@@ -65,4 +99,6 @@ class AssignmentLog:
         log = cls()
         log._y, log._label, log._row = (arrays[name].copy() for name in ("y", "labels", "rows"))
         log._size = len(log._y)
+        log.forgotten = Counter(dict(arrays["forgotten"].tolist()))
+        log.seen = log._size + log.forgotten.total()
         return log

@@ -137,12 +137,26 @@ class ModeClusterer:
         if not len(self._log):
             return tuple(c.mode for _, c in sorted(self.clusters.items()))
         counts = np.bincount(self.labels, minlength=self._next_id)
-        return tuple(c.mode.with_examples(int(counts[i])) for i, c in sorted(self.clusters.items()))
+        dropped = self._log.forgotten
+        return tuple(
+            c.mode.with_examples(int(counts[i]) + dropped[i]) for i, c in sorted(self.clusters.items())
+        )
 
     @property
     def noise_examples(self) -> int:
         """Number of examples no mode explains."""
-        return int((self.labels == NOISE).sum()) if len(self._log) else self._known_noise
+        if not len(self._log):
+            return self._known_noise
+        return int((self.labels == NOISE).sum()) + self._log.forgotten[NOISE]
+
+    @property
+    def seen(self) -> int:
+        """Number of examples that ever came, forgotten ones included."""
+        return self._log.seen
+
+    def keep(self, rows: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Forget the examples of dropped rows of the example table; see `AssignmentLog.keep`."""
+        return self._log.keep(rows)
 
     def fits(
         self, table: ExampleTable, examples: NDArray[np.intp]
@@ -191,7 +205,7 @@ class ModeClusterer:
         example = self._log.append(row, y)
         core = table.signatures[table.signature_ids[row]].core
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
-        if largest > self._largest or abs(y) > self._reach or len(self._log) in ESTIMATE_AT:
+        if largest > self._largest or abs(y) > self._reach or self._log.seen in ESTIMATE_AT:
             self._largest, self._reach = max(largest, self._largest), max(abs(y), self._reach)
             self._rescale(table)
         return example
@@ -238,9 +252,9 @@ class ModeClusterer:
         own = table.x[recent][:, : table.signatures[table.signature_ids[recent[-1]]].core]
         floor = rounding_noise(np.array([[self._largest]]), np.append(self.y[-256:], self._reach), own)
         self.floor = floor
-        if len(self._log) in ESTIMATE_AT and 2 * self.noise_examples > len(self._log):
+        if self._log.seen in ESTIMATE_AT and 2 * self.noise_examples > self._log.seen:
             estimate = self._estimate(table, floor)
-            explained = 1.0 - self.noise_examples / len(self._log)
+            explained = 1.0 - self.noise_examples / self._log.seen
             if refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
                 self._spread, self.approximate = estimate, False
                 self._start_over()
@@ -262,6 +276,9 @@ class ModeClusterer:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""
         self.clusters.clear()
         self._searches.clear()
+        total = self._log.forgotten.total()
+        self._log.forgotten.clear()
+        self._log.forgotten[NOISE] = total
         self.labels[:] = NOISE
 
     def retarget(self, target: Target) -> None:
@@ -304,11 +321,11 @@ class ModeClusterer:
         if (
             not self.config.approximate
             or self.config.noise_std != "auto"
-            or len(self._log) not in APPROXIMATE_AT
+            or self._log.seen not in APPROXIMATE_AT
         ):
             return False
         # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
-        return 2 * self.noise_examples > len(self._log) or self._spread > 0.0
+        return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
 
     def _approximate(self, table: ExampleTable) -> None:
         recent = np.arange(max(0, len(self._log) - MOST_ROWS), len(self._log))
@@ -323,7 +340,7 @@ class ModeClusterer:
         stds = self.scale.inlier_stds
         present = slots.present(table.x[self.rows[recent]], self.target)
         found = approximate(x, y, present, floor=self.floor, terms=terms, stds=stds, left=left)
-        explained = 2 * self.noise_examples <= len(self._log)
+        explained = 2 * self.noise_examples <= self._log.seen
         if found is None or (explained and found.sigma > 0.5 * self.scale.sigma):
             return
         self._spread, self.approximate = found.sigma, True
@@ -373,11 +390,13 @@ class ModeClusterer:
         cluster = known.cluster(fit, signature)
         members = self._explained(table, cluster, self._noise())
         cluster, absorbed = generalise(known, cluster, members, rng=self._rng)
+        inherited = sum(self._log.forgotten.pop(i, 0) for i in absorbed)
         for i in absorbed:
             self._remove(i)
         new = self._next_id
         self._next_id += 1
         self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
+        self._log.forgotten[new] += inherited
         self._reassign(table, new)
 
     def _noise(self) -> NDArray[np.intp]:
@@ -392,6 +411,7 @@ class ModeClusterer:
     def _remove(self, mode: int) -> None:
         """A deleted mode gives its examples back to the noise, from where others take them."""
         del self.clusters[mode]
+        self._log.forgotten[NOISE] += self._log.forgotten.pop(mode, 0)
         self.labels[self.labels == mode] = NOISE
 
     def _reassign(self, table: ExampleTable, new: int) -> None:
@@ -433,7 +453,7 @@ class ModeClusterer:
             "largest": self._largest,
             "reach": self._reach,
             "spread": self._spread,
-            "floor": self.floor,
+            "rounding": self.floor,
             "approximate": self.approximate,
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
@@ -452,7 +472,7 @@ class ModeClusterer:
         self._next_id = int(data["next_id"])
         self._largest, self._reach = float(data["largest"]), float(data["reach"])
         self.approximate = bool(data["approximate"])
-        self._spread, self.floor = float(data["spread"]), float(data["floor"])
+        self._spread, self.floor = float(data["spread"]), float(data["rounding"])
         self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}
         self.clusters = {int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]}

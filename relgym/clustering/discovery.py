@@ -252,7 +252,11 @@ def _enough_combinations(
     """Whether slowly changing columns take enough combinations of values to support their weights."""
     if fit.terms == 1 and fit.weights and abs(fit.weights[0] - 1.0) < 1e-9:
         return True  # persistence has no free parameter
-    slow = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3 and not _lively(x[:, c])]
+    few = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3]
+    lively = [c for c in few if _lively(x[:, c])]
+    if len(lively) > 1 and len(np.unique(x[:, lively], axis=0)) < len(lively) + 2:
+        return False
+    slow = [c for c in few if c not in lively]
     if not slow:
         return True
     combinations = len(np.unique(x[:, slow], axis=0))

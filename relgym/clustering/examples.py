@@ -14,12 +14,14 @@ __all__ = ["ExampleTable"]
 
 
 class ExampleTable:
-    """Growing store of regression rows; rows are numbered from 0 and never move.
+    """Growing store of regression rows, numbered from 0; they move only when `keep` drops some.
 
     Attributes
     ----------
     signatures
         The slot signatures seen, in order of appearance.
+    seen
+        Number of rows that ever came.
     """
 
     def __init__(self) -> None:
@@ -30,7 +32,9 @@ class ExampleTable:
         self._signature = np.zeros(256, dtype=np.int32)
         self._stratum = np.zeros(256, dtype=np.int32)
         self._bodies = np.zeros((256, 0), dtype=np.int16)
+        self._serial = np.zeros(256, dtype=np.int64)
         self._size = 0
+        self.seen = 0
 
     def __len__(self) -> int:
         return self._size
@@ -54,6 +58,24 @@ class ExampleTable:
     def bodies(self) -> NDArray[np.int16]:
         """Number of the body in each slot of every row, shape ``(n, slots)``; -1 for bodiless objects."""
         return self._bodies[: self._size]
+
+    @property
+    def serials(self) -> NDArray[np.int64]:
+        """The how-manieth each row was that came, shape ``(n,)``."""
+        return self._serial[: self._size]
+
+    def keep(self, rows: NDArray[np.bool_]) -> None:
+        """Forget all rows but these, shape ``(n,)``; those left are numbered anew, in their order."""
+        n = int(rows.sum())
+        names = ("_x", "_signature", "_stratum", "_bodies", "_serial")
+        for name in names:
+            array = getattr(self, name)
+            array[:n] = array[: self._size][rows]
+        self._size = n
+        used, numbers = np.unique(self.strata, return_inverse=True)
+        self._stratum[:n] = numbers
+        keys = list(self._strata)
+        self._strata = {keys[old]: new for new, old in enumerate(used.tolist())}
 
     def signature_id(self, signature: SlotSignature) -> int:
         """Number of the signature; a new one is taken up."""
@@ -89,21 +111,30 @@ class ExampleTable:
             self._signature = np.pad(self._signature, grow[0])
             self._stratum = np.pad(self._stratum, grow[0])
             self._bodies = np.pad(self._bodies, grow)
+            self._serial = np.pad(self._serial, grow[0])
         self._x[self._size, : len(row)] = row
         self._signature[self._size] = number
         self._stratum[self._size] = self._strata.setdefault(stratum, len(self._strata))
         self._bodies[self._size, : len(bodies)] = bodies
+        self._serial[self._size] = self.seen
         self._size += 1
+        self.seen += 1
         return self._size - 1
 
     def to_json(self) -> dict[str, Any]:
         """Signatures and relational states; the rows are in `to_arrays`."""
         signatures = [[t.name for t in s.types] for s in self.signatures]
-        return {"signatures": signatures, "strata": [key.hex() for key in self._strata]}
+        return {"signatures": signatures, "strata": [key.hex() for key in self._strata], "seen": self.seen}
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """The rows, their signatures and their strata."""
-        return {"x": self.x, "signature": self.signature_ids, "stratum": self.strata, "bodies": self.bodies}
+        return {
+            "x": self.x,
+            "signature": self.signature_ids,
+            "stratum": self.strata,
+            "bodies": self.bodies,
+            "serial": self.serials,
+        }
 
     def restore(
         self,
@@ -117,4 +148,5 @@ class ExampleTable:
         self._strata = {bytes.fromhex(key): k for k, key in enumerate(data["strata"])}
         self._x, self._size = arrays["x"].copy(), len(arrays["x"])
         self._signature, self._stratum = arrays["signature"].copy(), arrays["stratum"].copy()
-        self._bodies = arrays["bodies"].copy()
+        self._bodies, self._serial = arrays["bodies"].copy(), arrays["serial"].copy()
+        self.seen = int(data["seen"])

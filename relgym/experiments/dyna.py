@@ -125,6 +125,7 @@ def run(
     testing: Examination | None = None,
     to_the_end: bool = False,
     heard: Callable[[int, int], None] | None = None,
+    met: Callable[[Any, Any], None] | None = None,
     agent: dict[str, Any] | None = None,
     dyna: dict[str, Any] | None = None,
 ) -> Run:
@@ -144,6 +145,8 @@ def run(
         Go on after success.
     heard
         Is told (real steps, successes) at every evaluation.
+    met
+        Is shown the trained agent and its model (none: it has none) at the end.
     agent, dyna
         Parameters of the agent and of Dyna that differ from the course's.
     """
@@ -169,6 +172,8 @@ def run(
     started = perf_counter()
     algorithm.learn(steps, callback=CallbackList([*([own] if own is not None else []), Check()]))
     seconds = perf_counter() - started
+    if met is not None:
+        met(algorithm, getattr(own, "world", None))
     learning, dreaming, laws = _costs(own)
     return Run(course.name, arm.name, seed, tuple(curve), solved_at(curve), seconds, learning, dreaming, laws)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,8 +11,9 @@ import numpy as np
 from relgym.experiments.bar import Measure, measured
 from relgym.experiments.blocks import Block
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.law_motion import episode
 from relgym.experiments.law_score import TESTS, Rows, score, score_laws, taught
-from relgym.experiments.law_worlds import Ball, Material, World, episode
+from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.experiments.rooms import Room
 from relgym.laws.book import LawBook
 from relgym.model.report import report as report_of
@@ -59,9 +60,7 @@ class Trial:
 
 
 def _balls(*masses: float, types: Sequence[str] = ()) -> tuple[Ball, ...]:
-    return tuple(
-        Ball(types[k] if types else "ball", 0.08 + 0.02 * k, mass) for k, mass in enumerate(masses)
-    )
+    return tuple(Ball(types[k] if types else "ball", 0.08 + 0.02 * k, mass) for k, mass in enumerate(masses))
 
 
 _MATERIALS: Final[Mapping[str, Material]] = {
@@ -71,7 +70,9 @@ _MATERIALS: Final[Mapping[str, Material]] = {
 }
 
 TRIALS: Final = (
-    Trial("space", World(3, blocks=("block",) * 12, materials={"block": _ROUGH}), frozenset({_BOUNCES, _SLIDES})),
+    Trial(
+        "space", World(3, blocks=("block",) * 12, materials={"block": _ROUGH}), frozenset({_BOUNCES, _SLIDES})
+    ),
     Trial(
         "a spinning ball",
         World(2, (Ball(spins=True),), materials={"block": _ROUGH}),
@@ -91,9 +92,7 @@ TRIALS: Final = (
     ),
     Trial(
         "five rough balls",
-        World(
-            2, _balls(1.0, 1.5, 2.0, 2.5, 3.0), materials={"block": _ROUGH}, between=_ROUGH, weighed=True
-        ),
+        World(2, _balls(1.0, 1.5, 2.0, 2.5, 3.0), materials={"block": _ROUGH}, between=_ROUGH, weighed=True),
         frozenset({_BOUNCES, _SLIDES}),
     ),
     Trial(

@@ -38,6 +38,7 @@ ESTIMATE_AT = (64, 256, 1024)
 
 FEWEST_CONTACTS = 3
 
+
 class LawLearner:
     """Laws of all types whose velocity is a vector of learned properties.
 

@@ -192,9 +192,7 @@ def _inside(axes: list[FloatArray], encounters: Encounters) -> NDArray[np.bool_]
     return inside
 
 
-def _outside_bits(
-    axes: list[FloatArray], encounters: Encounters, inside: NDArray[np.bool_]
-) -> float:
+def _outside_bits(axes: list[FloatArray], encounters: Encounters, inside: NDArray[np.bool_]) -> float:
     """Each axis that the frame lacks has to be stated number by number."""
     return EXCEPTION_BITS * max(1, len(encounters.now) - len(axes)) * float((~inside).sum())
 

@@ -205,9 +205,7 @@ def _piece(
     return Piece(((examples.free, 1.0), *terms) if base else tuple(terms))
 
 
-def _refined(
-    piece: Piece, loose: NDArray[np.bool_], base: bool, examples: AxisExamples
-) -> Piece | None:
+def _refined(piece: Piece, loose: NDArray[np.bool_], base: bool, examples: AxisExamples) -> Piece | None:
     """The piece fitted to what it explains, `loose` at first, as far as that determines it."""
     for _ in range(3):
         if loose.sum() < len(piece.terms) + 1:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
 from relgym.model.chaining import CHECK_AT, revise
+from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.property_model import bodies_of
@@ -52,9 +53,10 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
         for index in before.layout.of_type(type_name):
             if before.layout.names[index] in after:
                 _learn_object(parts, percept, index, following, reports)
-    for type_name, table in parts.tables.items() if parts.open else ():
-        if len(table) in CHECK_AT:
+    for type_name, table in parts.tables.items():
+        if parts.open and table.seen in CHECK_AT:
             revise(parts, type_name)
+        forget(table, [m for t, m in parts.models.items() if t.type == type_name], parts.config.history)
     if parts.laws is not None:
         stays = {i: name in after for i, name in enumerate(before.layout.names)}
         parts.laws.learn_one(percept, following, stays, parts.models)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -71,13 +71,18 @@ class Situation:
     @cached_property
     def examples(self) -> ExampleBatch:
         """Relations and numbers for classifiers."""
-        return self._percept.examples(self._target, self._body, None)
+        return replace(self._bare, table=self._percept.relations.table) if self._body >= 0 else self._bare
 
     def glimpse(self, relations: Collection[str]) -> ExampleBatch:
         """`examples` in which only these binary relations can be told; the others hold nowhere."""
-        if "examples" in self.__dict__:
-            return self.examples
-        return self._percept.examples(self._target, self._body, relations)
+        if self._body < 0:
+            return self._bare
+        return replace(self._bare, table=self._percept.relations.table_of(relations))
+
+    @cached_property
+    def _bare(self) -> ExampleBatch:
+        """`examples` without binary relations."""
+        return self._percept.bare_examples(self._target, self._body)
 
     @cached_property
     def _numbers(self) -> NDArray[np.intp]:
@@ -252,14 +257,14 @@ class Percept:
         columns = [self.perception.gather(self.layout, place.signature, order) for order in orders]
         return np.take_along_axis(both, np.array(columns)[which], axis=1)
 
-    def examples(self, target: int, body: int, relations: Collection[str] | None) -> ExampleBatch:
-        """What classifiers are shown of an object; `Situation` says more."""
-        return self._bodiless(target) if body < 0 else self._embodied(body, target, relations)
+    def bare_examples(self, target: int, body: int) -> ExampleBatch:
+        """What classifiers are shown of an object, its binary relations left aside; `Situation` says more."""
+        return self._bodiless(target) if body < 0 else self._embodied(body, target)
 
     def _padded(self) -> NDArray[np.float64]:
         return np.concatenate([self.vectors, np.full((len(self), 1), np.nan)], axis=1)
 
-    def _embodied(self, body: int, target: int, names: Collection[str] | None) -> ExampleBatch:
+    def _embodied(self, body: int, target: int) -> ExampleBatch:
         perception, relations, n = self.perception, self.relations, len(self)
         padded = self._padded()
         own = padded[:, perception.own_columns(self.layout, target)]
@@ -271,8 +276,8 @@ class Percept:
         pair[:, body] = np.nan
         table = perception.unary_table(self.layout)
         every = np.broadcast_to(table, (n, *table.shape))
-        shown = relations.table if names is None else relations.table_of(names)
-        return ExampleBatch(shown, every, relations.context(body), pair, own, body)
+        nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
+        return ExampleBatch(nothing, every, relations.context(body), pair, own, body)
 
     def _bodiless(self, target: int) -> ExampleBatch:
         """An object without a body stands alone: no relations, only numbers."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import enum
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +57,9 @@ class Prediction:
     frame
         Axes in which what predicted it is stated: ``"world"`` for modes; laws of touching pairs name their own
         (`relgym.laws.frames`), and then the roles are the target and all that it touches.
+    spread
+        Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
+        among a few) left, in units of the property; NaN where no mode predicts.
     """
 
     object: str
@@ -66,6 +70,7 @@ class Prediction:
     roles: tuple[str, ...] = ()
     margin: float = 0.0
     frame: str = "world"
+    spread: float = math.nan
 
     @builtins.property  # `property` is a field here
     def ok(self) -> bool:

@@ -25,6 +25,7 @@ from relgym.model.grouping import distinct, members
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.model.spread import Spreads, action_columns, measure
 from relgym.scene.objects import SceneLayout, SceneSchema, Target
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
@@ -33,6 +34,9 @@ _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
     OUTCOMES.index(o)
     for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
 )
+
+MEASURE_EVERY = 256
+"""Spreads are measured after so many examples, and whenever the modes change."""
 
 HOPELESS, DOUBTFUL = 200, 500
 """Without a mode after so many examples there is no law; with most of so many recent ones unexplained, hardly one."""
@@ -66,6 +70,8 @@ class PropertyModel:
     ----------
     clusterer, classifier, casting
         The learners of modes, of their preconditions and of who plays their roles.
+    spreads
+        How far examples scatter about their modes.
     limits
         Which modes are limits: they take no part in the vote but cut off what its winner predicts.
     """
@@ -81,6 +87,7 @@ class PropertyModel:
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
         self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classification)
         self.casting = Casting(vocabulary, config.classification)
+        self.spreads = Spreads()
         self._unexplained = False
         self.limits = Limits()
         self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
@@ -94,7 +101,7 @@ class PropertyModel:
         return self._unexplained
 
     def _judge(self) -> bool:
-        seen = len(self.clusterer.y)
+        seen = self.clusterer.seen
         if not self.clusterer.clusters:
             return seen >= HOPELESS
         return seen >= DOUBTFUL and bool((self.clusterer.labels[-DOUBTFUL:] == NOISE).mean() > 0.5)
@@ -146,6 +153,8 @@ class PropertyModel:
         """
         report = self.clusterer.learn_one(table, row, y)
         self._unexplained = self._judge()
+        if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
+            self.spreads = measure(self.clusterer, table)
         if report.changed or self.limits.overstepped(y, self.clusterer.scale.tolerance):
             self._follow(table)
         number = len(self.clusterer.y) - 1
@@ -160,6 +169,12 @@ class PropertyModel:
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
         return report
+
+    def keep(self, rows: NDArray[np.bool_]) -> None:
+        """Forget the examples of dropped rows of the example table, shape ``(rows,)``."""
+        numbers = self.clusterer.keep(rows)
+        exemplars = self.classifier.exemplars.columns["row"]
+        exemplars[:] = numbers[exemplars]
 
     def refresh(self, budget: int | None) -> int:
         """Re-learn stale classifiers within a budget of work (None: all); returns the work spent."""
@@ -310,12 +325,19 @@ class PropertyModel:
     def example(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Example:
         """What the classifiers are shown of a single scene; arguments as of `predict_one`."""
         situation = percept.situation(index)
+        x = percept.rows(
+            index, following[None], ordered=False
+        )  # conditions are of objects alone of their type
+        return replace(self._shown(situation, x), key=situation.keys[0])
+
+    def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
+        """`example` without the key, by which examples are kept and not classified."""
         first = situation.examples[0]
-        own = first.own
-        if self.conditions.pairs:
-            x = percept.rows(index, following[None])
-            own = np.concatenate([own, self.conditions.values(situation.signature, x)[0]])
-        return replace(first, key=situation.keys[0], own=own)
+        if not self.conditions.pairs:
+            return first
+        return replace(
+            first, own=np.concatenate([first.own, self.conditions.values(situation.signature, x)[0]])
+        )
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
@@ -334,19 +356,20 @@ class PropertyModel:
         nothing = Prediction("", "", float("nan"), outcome)
         if self._unexplained or not self.classifier.modes:
             return nothing
-        x = percept.rows(index, following[None])[0].tolist()
-        example = self.example(percept, index, following)
+        casts = self._casts(situation.signature)
+        row = percept.rows(index, following[None], ordered=casts)
+        x, example = row[0].tolist(), self._shown(situation, row)
         ranking = self.classifier.rank(example, self._values_one(situation.signature, x))
         if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
             return replace(nothing, outcome=Outcome.OUTSIDE)
-        layout = percept.layout
+        layout, order = percept.layout, situation.order[0] if casts else situation.plain
         for place, mode in enumerate(ranking.modes):
             binding = self._binding(situation.signature, mode)
             if binding is None:
                 continue
             slots: tuple[int, ...] | None = ()
             if binding.open:
-                slots = self._cast(mode, binding, example, situation.order[0], layout)
+                slots = self._cast(mode, binding, example, order, layout)
             if slots is None:
                 if not self.config.abstain:
                     continue
@@ -354,10 +377,12 @@ class PropertyModel:
                 return replace(nothing, outcome=Outcome.OUTSIDE)
             rest = iter(slots)
             played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
-            roles = tuple(layout.names[situation.order[0, s]] for s in played)
+            roles = tuple(layout.names[order[s]] for s in played)
             margin = ranking.margin if place == 0 else 0.0
             found = Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
-            return self.limits.cut_off(found)
+            found = self.limits.cut_off(found)
+            action = tuple(x[k] for k in action_columns(situation.signature).tolist())
+            return replace(found, spread=self.spreads.of(found.mode, action))
         return replace(nothing, outcome=Outcome.NO_ROLES)
 
     def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
@@ -453,6 +478,7 @@ class PropertyModel:
         return {
             "clusterer": self.clusterer.to_json(),
             "unexplained": self._unexplained,
+            "spreads": self.spreads.to_json(),
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
             "limits": self.limits.to_json(),
@@ -466,6 +492,7 @@ class PropertyModel:
         """Take over what `to_json` and `to_arrays` wrote."""
         self.clusterer.restore(data["clusterer"], arrays)
         self._unexplained = bool(data["unexplained"])
+        self.spreads = Spreads.from_json(data["spreads"])
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))

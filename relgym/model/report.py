@@ -35,6 +35,9 @@ _CLAUSE_WIDTH = 62
 _FUNCTION_WIDTH = 76
 """The same for functions: a report fits a terminal of 100 columns."""
 
+_ROUNDING = 0.1
+"""A spread below this fraction of the noise assumed is not worth telling."""
+
 _OTHERWISE = "otherwise"
 
 
@@ -50,11 +53,14 @@ class ModeRow:
         Training examples that it explains and that were assigned to it.
     function
         Such as ``vx' = -0.9 vx``.
+    spread
+        How far examples scatter about it, where that is more than rounding; empty otherwise.
     """
 
     mode: int
     examples: int
     function: str
+    spread: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,7 +285,7 @@ def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
 
 
 def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> TargetReport:
-    modes = tuple(ModeRow(m.id, m.examples, _function(part, m, digits)) for m in part.modes)
+    modes = tuple(ModeRow(m.id, m.examples, _function(part, m, digits), _spread(part, m)) for m in part.modes)
     pairs = tuple(_pair_table(c) for c in part.classifier.classifiers)
     return TargetReport(
         str(part.target),
@@ -297,6 +303,17 @@ def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
         return mode.formula(digits)
     side = "least" if mode.id == part.limits.low else "most"
     return f"{mode.formula(digits)} at {side}: a limit to what the others predict"
+
+
+def _spread(part: PropertyModel, mode: Mode) -> str:
+    """A mode's spread in words, action by action where they differ much."""
+    known = part.spreads.by_mode.get(mode.id)
+    if known is None or known.whole <= max(part.clusterer.floor, _ROUNDING * part.clusterer.scale.sigma):
+        return ""
+    if not known.uneven():
+        return f"± {known.whole:.2g}"
+    texts = (f"± {s:.2g} after {', '.join(f'{x:g}' for x in a)}" for a, s in known.by_action.items())
+    return "; ".join(texts)
 
 
 def _pair_table(classifier: BinaryClassifier) -> PairTable:
@@ -336,6 +353,7 @@ def _mode_table(target: TargetReport) -> str:
         first, *rest = wrapped(m.function, _FUNCTION_WIDTH, "+-")
         rows.append([m.mode, m.examples, first])
         rows += [["", "", f"      {line}"] for line in rest]
+        rows += [["", "", f"      {line}"] for line in wrapped(m.spread, _FUNCTION_WIDTH, "a") if line]
     return table(["mode", "examples", "function"], rows)
 
 

@@ -92,6 +92,11 @@ class WorldModel:
         """What is learned, in causal order."""
         return self._parts.targets
 
+    @property
+    def history(self) -> int:
+        """Number of examples remembered of the type that has most; see `ModelConfig.history`."""
+        return max((len(table) for table in self._parts.tables.values()), default=0)
+
     def property_model(self, type_name: str, prop: str) -> PropertyModel:
         """The model of one target; `QueryError` when there is none."""
         return self._parts.property_model(type_name, prop)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, installed
+from relgym.baselines.tuned import setting_of
 from relgym.experiments.chapter4.job import Plan
 from relgym.experiments.chapter4.protocol import LEARNERS, Batch, Protocol
 from relgym.experiments.jobs.task import Task
@@ -145,6 +146,7 @@ def _baseline(protocol: Protocol, function: str, name: str, seen: str, run: Batc
         "order": run.order,
         "checkpoints": list(protocol.after(2)),
         "tests": protocol.tests(),
+        "setting": setting_of(name, seen),
     }
     return Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}")
 

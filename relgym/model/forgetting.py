@@ -1,0 +1,75 @@
+"""Bounded memory: of a long history a uniform choice is kept, and all that is rare (design §5).
+
+Which examples stay is decided by hashes of their serial numbers, the smallest ones first. That is a uniform reservoir
+without a random number: it depends on nothing but how many examples came, and it needs no weights.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.mode import NOISE
+from relgym.model.property_model import PropertyModel
+
+__all__ = ["SLACK", "forget"]
+
+SLACK = 1.25
+"""The history is cut when it has grown beyond its bound by this factor, so that cutting is rare."""
+
+RARE = 20
+"""A mode that holds less than this fraction of the bound is kept whole; so is the newest noise, up to a quarter."""
+
+
+def forget(table: ExampleTable, models: list[PropertyModel], bound: int) -> bool:
+    """Cut a type's history back to its bound, if that is due; whether it was.
+
+    Parameters
+    ----------
+    table
+        The type's rows.
+    models
+        Models of its targets.
+    bound
+        Number of rows that stay. What classifiers remember stays in any case, and rare modes may exceed it a little.
+
+    Notes
+    -----
+    Cost O(bound), once every quarter of it.
+    """
+    if len(table) < SLACK * bound:
+        return False
+    forced = np.zeros(len(table), dtype=bool)
+    for model in models:
+        forced[_indispensable(model, bound)] = True
+    free = np.flatnonzero(~forced)
+    room = max(0, bound - int(forced.sum()))
+    kept = forced.copy()
+    kept[free[np.argsort(_lot(table.serials[free]), kind="stable")[:room]]] = True
+    for model in models:
+        model.keep(kept)
+    table.keep(kept)
+    return True
+
+
+def _indispensable(model: PropertyModel, bound: int) -> NDArray[np.int64]:
+    """Rows of what classifiers remember, of rare modes and of recent noise."""
+    log = model.clusterer
+    chosen = [
+        model.classifier.exemplars.rows.astype(np.intp),
+        np.flatnonzero(log.labels == NOISE)[-bound // 4 :],
+    ]
+    counts = np.bincount(log.labels)
+    for mode in np.flatnonzero(counts[1:]) + 1:
+        if counts[mode] < bound / RARE:
+            chosen.append(np.flatnonzero(log.labels == mode))
+    return log.rows[np.concatenate(chosen)]
+
+
+def _lot(serials: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """A number that looks random for every serial number (splitmix64)."""
+    x = (serials.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
