@@ -211,7 +211,11 @@ def load(path: Path) -> Run:
 def _job(folder: str, course: str, arm: str, seed: int, steps: int) -> str:
     """One run in a process of its own, written atomically."""
     path = kept(Path(folder), COURSES[course], ARMS[arm], seed, steps)
-    found = run(COURSES[course], ARMS[arm], seed=seed, steps=steps)
+
+    def heard(at: int, good: int) -> None:
+        print(f"{course}, {arm}, seed {seed}: {good} of {EPISODES} after {at:,}", file=sys.stderr, flush=True)
+
+    found = run(COURSES[course], ARMS[arm], seed=seed, steps=steps, heard=heard)
     partial = path.with_suffix(f".{os.getpid()}.partial")
     partial.write_text(json.dumps(asdict(found), indent=1), encoding="utf-8")
     partial.replace(path)

@@ -37,34 +37,27 @@ def lwr_shown(_: Protocol, values: Values, number: str) -> Shown:
         for blocks, score in scores.items()
     ]
 
-    def draw(path: Path) -> None:
-        figure, panels = canvas(8.0, 4.6)
-        panel = panels[0][0]
-        shades = iter(("#8e6eb0", "#cda443"))
-        for group, scores in found.items():
-            ours = group in COLOURS
-            colour = COLOURS[group] if ours else next(shades)
-            for q, style in _STYLES[:1] if ours else _STYLES:
-                line = [above(quantile(s["errors"], q)) for s in scores.values()]
-                label = f"{TITLES.get(group, group)}, {100 * q:g} %"
-                panel.plot(
-                    list(scores),
-                    line,
-                    style,
-                    marker="o",
-                    ms=3,
-                    lw=3 if ours else 1.2,
-                    color=colour,
-                    label=label,
-                )
-        last = list(next(iter(found.values())).values())[-1]
-        panel.axhline(last["change"] / last["examples"], color="black", lw=0.8, ls="--")
-        error_axis(panel)
-        panel.set_xlabel("training blocks")
-        panel.legend(fontsize=7, ncols=2)
-        save(figure, path)
+    text = f"{table(heading, lines)}\n\nprinted: {LWR[number]}"
+    return Shown(text, [heading, *lines], lambda path: _draw_lwr(path, found))
 
-    return Shown(f"{table(heading, lines)}\n\nprinted: {LWR[number]}", [heading, *lines], draw)
+
+def _draw_lwr(path: Path, found: Mapping[str, Mapping[int, Any]]) -> None:
+    figure, panels = canvas(8.0, 4.6)
+    panel, shades = panels[0][0], iter(("#8e6eb0", "#cda443"))
+    for group, scores in found.items():
+        ours = group in COLOURS
+        colour = COLOURS[group] if ours else next(shades)
+        for q, style in _STYLES[:1] if ours else _STYLES:
+            line = [above(quantile(s["errors"], q)) for s in scores.values()]
+            label = f"{TITLES.get(group, group)}, {100 * q:g} %"
+            width = 3.0 if ours else 1.2
+            panel.plot(list(scores), line, style, marker="o", ms=3, lw=width, color=colour, label=label)
+    last = list(next(iter(found.values())).values())[-1]
+    panel.axhline(last["change"] / last["examples"], color="black", lw=0.8, ls="--")
+    error_axis(panel)
+    panel.set_xlabel("training blocks")
+    panel.legend(fontsize=7, ncols=2)
+    save(figure, path)
 
 
 # ------------------------------------------------------------------ figure 4.21
