@@ -33,6 +33,9 @@ APPROXIMATE_AT = (256, 1024, 4096, 16384)
 MOST_ROWS, MANY_FEATURES = 1500, 200
 """At most so many rows determine an approximation; it may have twice as many terms if there are so many columns."""
 
+LEAST_MEMBERS = 4
+"""Examples that a mode of another model must explain here to be taken over."""
+
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
 
@@ -320,7 +323,10 @@ class ModeClusterer(Population):
         known = Known(
             table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
         )
-        cluster = known.cluster(fit, signature)
+        self._admit(table, known, known.cluster(fit, signature))
+
+    def _admit(self, table: ExampleTable, known: Known, cluster: Cluster) -> int:
+        """Take up a mode that has no id yet; the id that it gets."""
         members = self._explained(table, cluster, self._noise())
         cluster, absorbed = generalise(known, cluster, members, rng=self._rng)
         inherited = sum(self._log.forgotten.pop(i, 0) for i in absorbed)
@@ -331,6 +337,48 @@ class ModeClusterer(Population):
         self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
         self._log.forgotten[new] += inherited
         self._reassign(table, new)
+        return new
+
+    def absorb(
+        self, other: ModeClusterer, table: ExampleTable, rows: NDArray[np.int64], *, functions: bool
+    ) -> None:
+        """Take up another clusterer's examples and modes, as if this one had seen them.
+
+        Parameters
+        ----------
+        other
+            Of the same property; unchanged.
+        table, rows
+            Where its examples lie now: row of each in the table, shape ``(n,)``.
+        functions
+            Whether its modes may be taken over: not if they were given other next values.
+        """
+        first = len(self._log)
+        for row, y in zip(rows.tolist(), other.y.tolist(), strict=True):
+            self._log.append(row, y)
+        self._largest, self._reach = max(self._largest, other._largest), max(self._reach, other._reach)
+        self._spread, self.floor = max(self._spread, other._spread), max(self.floor, other.floor)
+        self.approximate |= other.approximate
+        self.scale = replace(self.scale, sigma=max(self.scale.sigma, other.scale.sigma))
+        self._rehome(table, np.arange(first, len(self._log)))
+        matched = {NOISE: NOISE}
+        for i, cluster in sorted(other.clusters.items()):
+            alike = [k for k, c in sorted(self.clusters.items()) if c.mode.same_function(cluster.mode, 1e-6)]
+            if alike:
+                matched[i] = alike[0]
+            elif (
+                functions
+                and len(self._explained(table, Cluster(cluster.mode), self._noise())) >= LEAST_MEMBERS
+            ):
+                known = Known(
+                    table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
+                )
+                matched[i] = self._admit(
+                    table, known, Cluster(replace(cluster.mode, id=0, target=self.target))
+                )
+        for i, count in other._log.forgotten.items():
+            self._log.forgotten[matched.get(i, NOISE)] += count
+        self._log.seen += other._log.seen - len(other._log)
 
     # ------------------------------------------------------------------ saving
     def to_json(self) -> dict[str, Any]:

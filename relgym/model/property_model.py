@@ -157,6 +157,30 @@ class PropertyModel(ModeFunctions):
             self.casting.observe(self.mode(report.mode), seen, played)
         return report
 
+    @property
+    def base_features(self) -> int:
+        """Number of own features that classifiers are shown, next values left aside."""
+        return len(self._base.own)
+
+    def follow(self, table: ExampleTable) -> None:
+        """The modes changed from outside: classifiers and spreads follow."""
+        self._follow(table)
+        self.spreads, self._unexplained = measure(self.clusterer, table), self._judge()
+
+    def remember(self, table: ExampleTable, example: Example, weight: float) -> None:
+        """Let the classifiers remember one more of the examples there are, by its number in ``example.row``."""
+        number = np.array([example.row])
+        assigned = int(self.clusterer.labels[example.row])
+        modes = self.classifier.modes
+        known, fits = self.clusterer.fits(table, number)
+        shown = np.array([bool(fits[0, known.index(i)]) for i in modes], dtype=bool)
+        values = self._values_many(table, self.clusterer.rows[number], modes)[0]
+        played = self._played(table, number, assigned)[0].tolist()
+        label = assigned if assigned in modes else UNKNOWN
+        self.classifier.exemplars.add(example, label, shown, values, roles=played, weight=weight)
+        if played:
+            self.casting.observe(self.mode(assigned), example, played)
+
     def keep(self, rows: NDArray[np.bool_]) -> None:
         """Forget the examples of dropped rows of the example table, shape ``(rows,)``."""
         numbers = self.clusterer.keep(rows)
