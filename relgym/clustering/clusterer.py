@@ -16,7 +16,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
-from relgym.clustering.population import Population
+from relgym.clustering.population import ClusterReport, Population
 from relgym.clustering.unification import reordered
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
@@ -38,31 +38,6 @@ LEAST_MEMBERS = 4
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
-
-
-@dataclass(frozen=True, slots=True)
-class ClusterReport:
-    """What one example changed.
-
-    Attributes
-    ----------
-    mode
-        Id of the mode the example was assigned to; `NOISE` if none explains it.
-    fits
-        Ids of all modes that explain it.
-    created, removed
-        Ids of modes that came and went.
-    """
-
-    mode: int
-    fits: tuple[int, ...]
-    created: tuple[int, ...] = ()
-    removed: tuple[int, ...] = ()
-
-    @property
-    def changed(self) -> bool:
-        """Whether the set of modes is another than before."""
-        return bool(self.created or self.removed)
 
 
 @dataclass(slots=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +15,32 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.config import ClusteringConfig
 from relgym.scene.objects import Target
 
-__all__ = ["Population"]
+__all__ = ["ClusterReport", "Population"]
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterReport:
+    """What one example changed.
+
+    Attributes
+    ----------
+    mode
+        Id of the mode the example was assigned to; `NOISE` if none explains it.
+    fits
+        Ids of all modes that explain it.
+    created, removed
+        Ids of modes that came and went.
+    """
+
+    mode: int
+    fits: tuple[int, ...]
+    created: tuple[int, ...] = ()
+    removed: tuple[int, ...] = ()
+
+    @property
+    def changed(self) -> bool:
+        """Whether the set of modes is another than before."""
+        return bool(self.created or self.removed)
 
 
 class Population:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.classification.examples import Example
+from relgym.classification.exemplars import Exemplars
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
@@ -107,6 +108,18 @@ class ModeFunctions:
             slots = binding.slots[assignment[part]][:, chosen]
             played[part] = np.take_along_axis(table.bodies[rows[part]], slots, axis=1)
         return played
+
+    def _recast(self, table: ExampleTable, exemplars: Exemplars) -> None:
+        """Write down anew who plays the roles of the remembered examples' modes."""
+        numbers = exemplars.rows.astype(np.intp)
+        labels = self.clusterer.labels[numbers]
+        roles = exemplars.columns["roles"]
+        roles[:] = -1
+        for mode in np.unique(labels[labels != NOISE]):
+            part = np.flatnonzero(labels == mode)
+            played = self._played(table, numbers[part], int(mode))
+            width = min(played.shape[1], roles.shape[1])
+            roles[part, :width] = played[:, :width]
 
     def _cast(
         self, mode: int, binding: Binding, example: Example, order: NDArray[np.intp], layout: SceneLayout

@@ -111,6 +111,7 @@ def _take_up(
     for example, weight in _exemplars(theirs, mine, table, numbers):
         mine.remember(table, example, weight)
     mine.follow(table)
+    mine.start_over(table)
 
 
 def _exemplars(

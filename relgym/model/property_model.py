@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,13 +13,13 @@ from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.mode_classifier import ModeClassifier
 from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
-from relgym.clustering.columns import PRIME, SlotSignature
+from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
-from relgym.model.conditions import Conditions
+from relgym.model.conditions import Conditions, needed
 from relgym.model.functions import ModeFunctions, bodies_of
 from relgym.model.grouping import distinct, members
 from relgym.model.limits import Limits, find_limits
@@ -105,18 +104,8 @@ class PropertyModel(ModeFunctions):
     @property
     def needs(self) -> frozenset[tuple[str, str]]:
         """(type, property) pairs whose next values a mode's function reads or a clause tests."""
-        if not self.target.given:
-            return frozenset()
-        names = {
-            name for c in self.clusterer.clusters.values() for role in c.mode.roles for name, _ in role.terms
-        }
-        for c in self.classifier.classifiers:
-            names |= {literal.relation for clause in c.definition.clauses for literal in clause}
-            trees = [tree for tree in (*c.clause_trees, c.fall_through_tree) if tree is not None]
-            names |= {tree.columns[k] for tree in trees for k in tree.column if k >= 0}
-        words = {word for name in names for word in re.findall(r"[\w.]+'", name)}
-        bare = {word.rpartition(".")[2] for word in words}
-        return frozenset(pair for pair in self.target.given if pair[1] + PRIME in bare)
+        modes = [c.mode for c in self.clusterer.clusters.values()]
+        return needed(self.target, modes, self.classifier.classifiers)
 
     # ------------------------------------------------------------------ learning
     def learn_one(
@@ -166,6 +155,10 @@ class PropertyModel(ModeFunctions):
         """The modes changed from outside: classifiers and spreads follow."""
         self._follow(table)
         self.spreads, self._unexplained = measure(self.clusterer, table), self._judge()
+
+    def start_over(self, table: ExampleTable) -> None:
+        """Learn all classifiers anew, of what they remember."""
+        self._widen(table, self.classifier.vocabulary.follows)
 
     def remember(self, table: ExampleTable, example: Example, weight: float) -> None:
         """Let the classifiers remember one more of the examples there are, by its number in ``example.row``."""
@@ -230,19 +223,7 @@ class PropertyModel(ModeFunctions):
         labels = self.clusterer.labels[numbers].astype(np.int64)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
-        self._recast(table)
-
-    def _recast(self, table: ExampleTable) -> None:
-        """Write down anew who plays the roles of the remembered examples' modes."""
-        numbers = self.classifier.exemplars.rows.astype(np.intp)
-        labels = self.clusterer.labels[numbers]
-        roles = self.classifier.exemplars.columns["roles"]
-        roles[:] = -1
-        for mode in np.unique(labels[labels != NOISE]):
-            part = np.flatnonzero(labels == mode)
-            played = self._played(table, numbers[part], int(mode))
-            width = min(played.shape[1], roles.shape[1])
-            roles[part, :width] = played[:, :width]
+        self._recast(table, self.classifier.exemplars)
 
     # ------------------------------------------------------------------ prediction (§3.6)
     def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
