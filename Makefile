@@ -15,10 +15,10 @@ DYNA := $(VENV)/.installed-dyna
 
 .DEFAULT_GOAL := help
 .PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow bench coverage lint format types check
-.PHONY: wheel clean
+.PHONY: wheel clean example-highway example-ocatari
 
 help:            ## show this list
-	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 12
+	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 17
 
 demo: $(VIZ)     ## learn the laws of both worlds and print them
 	$(BIN)/relgym demo
@@ -31,6 +31,13 @@ dyna-full: $(DYNA) ## the whole comparison, hours; resumes where it was stopped
 
 reproduce: $(DEV) ## the thesis' tables and figures again, the fast way; writes docs/results.md
 	$(BIN)/relgym reproduce all --batches 2 --fast --page docs/results.md
+
+# Their pins and ours clash (OCAtari wants numpy < 2), so each has a venv of its own. relgym's core runs with both.
+example-highway: $(VENV)-highway/.installed ## learn highway-env's traffic from its table of cars
+	$(VENV)-highway/bin/python examples/adapters/highway_traffic.py
+
+example-ocatari: $(VENV)-ocatari/.installed ## learn Pong's ball from OCAtari's list of objects
+	$(VENV)-ocatari/bin/python examples/adapters/ocatari_pong.py
 
 test: $(DEV)     ## all tests but the slow ones
 	$(PYTEST) -n 2
@@ -72,8 +79,20 @@ wheel: $(VIZ)    ## build dist/relgym-*.whl
 	rm -rf build
 
 clean:           ## remove all that was installed, built and cached
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .coverage
+	rm -rf $(VENV) $(VENV)-highway $(VENV)-ocatari build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .coverage
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)-highway/.installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-highway
+	$(VENV)-highway/bin/python -m pip install --quiet --disable-pip-version-check -e . 'highway-env==1.12.1'
+	@touch $@
+
+$(VENV)-ocatari/.installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-ocatari
+	$(VENV)-ocatari/bin/python -m pip install --quiet --disable-pip-version-check 'ocatari==2.2.1' 'ale-py==0.12.1' \
+		'gymnasium>=1.2,<2' python-fcl scipy rich typer
+	$(VENV)-ocatari/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+	@touch $@
 
 $(VENV)/pyvenv.cfg:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "relgym needs Python >= 3.11, this is %d.%d: make PYTHON=python3.11 ..." % sys.version_info[:2])'

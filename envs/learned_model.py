@@ -11,7 +11,6 @@ from gymnasium.error import ResetNeeded
 
 from relgym.envs.actions import without_action
 from relgym.envs.arguments import check_options, checked_action, checked_count, checked_least
-from relgym.envs.flat import FlatSpec
 from relgym.envs.learned_model_ends import Cause, explained, horizon_reached, parts_of
 from relgym.envs.learned_model_judges import Judge, Judges, Start, TaskFunctions
 from relgym.envs.learned_model_setting import Setting, check_knowledge
@@ -139,6 +138,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         self.observation_space, self.action_space = place.observation_space, place.action_space
         self.metadata = {**self.metadata, "render_fps": place.render_fps}
         self.task = place.task if task is None else task
+        self.flat_spec = place.flat_spec
         self._judges = Judges.of(reward, terminated, self.task, place.model, place.layout)
         self._start = start
         self._horizon = None if horizon is None else checked_count("horizon", horizon, 1, 10**9)
@@ -215,13 +215,6 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         if self._viewer is not None:
             self._viewer.close()
             self._viewer = None
-
-    @property
-    def flat_spec(self) -> FlatSpec:
-        """What flat views of the dream show unless told otherwise: what those of the real env do."""
-        world = self._setting.world
-        spec: FlatSpec = FlatSpec() if world is None else getattr(world.unwrapped, "flat_spec", FlatSpec())
-        return spec
 
     @property
     def scene(self) -> Scene:

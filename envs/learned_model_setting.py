@@ -15,6 +15,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from relgym.envs.actions import check_action_space
+from relgym.envs.flat import FlatSpec
 from relgym.envs.learned_model_judges import TaskFunctions
 from relgym.envs.learned_model_shown import BoxesShown, Shown, ViewShown, checked_boxes, is_plain
 from relgym.envs.model_files import EnvRecord, copied, schema_like, world_like
@@ -149,6 +150,14 @@ class Setting:
     def layout(self) -> SceneLayout:
         """Layout of the scenes of a batch: what is shown, and the `task` object if there is one; no action."""
         return self.shown.layout
+
+    @property
+    def flat_spec(self) -> FlatSpec:
+        """What flat views show unless told otherwise: what those of the real env do."""
+        spec: FlatSpec = (
+            FlatSpec() if self.world is None else getattr(self.world.unwrapped, "flat_spec", FlatSpec())
+        )
+        return spec
 
     @property
     def task(self) -> TaskFunctions | None:

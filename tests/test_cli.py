@@ -60,7 +60,8 @@ def test_dyna_shows_both_agents_and_the_laws(tmp_path: Path) -> None:
     assert "Dyna, relgym, reward given" in text and "SAC" in text
     assert "What the agent learned of its world, and dreamed in:" in text
     assert "truck.vx" in text
-    assert (tmp_path / "curves.png").stat().st_size > 5_000
+    for name in ("curves.png", "episodes.png"):
+        assert (tmp_path / name).stat().st_size > 5_000
 
 
 def test_rules_print_a_model(folder: Path) -> None:

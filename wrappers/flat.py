@@ -8,14 +8,16 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
+from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from relgym.envs.arguments import refuse_vector_env
 from relgym.envs.flat import FlatSpec, Flattener
 from relgym.errors import ConfigError
+from relgym.scene.objects import SceneSchema
 from relgym.wrappers.views import SceneView, view_of
 
-__all__ = ["FlatView"]
+__all__ = ["FlatView", "VectorFlatView"]
 
 
 class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordConstructorArgs):
@@ -74,3 +76,78 @@ class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordCons
         scene = self._schema.scene(observation)
         flat: NDArray[np.float32] = self.flattener(scene.layout, scene.vector[None])[0]
         return flat
+
+
+class VectorFlatView(gym.vector.VectorWrapper[Any, Any, Any, Any, Any], RecordConstructorArgs):
+    """Shows the scenes of a vector env as flat vectors, of all envs at once: `FlatView` for dreams by the thousand.
+
+    Last observations that a ``SAME_STEP`` autoreset puts into ``infos["final_obs"]`` become flat as well.
+
+    Parameters
+    ----------
+    env
+        A vector env whose envs' observations are scenes: of `relgym.envs.SceneEnv`, or `LearnedModelVectorEnv`.
+    spec
+        What to show; see `FlatView`.
+
+    Attributes
+    ----------
+    flattener : Flattener
+        The function from scenes to vectors.
+
+    Raises
+    ------
+    ConfigError
+        A single env, envs without scenes, or a spec that doesn't fit their schema.
+
+    Examples
+    --------
+    >>> import gymnasium as gym, relgym
+    >>> envs = VectorFlatView(gym.make_vec("relgym/TruckPush-v0", 3, vectorization_mode="sync", task="push"))
+    >>> flat, _ = envs.reset(seed=0)
+    >>> flat.shape
+    (3, 15)
+    """
+
+    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], spec: FlatSpec | None = None) -> None:
+        RecordConstructorArgs.__init__(self, spec=spec)
+        gym.vector.VectorWrapper.__init__(self, env)
+        self._schema: SceneSchema | None = _shared(env, "schema")
+        if self._schema is None:
+            raise ConfigError(
+                f"{env} has no `schema`: expected a vector env whose observations are scenes (of relgym.envs.SceneEnv)"
+            )
+        self.flattener = Flattener(self._schema, spec or _shared(env, "flat_spec") or FlatSpec())
+        self.single_observation_space = self.flattener.space
+        self.observation_space = batch_space(self.flattener.space, self.num_envs)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin episodes; flat observations, shape ``(num_envs, len(flattener.names))``."""
+        observations, infos = self.env.reset(seed=seed, options=options)
+        return self._flat(observations), infos
+
+    def step(self, actions: Any) -> tuple[NDArray[np.float32], Any, Any, Any, dict[str, Any]]:
+        """Step all envs; see `reset` for the observations."""
+        observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        if "final_obs" in infos:
+            final = np.full(self.num_envs, None, dtype=object)
+            for k in np.flatnonzero(infos["_final_obs"]).tolist():
+                final[k] = self._flat({name: v[None] for name, v in infos["final_obs"][k].items()})[0]
+            infos = {**infos, "final_obs": final}
+        return self._flat(observations), rewards, terminated, truncated, infos
+
+    def _flat(self, observations: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float32]:
+        assert self._schema is not None, "checked when made"
+        layout = self._schema.layout(observations)
+        vectors = np.concatenate([observations[name] for name in layout.names], axis=1)
+        return self.flattener(layout, np.asarray(vectors, dtype=np.float64))
+
+
+def _shared(env: gym.vector.VectorEnv[Any, Any, Any], name: str) -> Any:
+    """An attribute of the vector env itself, or of its envs; None where there is none."""
+    inner: Any = env.unwrapped
+    if hasattr(inner, name) or not hasattr(inner, "call"):
+        return getattr(inner, name, None)
+    return inner.get_attr(name)[0] if inner.call("has_wrapper_attr", name)[0] else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -132,6 +133,8 @@ def compared(
         column = layout.column(layout.index(part.object), part.property)
         came = float(after.vector[column])
         residuals[key] = came - part.value
+        if part.property in after[part.object].type.angles:  # π and -π are the same place
+            residuals[key] = math.remainder(residuals[key], 2.0 * math.pi)
         if not part.ok or not abs(residuals[key]) <= max(WRONG, precision * max(1.0, abs(came))):
             wrong.append(key)
     return residuals, tuple(wrong)

@@ -35,11 +35,12 @@ def config_of(given: ModelConfig | Mapping[str, Any]) -> ModelConfig:
     if isinstance(given, ModelConfig):
         return given
     try:
-        halves = {
+        parts = {
             "clustering": ClusteringConfig(**given.get("clustering", {})),
             "classification": ClassificationConfig(**given.get("classification", {})),
+            "features": tuple(given.get("features", ())),
         }
-        return ModelConfig(**{**given, **halves})
+        return ModelConfig(**{**given, **parts})
     except TypeError as error:
         raise ConfigError(f"config={dict(given)!r}: {error}; see relgym.config.ModelConfig") from None
 

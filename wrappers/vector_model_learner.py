@@ -242,7 +242,7 @@ def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> AutoresetMode:
 
 def _schema(env: gym.vector.VectorEnv[Any, Any, Any]) -> Any:
     """The envs' schema, if they have one."""
-    inner = env.unwrapped
+    inner: Any = env.unwrapped
     if hasattr(inner, "schema"):
         return inner.schema
     # Asked first: an attribute that isn't there would end the processes of an AsyncVectorEnv.

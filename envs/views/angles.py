@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.scene.objects import Float1D
 
-__all__ = ["candidates", "circular", "continued", "decoded", "disjoint", "tolerance"]
+__all__ = ["candidates", "circular", "decoded", "disjoint", "tolerance"]
 
 
 def tolerance(single: bool) -> float:
@@ -61,17 +61,7 @@ def disjoint(pairs: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
     return tuple(chosen)
 
 
-def decoded(cos: float, sin: float, *, last: float | None, single: bool) -> float:
-    """The angle, in radians; the one nearest to the last one, so that an episode's angles make no leap.
-
-    An angle of float32 numbers is rounded to float32: so it shows how precise it is.
-    """
+def decoded(cos: float, sin: float, *, single: bool) -> float:
+    """The angle, in radians, within [-π, π]; of float32 numbers rounded to float32, so that it shows its precision."""
     angle = math.atan2(sin, cos)
-    if last is not None:
-        angle = continued(angle, last)
     return float(np.float32(angle)) if single else angle
-
-
-def continued(angle: float, last: float) -> float:
-    """The angle plus the multiple of 2π that brings it nearest to the last one."""
-    return angle + 2.0 * math.pi * round((last - angle) / (2.0 * math.pi))

@@ -108,7 +108,8 @@ def arranged(
         first = len(names) + len(angles) + len(constants)
         sources += [*own.values(), *range(first, first + len(fixed))]
         constants += [float(value) for value in fixed.values()]
-        kinds.append(_kind(part, (*own, *fixed)))
+        turning = tuple(prop for prop, source in own.items() if source >= len(names))
+        kinds.append(_kind(part, (*own, *fixed), turning))
     owners = [part.name for part in everything]
     identifiers("names of the objects", owners, len(owners))
     if ACTION in owners:
@@ -154,8 +155,14 @@ def _shown(
     return found
 
 
-def _kind(part: Part | Static, properties: tuple[str, ...]) -> ObjectType:
-    pose, velocity = (part.pose, part.velocity) if isinstance(part, Part) else ({}, ())
+def _kind(part: Part | Static, properties: tuple[str, ...], decoded: tuple[str, ...]) -> ObjectType:
+    if isinstance(part, Static):
+        return ObjectType(part.type or part.name, properties, part.shape)
     return ObjectType(
-        part.type or part.name, properties, part.shape, pose=dict(pose), velocity=tuple(velocity)
+        part.type or part.name,
+        properties,
+        part.shape,
+        pose=dict(part.pose),
+        velocity=tuple(part.velocity),
+        angles=(*part.angles, *decoded),
     )

@@ -48,7 +48,7 @@ class View(Protocol):
         info
             What came with it.
         last
-            The scene one step ago; none at the beginning of an episode. Angles go on from it.
+            The scene one step ago; none at the beginning of an episode. Objects without names go on from it.
         expected
             Where things were expected to be, if anybody knows: rows without names are matched with it.
 

@@ -52,10 +52,6 @@ class NumbersView:
     ConfigError
         Spaces that can't be viewed so, or declarations that don't fit them.
 
-    Notes
-    -----
-    Angles go on from the last scene's without a leap: an angle may leave [-π, π] within an episode.
-
     Examples
     --------
     >>> box, push = spaces.Box(-9, 9, (2,), np.float64), spaces.Discrete(2)
@@ -141,8 +137,7 @@ class NumbersView:
         numbers, how = self._numbers.read(observation), self._how
         if not np.isfinite(numbers).all():
             self._complain(numbers)
-        before = None if last is None else self._sources(last)
-        angles = [self._decoded(k, numbers, before) for k in range(len(how.pairs))]
+        angles = [self._decoded(pair, numbers) for pair in how.pairs]
         return Scene(self.schema, how.layout, np.concatenate([numbers, angles, how.constants])[how.gather])
 
     def with_action(self, scene: Scene, action: Any) -> Scene:
@@ -172,8 +167,8 @@ class NumbersView:
         sources[how.gather] = vector
         return sources
 
-    def _decoded(self, k: int, numbers: Float1D, before: Float1D | None) -> float:
-        i, j = self._how.pairs[k]
+    def _decoded(self, pair: tuple[int, int], numbers: Float1D) -> float:
+        i, j = pair
         single = self._numbers.single[i]
         if abs(numbers[i] ** 2 + numbers[j] ** 2 - 1.0) > 10 * tolerance(single):
             raise ObservationError(
@@ -181,8 +176,7 @@ class NumbersView:
                 f"{numbers[i]:g} and {numbers[j]:g}; say which pairs are angles, "
                 "view=NumbersView(..., angles=()) if none is"
             )
-        last = None if before is None else float(before[self._numbers.width + k])
-        return decoded(float(numbers[i]), float(numbers[j]), last=last, single=single)
+        return decoded(float(numbers[i]), float(numbers[j]), single=single)
 
     def _complain(self, numbers: Float1D) -> None:
         k = int(np.flatnonzero(~np.isfinite(numbers))[0])

@@ -36,6 +36,8 @@ class Part:
         The velocity along the three axes (`ObjectType.velocity`).
     constants
         Properties that no number supplies, and their values: ``{"sx": 2.0}``.
+    angles
+        Properties that are angles in radians already (`ObjectType.angles`).
     """
 
     name: str
@@ -45,6 +47,7 @@ class Part:
     pose: Mapping[str, str] = field(default_factory=dict)
     velocity: tuple[str | None, ...] = ()
     constants: Mapping[str, float] = field(default_factory=dict)
+    angles: tuple[str, ...] = ()
 
     @property
     def sources(self) -> dict[str, str]:
@@ -63,6 +66,7 @@ class Part:
             "pose": dict(self.pose),
             "velocity": list(self.velocity),
             "constants": [[p, v] for p, v in self.constants.items()],
+            "angles": list(self.angles),
         }
 
     @classmethod
@@ -76,6 +80,7 @@ class Part:
             dict(data["pose"]),
             tuple(data["velocity"]),
             {str(p): float(v) for p, v in data["constants"]},
+            tuple(data["angles"]),
         )
 
 
@@ -91,7 +96,7 @@ class Rows:
         Number of rows, >= 1.
     type
         The type's name; default: `name`.
-    shape, pose, velocity, constants
+    shape, pose, velocity, constants, angles
         As of `Part`; `pose` and `velocity` name columns.
     """
 
@@ -102,6 +107,7 @@ class Rows:
     pose: Mapping[str, str] = field(default_factory=dict)
     velocity: tuple[str | None, ...] = ()
     constants: Mapping[str, float] = field(default_factory=dict)
+    angles: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.count < 1:
@@ -117,6 +123,7 @@ class Rows:
             "pose": dict(self.pose),
             "velocity": list(self.velocity),
             "constants": [[p, v] for p, v in self.constants.items()],
+            "angles": list(self.angles),
         }
 
     @classmethod
@@ -130,6 +137,7 @@ class Rows:
             dict(data["pose"]),
             tuple(data["velocity"]),
             {str(p): float(v) for p, v in data["constants"]},
+            tuple(data["angles"]),
         )
 
 

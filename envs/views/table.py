@@ -120,6 +120,7 @@ class TableView:
             part.shape,
             pose=dict(part.pose),
             velocity=tuple(part.velocity),
+            angles=tuple(part.angles),
             optional=self._presence is not None or self._match is not None,
         )
 

@@ -36,6 +36,11 @@ class Features(Protocol):
         """How many columns at the beginning are the target object's own."""
         ...
 
+    @property
+    def objects(self) -> int:
+        """How many other objects follow, with equally many columns each."""
+        ...
+
     def rows(self, layout: SceneLayout, vectors: Float2D) -> Float2D:
         """Features of scenes of shape ``(n, layout.width)``, shape ``(n, len(names))``."""
         ...
@@ -63,6 +68,11 @@ class ThesisFeatures:
     def own(self) -> int:
         """Properties of the target."""
         return len(self.schema.type_of(self.target).properties)
+
+    @property
+    def objects(self) -> int:
+        """All others."""
+        return len(self._others)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -141,6 +151,11 @@ class ContactFeatures:
     def own(self) -> int:
         """Own properties that are no pose."""
         return len(self._free)
+
+    @property
+    def objects(self) -> int:
+        """The nearest ones."""
+        return self.contacts
 
     @cached_property
     def names(self) -> tuple[str, ...]:

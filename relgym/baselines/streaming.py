@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,9 @@ class StreamingRegressor:
         self._scaler.learn_one(row)
         scaled = self._scaler.transform_one(row)
         for part, value in zip(self._parts, y.tolist(), strict=True):
-            part.learn_one(scaled, value)
+            # AMRules divides by zero where a split leaves one side empty; the rule then simply isn't split.
+            with suppress(ZeroDivisionError):
+                part.learn_one(scaled, value)
 
     def predict_one(self, x: Float1D) -> Float1D:
         """Values of one row, shape ``(m,)``; zeros before the first example."""

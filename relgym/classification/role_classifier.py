@@ -191,11 +191,11 @@ class RoleClassifier:
                 if each != target:
                     (positives if each in players else negatives).append((row, target, each))
         for_, against = (np.array(some, dtype=np.int64).reshape(-1, 3) for some in (positives, negatives))
-        row, target, player = for_.T
+        where, targets, who = for_.T
         parts = (
-            view.table[row, :, player, target],
-            view.table[row, :, target, player],
-            view.unary[row, :, player],
+            view.table[where, :, who, targets],
+            view.table[where, :, targets, who],
+            view.unary[where, :, who],
         )
         description.witness(np.concatenate(parts, axis=1))
         if not negatives:

@@ -125,6 +125,7 @@ def run(
     testing: Examination | None = None,
     to_the_end: bool = False,
     heard: Callable[[int, int], None] | None = None,
+    met: Callable[[Any, Any], None] | None = None,
     agent: dict[str, Any] | None = None,
     dyna: dict[str, Any] | None = None,
 ) -> Run:
@@ -144,6 +145,8 @@ def run(
         Go on after success.
     heard
         Is told (real steps, successes) at every evaluation.
+    met
+        Is shown the trained agent and its model (none: it has none) at the end.
     agent, dyna
         Parameters of the agent and of Dyna that differ from the course's.
     """
@@ -169,6 +172,8 @@ def run(
     started = perf_counter()
     algorithm.learn(steps, callback=CallbackList([*([own] if own is not None else []), Check()]))
     seconds = perf_counter() - started
+    if met is not None:
+        met(algorithm, getattr(own, "world", None))
     learning, dreaming, laws = _costs(own)
     return Run(course.name, arm.name, seed, tuple(curve), solved_at(curve), seconds, learning, dreaming, laws)
 
@@ -206,7 +211,11 @@ def load(path: Path) -> Run:
 def _job(folder: str, course: str, arm: str, seed: int, steps: int) -> str:
     """One run in a process of its own, written atomically."""
     path = kept(Path(folder), COURSES[course], ARMS[arm], seed, steps)
-    found = run(COURSES[course], ARMS[arm], seed=seed, steps=steps)
+
+    def heard(at: int, good: int) -> None:
+        print(f"{course}, {arm}, seed {seed}: {good} of {EPISODES} after {at:,}", file=sys.stderr, flush=True)
+
+    found = run(COURSES[course], ARMS[arm], seed=seed, steps=steps, heard=heard)
     partial = path.with_suffix(f".{os.getpid()}.partial")
     partial.write_text(json.dumps(asdict(found), indent=1), encoding="utf-8")
     partial.replace(path)

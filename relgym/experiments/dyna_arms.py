@@ -48,6 +48,8 @@ class Course:
         For files, and for people.
     env_id, arguments
         What `gymnasium.make` is asked for.
+    mover
+        Name of the object whose path is drawn.
     repeat
         Env steps that a decision lasts.
     horizon
@@ -59,6 +61,7 @@ class Course:
     name: str
     title: str
     env_id: str
+    mover: str
     arguments: Mapping[str, Any] = field(default_factory=dict)
     repeat: int = 1
     horizon: int = 20
@@ -104,8 +107,8 @@ _BALL_DREAMS: Final[Mapping[str, Any]] = {
 COURSES: Final = {
     course.name: course
     for course in (
-        Course("truck", "TruckPush, task push", "relgym/TruckPush-v0", {"task": "push"}),
-        Course("ball", "BallGoal", "relgym/BallGoal-v0", {}, repeat=5, horizon=100, dreams=_BALL_DREAMS),
+        Course("truck", "TruckPush, task push", "relgym/TruckPush-v0", "truck", {"task": "push"}),
+        Course("ball", "BallGoal", "relgym/BallGoal-v0", "ball", repeat=5, horizon=100, dreams=_BALL_DREAMS),
     )
 }
 

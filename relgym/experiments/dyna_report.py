@@ -109,10 +109,11 @@ def draw_runs(path: Path, runs: Sequence[Run], title: str, *, seed: int = 0) -> 
         matplotlib isn't installed.
     """
     require_matplotlib()
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure  # no pyplot: it would choose a window system
 
     rng = np.random.default_rng(seed)
-    figure, axes = plt.subplots(figsize=(7.5, 4.2), layout="constrained")
+    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
+    axes = figure.subplots()
     for arm, own in _by_arm(runs):
         steps, values = curves(own)
         mean, low, high = interval(values, rng=rng)
@@ -123,7 +124,6 @@ def draw_runs(path: Path, runs: Sequence[Run], title: str, *, seed: int = 0) -> 
     axes.set(title=title, xlabel="real steps", ylabel="successes of 100", ylim=(-2, 102))
     axes.legend(loc="best", fontsize="small")
     figure.savefig(path, dpi=120)
-    plt.close(figure)
     return path
 
 

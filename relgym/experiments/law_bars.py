@@ -21,6 +21,7 @@ from relgym.config import ModelConfig
 from relgym.experiments.bar import measured, report
 from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_blocks, truck_blocks
 from relgym.experiments.law_classic import CLASSICS, Classic, classic_transitions
+from relgym.experiments.law_scaling import scaling
 from relgym.experiments.law_score import SEEDS, TESTS, Part, Rows, score, taught
 from relgym.experiments.law_trials import inexpressible, noise, other_worlds
 from relgym.experiments.rollouts import largest_errors
@@ -93,7 +94,7 @@ def _rooms(seeds: Sequence[int]) -> Rows:
                 )
                 values.append(score(model, found).bad)
             measures.append(measured(f"laws of {experiment}, {objects} objects: of {400 * count}", 0, values))
-    return "rooms never seen", measures, []
+    return "rooms never seen", [*measures, *scaling()], []
 
 
 def _parts_of_the_world(seeds: Sequence[int]) -> Rows:

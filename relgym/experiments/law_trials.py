@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,8 +11,9 @@ import numpy as np
 from relgym.experiments.bar import Measure, measured
 from relgym.experiments.blocks import Block
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.law_motion import episode
 from relgym.experiments.law_score import TESTS, Rows, score, score_laws, taught
-from relgym.experiments.law_worlds import Ball, Material, World, episode
+from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.experiments.rooms import Room
 from relgym.laws.book import LawBook
 from relgym.model.report import report as report_of

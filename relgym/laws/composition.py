@@ -128,26 +128,33 @@ def compose(engaged: Engaged, group: Group, joints: Joints, now: FloatArray, fre
     one before: such a sequence is continued in a leap now and then (Aitken's extrapolation).
     """
     settling = _Settling(engaged, group, joints, now, free)
-    active = np.arange(len(group.pairs))
     if group.pairs.shape[1] == 1:
-        settling.sweep(active)
-        return settling.result(active[:0])
+        settling.sweep()
+        return settling.result(settled=True)
     still = np.maximum(SETTLED, ROUNDINGS * np.abs(free).max(axis=(0, 2)))
     before = np.empty(0)
     for sweep in range(1, SWEEPS + 1):
-        step = settling.sweep(active)
-        going = np.abs(step).max(axis=(0, 2)) > still[active]
-        active, step = active[going], step[:, going]
-        if not len(active):
+        step = settling.sweep()
+        going = np.abs(step).max(axis=(0, 2)) > still[settling.active]
+        settling.keep(going)
+        if not len(settling.active):
             break
         if sweep % LEAP == 0:
-            settling.leap(active, before[:, going], step)
-        before = step
-    return settling.result(active)
+            settling.leap(before[:, going], step[:, going])
+        before = step[:, going]
+    return settling.result(settled=False)
 
 
 class _Settling:
-    """Impulses on their way to where they agree with each other, in scenes with equally many contacts."""
+    """Impulses on their way to where they agree with each other, in scenes with equally many contacts.
+
+    Attributes
+    ----------
+    velocity, impulse
+        Of all scenes, as they are at present.
+    active
+        Scenes whose impulses still change.
+    """
 
     def __init__(
         self, engaged: Engaged, group: Group, joints: Joints, now: FloatArray, free: FloatArray
@@ -155,13 +162,23 @@ class _Settling:
         self.engaged, self.group, self.joints, self.now = engaged, group, joints, now
         self.velocity = free.copy()
         self.impulse = np.zeros(group.bearings.normal.shape)
+        self._focus(np.arange(len(group.pairs)))
 
-    def sweep(self, active: NDArray[np.intp]) -> FloatArray:
+    def _focus(self, active: NDArray[np.intp]) -> None:
+        self.active = active
+        count = self.group.pairs.shape[1]
+        self._parts = [_joint(self.engaged, self.group, self.joints, active, k) for k in range(count)]
+
+    def keep(self, going: NDArray[np.bool_]) -> None:
+        """Go on with some of the active scenes."""
+        if not going.all():
+            self._focus(self.active[going])
+
+    def sweep(self) -> FloatArray:
         """Let every contact respond to all others, one after the other; how impulses changed, ``(d, n, c)``."""
-        law = self.engaged.law
+        law, active = self.engaged.law, self.active
         steps = np.empty((len(self.impulse), len(active), self.group.pairs.shape[1]))
-        for k in range(steps.shape[2]):
-            joint, there = _joint(self.engaged, self.group, self.joints, active, k)
+        for k, (joint, there) in enumerate(self._parts):
             own = self.impulse[:, active, k]
             others = joint.relative(self.velocity) - own
             chosen = self.engaged.chosen[:, self.group.pairs[active, k]]
@@ -171,23 +188,23 @@ class _Settling:
             self.impulse[:, active, k] = new
         return steps
 
-    def result(self, unsettled: NDArray[np.intp]) -> Composed:
-        """What has become of it; `unsettled` are the scenes that still changed in the last sweep."""
-        settled = ~np.isin(np.arange(len(self.group.pairs)), unsettled)
-        return Composed(self.velocity, self.impulse, settled)
+    def result(self, *, settled: bool) -> Composed:
+        """What has become of it; whether scenes that were active to the last count as settled."""
+        done = np.ones(self.group.pairs.shape[:1], dtype=np.bool_)
+        done[self.active] = settled
+        return Composed(self.velocity, self.impulse, done)
 
-    def leap(self, active: NDArray[np.intp], before: FloatArray, step: FloatArray) -> None:
+    def leap(self, before: FloatArray, step: FloatArray) -> None:
         """Go on as two sweeps have gone, to where a sequence of steps with that ratio ends."""
-        kept = along = np.zeros(len(active))
+        kept = along = np.zeros(len(self.active))
         for k in range(step.shape[2]):
             kept = kept + dot(before[..., k], before[..., k])
             along = along + dot(before[..., k], step[..., k])
         ratio = np.clip(along / np.where(kept > 0.0, kept, 1.0), 0.0, 1.0 - 1.0 / FARTHEST)
         steps = np.where(ratio > 0.5, ratio / (1.0 - ratio), 0.0)
-        for k in range(step.shape[2]):
-            joint, _ = _joint(self.engaged, self.group, self.joints, active, k)
+        for k, (joint, _) in enumerate(self._parts):
             joint.apply(steps * step[..., k], self.velocity)
-            self.impulse[:, active, k] += steps * step[..., k]
+            self.impulse[:, self.active, k] += steps * step[..., k]
 
 
 def _joint(

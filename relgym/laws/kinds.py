@@ -12,7 +12,7 @@ from relgym.laws.pieces import AxisExamples
 from relgym.laws.records import AxisLaw, Kind, Operator, Piece
 from relgym.laws.selection import AxisFit, fit_axis, refitted
 
-__all__ = ["KindsFit", "fit_together", "fit_apart"]
+__all__ = ["KindsFit", "fit_apart", "fit_together"]
 
 JOINS = 0.98
 """A kind of contact obeys a law of other kinds if that explains at least this share of its examples."""

@@ -22,14 +22,15 @@ POWERS = (1, 2, 3)
 
 
 def share_values(share: Share, a: Mapping[str, FloatArray], b: Mapping[str, FloatArray]) -> FloatArray:
-    """The first body's share, from the two bodies' properties."""
+    """The first body's share, from the two bodies' properties; NaN where those say nothing."""
     if not share.property:
         some = next(iter(a.values()))
         return np.full(some.shape, share.constant)
     mine, theirs = np.ones(1), np.ones(1)
     for _ in range(share.power):
         mine, theirs = mine * a[share.property], theirs * b[share.property]
-    return np.asarray(theirs / (mine + theirs))
+    both = mine + theirs
+    return np.where(both == 0.0, np.nan, theirs / np.where(both == 0.0, 1.0, both))
 
 
 def find_share(
@@ -77,8 +78,8 @@ def _trivial(
     """Whether a property says nothing here, since its ratio never varied."""
     if not share.property:
         return False
-    ratio = b[share.property][told] / a[share.property][told]
-    return bool(np.ptp(ratio) <= 1e-9 * np.abs(ratio).max())
+    values = share_values(share, a, b)[told]
+    return bool(np.ptp(values) <= 1e-9 * np.abs(values).max())
 
 
 def _candidates(names: list[str], median: float, *, alike: bool) -> list[Share]:

@@ -237,12 +237,19 @@ class PropertyModel(ModeFunctions):
     def example(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Example:
         """What the classifiers are shown of a single scene; arguments as of `predict_one`."""
         situation = percept.situation(index)
+        x = percept.rows(
+            index, following[None], ordered=False
+        )  # conditions are of objects alone of their type
+        return replace(self._shown(situation, x), key=situation.keys[0])
+
+    def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
+        """`example` without the key, by which examples are kept and not classified."""
         first = situation.examples[0]
-        own = first.own
-        if self.conditions.pairs:
-            x = percept.rows(index, following[None])
-            own = np.concatenate([own, self.conditions.values(situation.signature, x)[0]])
-        return replace(first, key=situation.keys[0], own=own)
+        if not self.conditions.pairs:
+            return first
+        return replace(
+            first, own=np.concatenate([first.own, self.conditions.values(situation.signature, x)[0]])
+        )
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
@@ -261,21 +268,22 @@ class PropertyModel(ModeFunctions):
         nothing = Prediction("", "", float("nan"), outcome)
         if self._unexplained or not self.classifier.modes:
             return nothing
-        x = percept.rows(index, following[None])[0].tolist()
-        example = self.example(percept, index, following)
+        casts = self._casts(situation.signature)
+        row = percept.rows(index, following[None], ordered=casts)
+        x, example = row[0].tolist(), self._shown(situation, row)
         ranking = self.classifier.rank(
             example, self._values_one(situation.signature, x, self.classifier.modes)
         )
         if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
             return replace(nothing, outcome=Outcome.OUTSIDE)
-        layout = percept.layout
+        layout, order = percept.layout, situation.order[0] if casts else situation.plain
         for place, mode in enumerate(ranking.modes):
             binding = self._binding(situation.signature, mode)
             if binding is None:
                 continue
             slots: tuple[int, ...] | None = ()
             if binding.open:
-                slots = self._cast(mode, binding, example, situation.order[0], layout)
+                slots = self._cast(mode, binding, example, order, layout)
             if slots is None:
                 if not self.config.abstain:
                     continue
@@ -283,7 +291,7 @@ class PropertyModel(ModeFunctions):
                 return replace(nothing, outcome=Outcome.OUTSIDE)
             rest = iter(slots)
             played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
-            roles = tuple(layout.names[situation.order[0, s]] for s in played)
+            roles = tuple(layout.names[order[s]] for s in played)
             margin = ranking.margin if place == 0 else 0.0
             found = Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
             found = self.limits.cut_off(found)

@@ -23,6 +23,9 @@ __all__ = ["Slots", "canonical_order", "close_set", "signature", "slots"]
 _SAME_DISTANCE = 1e-9
 """Distances within this, in units of length, count as equal: rounding must not decide an order."""
 
+_FEW = 512
+"""Codes of fewer bodies than this are summed at once."""
+
 Slots: TypeAlias = tuple[tuple[str, NDArray[np.intp]], ...]
 """Type names, alphabetical, each with the numbers of its bodies."""
 
@@ -148,6 +151,11 @@ def signature(relations: Relations, body: int, order: _Order | None = None) -> l
 def _codes(there: NDArray[np.bool_], back: NDArray[np.bool_]) -> NDArray[np.uint64]:
     """Which relations (second axis) hold either way round, as bits; the first relation's are the highest."""
     codes = np.zeros((len(there), *there.shape[2:]), dtype=np.uint64)
+    if codes.size < _FEW:  # one sum costs less than many steps
+        weights = np.uint64(1) << np.arange(2 * there.shape[1], dtype=np.uint64)[::-1]
+        shape = (there.shape[1], *(1 for _ in there.shape[2:]))
+        both = there * weights[0::2].reshape(shape) + back * weights[1::2].reshape(shape)
+        return np.asarray(both.sum(axis=1, dtype=np.uint64))
     one = np.uint64(1)
     for r in range(there.shape[1]):
         for bits in (there[:, r], back[:, r]):

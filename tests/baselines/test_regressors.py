@@ -10,6 +10,7 @@ from relgym.baselines.catalogue import (
     BUDGET,
     CLASSIFIERS,
     REGRESSORS,
+    Columns,
     installed,
     make_classifier,
     make_regressor,
@@ -24,7 +25,7 @@ from relgym.errors import ConfigError, ObservationError, QueryError
 RNG = np.random.default_rng(7)
 X = RNG.normal(size=(240, 4))
 LINEAR = np.column_stack([X[:, 0] - 2.0 * X[:, 1] + 0.5, X[:, 2]])
-KINKED = np.where(X[:, :1] > 0.0, 3.0 * X[:, 1:2], -X[:, 2:3])
+COLUMNS = Columns((0, 1), own=2, objects=2)
 
 
 def _taught(model: object, x: np.ndarray, y: np.ndarray) -> None:
@@ -35,9 +36,11 @@ def _taught(model: object, x: np.ndarray, y: np.ndarray) -> None:
 LIGHT = sorted(name for name, known in REGRESSORS.items() if known.library != "torch")
 
 
-@pytest.mark.parametrize("name", [*LIGHT, pytest.param("ensemble", marks=pytest.mark.sb3)])
+@pytest.mark.parametrize(
+    "name", [*LIGHT, *(pytest.param(n, marks=pytest.mark.sb3) for n in ("ensemble", "interactions"))]
+)
 def test_one_by_one_and_in_a_batch(name: str) -> None:
-    model = make_regressor(name, velocity=(0, 1), rng=np.random.default_rng(0))
+    model = make_regressor(name, columns=COLUMNS, rng=np.random.default_rng(0))
     kept = X.copy()
     _taught(model, X[:200], LINEAR[:200])
     batch = model.predict_batch(X[200:])
@@ -52,7 +55,7 @@ def test_one_by_one_and_in_a_batch(name: str) -> None:
     "name", sorted(set(LIGHT) - {"persistence", "constant-velocity", "amrules", "hoeffding"})
 )
 def test_better_than_the_mean(name: str) -> None:
-    model = make_regressor(name, velocity=(0, 1), rng=np.random.default_rng(0))
+    model = make_regressor(name, columns=COLUMNS, rng=np.random.default_rng(0))
     _taught(model, X[:200], LINEAR[:200])
     off = np.abs(model.predict_batch(X[200:]) - LINEAR[200:]).mean()
     assert off < 0.8 * np.abs(LINEAR[:200].mean(axis=0) - LINEAR[200:]).mean()
@@ -62,7 +65,7 @@ def test_better_than_the_mean(name: str) -> None:
 def test_same_seed_same_predictions(name: str) -> None:
     answers = []
     for _ in range(2):
-        model = make_regressor(name, velocity=(0, 1), rng=np.random.default_rng(3))
+        model = make_regressor(name, columns=COLUMNS, rng=np.random.default_rng(3))
         _taught(model, X[:100], LINEAR[:100])
         answers.append(model.predict_batch(X[100:]))
     np.testing.assert_array_equal(*answers)
@@ -152,13 +155,34 @@ def test_the_budget_is_the_same_for_all() -> None:
 
 
 def test_what_was_tuned_exists() -> None:
-    every = {**REGRESSORS, **CLASSIFIERS}
-    for (name, seen), number in TUNED.items():
-        assert seen in ("thesis", "contact") and 0 <= number < len(every[name].settings)
-    assert setting_of("lwr-50", "thesis-uncentred") == setting_of("lwr-50", "thesis")
+    known = {"regress": REGRESSORS, "classify": CLASSIFIERS}
+    for (task, name, seen), number in TUNED.items():
+        assert seen in ("thesis", "contact") and 0 <= number < len(known[task][name].settings)
+    wanted = {
+        (t, n, s) for t in known for n, b in known[t].items() for s in ("thesis", "contact") if b.settings[1:]
+    }
+    assert TUNED.keys() == wanted
+    assert setting_of("regress", "lwr-50", "thesis-uncentred") == setting_of("regress", "lwr-50", "thesis")
 
 
-@pytest.mark.parametrize("make", [make_classifier, lambda n, rng: make_regressor(n, velocity=(0,), rng=rng)])
+@pytest.mark.parametrize(
+    "make", [make_classifier, lambda n, rng: make_regressor(n, columns=COLUMNS, rng=rng)]
+)
 def test_unknown_baseline(make: object) -> None:
     with pytest.raises(ConfigError, match="baseline 'oracle': expected one of"):
         make("oracle", rng=np.random.default_rng(0))  # type: ignore[operator]
+
+
+@pytest.mark.sb3
+def test_an_interaction_network_does_not_care_who_comes_first() -> None:
+    from relgym.baselines.interaction import InteractionNetwork
+
+    model = InteractionNetwork(2, 2, train_steps=20)
+    _taught(model, X[:200], LINEAR[:200])
+    np.testing.assert_allclose(
+        model.predict_batch(X[200:]), model.predict_batch(X[200:][:, [0, 1, 3, 2]]), rtol=1e-4, atol=1e-5
+    )
+    with pytest.raises(ConfigError, match="2 columns can't be shared out among 3 objects"):
+        InteractionNetwork(2, 3).learn_one(X[0], LINEAR[0])
+    with pytest.raises(ConfigError, match="objects=0: expected at least 1"):
+        InteractionNetwork(2, 0)

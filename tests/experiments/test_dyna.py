@@ -123,5 +123,5 @@ def test_dreaming_pays_in_truck_push() -> None:
     dreaming = run(course, ARMS["relgym-given"], seed=100, steps=3_000, testing=tests)
     assert dreaming.solved_at is not None
     alone = run(course, ARMS["sac"], seed=100, steps=dreaming.solved_at, testing=tests)
-    assert max(good for _, good in alone.curve) < 20
+    assert max(good for _, good in alone.curve) < 50
     assert "a limit to what the others predict" in dreaming.laws

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from relgym.laws import composition
 from relgym.laws.composition import Engaged, compose
 from relgym.laws.frames import Bearings
 from relgym.laws.joints import Joints
@@ -120,3 +121,28 @@ def test_company_changes_no_bit(rng: np.random.Generator) -> None:
     whole = run(slice(None))
     for k in range(m):
         assert run(slice(k, k + 1)).tobytes() == np.ascontiguousarray(whole[:, k : k + 1]).tobytes()
+
+
+def test_leaps_lead_where_sweeps_would(monkeypatch: pytest.MonkeyPatch) -> None:
+    # A ball jammed between two rough surfaces: each sweep stops it at one and sets it moving at the other.
+    angles, v = [math.radians(167.0), math.radians(65.0)], [4.3e-6, -1.65e-5]
+    found = step(ROUGH, v, angles)
+    monkeypatch.setattr(composition, "LEAP", 10**9)
+    assert np.abs(np.array(step(ROUGH, v, angles)) - found).max() > 1e-9  # not there yet
+    monkeypatch.setattr(composition, "SWEEPS", 20_000)
+    assert step(ROUGH, v, angles) == pytest.approx(found, abs=1e-12)
+
+
+def test_what_does_not_settle_is_told() -> None:
+    # Surfaces that turn every velocity round: at 60 degrees to each other they undo each other's work for ever.
+    mirror = AxisLaw((Piece((("u_n", -1.0),)),), "max", (KIND,))
+    mirrors = PairLaw("contact", ((mirror,), SMOOTH.axes[1]), 0.0)
+    now = np.zeros((2, 2, 3))
+    now[:, :, 0] = [[-0.3], [-0.5]]
+    angles = np.array([[UP, UP - math.pi / 3], [UP, UP - math.pi / 2]])
+    normals = np.stack([np.cos(angles), np.sin(angles)])
+    bearings = Bearings(normals, normals, np.zeros((3, 2, 2)))
+    engaged = Engaged(mirrors, np.zeros((2, 2), dtype=np.intp), np.zeros(2, dtype=np.intp), np.array([1, 2]))
+    group = Group(np.arange(2), np.tile([0, 1], (2, 1)), bearings)
+    found = compose(engaged, group, joints(np.ones((2, 2))), now, now)
+    assert found.settled.tolist() == [False, True]  # at right angles they leave each other alone

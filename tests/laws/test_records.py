@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -59,11 +60,22 @@ def test_kinds_never_seen_obey_the_law_of_all_or_none() -> None:
     assert PairLaw("contact", ((floor, ice),), 0.0).law_of(0, ("ball", "wall")) is None
 
 
+def test_grips_of_kinds_never_seen_are_those_of_all_or_none() -> None:
+    floor, ice, wall = (("ball", name) for name in ("floor", "ice", "wall"))
+    assert math.isnan(PairLaw("point", (), 0.0).grip(floor))
+    alike = PairLaw("point", (), 0.0, ((floor, 1 / 3), (ice, 1 / 3 + 1e-9)))
+    assert alike.grip(wall) == 1 / 3
+    different = PairLaw("point", (), 0.0, ((floor, 0.5), (ice, 1 / 3)))
+    assert [different.grip(kind) for kind in (floor, ice)] == [0.5, 1 / 3]
+    assert math.isnan(different.grip(wall))
+
+
 def test_laws_survive_json() -> None:
     law = AxisLaw(
         (FREE, BOUNCE), "max", (("ball", "box"),), (("min", (FRICTION, ZERO)),), (False, True), 7, 1, 50.5
     )
-    pair = PairLaw("contact", ((law,), (law, law)), 3.0)
+    pair = PairLaw("contact", ((law,), (law, law)), 3.0, ((("ball", "box"), 0.25),))
+    assert (pair.examples, pair.unexplained) == (7, 3)
     assert PairLaw.from_json(json.loads(json.dumps(pair.to_json()))) == pair
     free = FreeLaw("ball", (FREE, ZERO), 3, 1, 2.0)
     assert FreeLaw.from_json(json.loads(json.dumps(free.to_json()))) == free

@@ -13,12 +13,15 @@ from relgym.envs.learned_model import LearnedModelEnv
 from relgym.errors import ConfigError
 from relgym.experiments.blocks import Block
 from relgym.experiments.data import ball_blocks, truck_blocks
+from relgym.experiments.law_score import taught
+from relgym.experiments.law_trials import trial_rooms
+from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.experiments.rollouts import largest_errors
 from relgym.model.motion import FREE, TOUCHING
 from relgym.model.prediction import Outcome
 from relgym.model.report import report
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Target
+from relgym.scene.objects import Scene, Target
 
 VX, VY = Target("ball", "vx"), Target("ball", "vy")
 
@@ -170,6 +173,25 @@ def test_explanations(model: WorldModel, unseen: list[Block]) -> None:
     text = model.explain(block.scene(touching))
     assert "ball touches" in text
     assert "v'_n = max(u_n, -0.95 v_n)" in text
+
+
+def test_a_spinning_ball_is_foretold_told_and_kept(tmp_path: Path) -> None:
+    world = World(2, (Ball(spins=True),), materials={"block": Material(0.9, 0.2)})
+    model = taught(trial_rooms(world, 5, seed=1))
+    room = trial_rooms(world, 1, seed=2)[0]
+    batch = model.predict_batch(room.layout, room.vectors[:-1])
+    assert np.abs(batch.vectors - room.vectors[1:]).max() < 1e-12  # the angle included
+    touching = int(np.flatnonzero((batch.modes == TOUCHING).all(axis=1))[0])
+    scene = Scene(room.schema, room.layout, room.vectors[touching])
+    parts = model.predict_one(scene).parts
+    assert {p.property: p.frame for p in parts} == {"vx": "point", "vy": "point", "spin": "point"}
+    assert "v'_t = max(0, u_t - 0.6 J_n)" in model.explain(scene)
+    assert "velocities take 0.3333333 of the change along t, spins the rest" in model.describe()
+    with pytest.raises(ConfigError, match="contact normals"):
+        model.describe(frame="world", incline=30.0)
+    model.save(tmp_path / "spin")
+    again = WorldModel.load(tmp_path / "spin").predict_batch(room.layout, room.vectors[:-1])
+    assert again.vectors.tobytes() == batch.vectors.tobytes()
 
 
 def test_a_dream_by_laws_is_the_real_thing(model: WorldModel) -> None:

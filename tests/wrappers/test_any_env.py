@@ -17,7 +17,7 @@ from plain_envs import Slider, Wheel
 from relgym.envs.views import FunctionView, NumbersView, Part, TaskView
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, SceneSchema, Target
+from relgym.scene.objects import ObjectType, SceneSchema
 from relgym.wrappers import ModelLearner
 from relgym.wrappers.views import chosen_view
 
@@ -76,7 +76,7 @@ def test_reward_and_termination_are_learned_on_demand() -> None:
                 ended += 1
                 break
     assert ended
-    assert {Target("task", "reward"), Target("task", "terminated")} <= set(env.model.targets)
+    assert {"task.reward", "task.terminated"} <= {str(target) for target in env.model.targets}
     assert env.scene.layout.names == ("self",)  # what a step brought belongs to the transition
     (still,) = [m for m in env.model.modes("task", "terminated") if m.formula() == "terminated' = 0"]
     assert still.examples > 0

@@ -7,12 +7,14 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
 
 import relgym  # noqa: F401  (registers the ids)
 from relgym.envs.flat import FlatSpec
 from relgym.envs.learned_model import LearnedModelEnv
+from relgym.envs.learned_model_vector import LearnedModelVectorEnv
 from relgym.errors import ConfigError
-from relgym.wrappers.flat import FlatView
+from relgym.wrappers.flat import FlatView, VectorFlatView
 from relgym.wrappers.model_learner import ModelLearner
 
 
@@ -68,3 +70,42 @@ def test_vectors_of_envs() -> None:
 def test_envs_without_scenes_are_refused() -> None:
     with pytest.raises(ConfigError, match="schema"):
         FlatView(gym.make("CartPole-v1"))
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_vector_envs_are_flattened_as_single_ones(mode: AutoresetMode) -> None:
+    options = {"autoreset_mode": mode}
+    inner = gym.make_vec("relgym/TruckPush-v0", 3, "sync", vector_kwargs=options, task="push")
+    envs, alone = VectorFlatView(inner), FlatView(pushing())
+    flat, _ = envs.reset(seed=5)
+    single, _ = alone.reset(seed=7)
+    actions = np.ones((3, 1), np.float32)
+    while True:
+        np.testing.assert_array_equal(flat[2], single)
+        assert envs.observation_space.contains(flat)
+        flat, _, terminated, _, infos = envs.step(actions)
+        single, _, over, *_ = alone.step(actions[2])
+        assert terminated[2] == over
+        if over or terminated.any():
+            break
+    if mode is AutoresetMode.SAME_STEP:
+        ended = int(np.argmax(terminated))
+        assert infos["final_obs"][ended].shape == flat[0].shape
+        assert not np.array_equal(infos["final_obs"][ended], flat[ended])
+    envs.close()
+
+
+def test_dreams_by_the_dozen() -> None:
+    env = pushing()
+    learner = ModelLearner(env, predict=False)
+    learner.reset(seed=0)
+    for _ in range(20):
+        *_, over, late, _ = learner.step(np.array([0.5]))
+        if over or late:
+            learner.reset()
+    dreams = VectorFlatView(LearnedModelVectorEnv(learner.model, num_envs=4, like=env))
+    flat, _ = dreams.reset(seed=0)
+    assert flat.shape == (4, 15)
+    assert dreams.flattener.names == FlatView(env).flattener.names
+    with pytest.raises(ConfigError, match="schema"):
+        VectorFlatView(gym.make_vec("CartPole-v1", 2, "sync"))

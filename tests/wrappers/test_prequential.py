@@ -60,3 +60,22 @@ def test_objects_that_vanished_are_not_compared() -> None:
     )
     assert compared(ScenePrediction(before, parts), after) == ({("other", "vx"): 0.0}, ())
     assert compared(None, after) == ({}, ())
+
+
+def test_angles_are_compared_around_the_circle() -> None:
+    wheel = ObjectType("wheel", ("turn",), angles=("turn",))
+    schema = SceneSchema((wheel,), (("wheel", "wheel"),))
+    said = Prediction("wheel", "turn", 3.1, Outcome.PREDICTED)
+    scene = schema.scene({"wheel": [3.1]})
+    residuals, wrong = compared(ScenePrediction(scene, (said,)), schema.scene({"wheel": [-3.1]}))
+    assert residuals["wheel", "turn"] == pytest.approx(2 * math.pi - 6.2, abs=1e-12)
+    assert wrong
+    again = compared(ScenePrediction(scene, (said,)), schema.scene({"wheel": [3.1 - 2 * math.pi]}))
+    assert again == ({("wheel", "turn"): pytest.approx(0.0, abs=1e-12)}, ())
+
+
+def test_errors_below_the_precision_are_not_wrong() -> None:
+    after = SCHEMA.scene({"ball": [100.0, 0.0]})
+    prediction = ScenePrediction(after, (Prediction("ball", "vx", 100.00001, Outcome.PREDICTED),))
+    assert compared(prediction, after)[1] == (A,)
+    assert compared(prediction, after, 1e-6)[1] == ()

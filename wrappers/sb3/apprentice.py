@@ -83,17 +83,18 @@ class Apprentice:
     def _judged(self, real: Experience) -> Verdict:
         before, after = real.start, real.transition.after
         foretold = self.model.predict_one(real.transition.before)
-        changes: dict[Key, float] = {}
+        changes: dict[Key, float] = {(TASK, "reward"): real.reward, (TASK, "terminated"): 1.0}
         residuals: dict[Key, float] = {}
         moving = changing(self.model)
         for o in before:
+            if o.name not in after:
+                continue
             for prop in o.type.properties:
-                if (o.type.name, prop) in moving and o.name in after:
-                    key, now = (o.type.name, prop), after[o.name][prop]
+                key, now = (o.type.name, prop), after[o.name][prop]
+                # What changes though no target covers it was foretold to stay.
+                if key in moving or (now != o[prop] and prop not in o.type.exogenous):
                     _widen(changes, key, now - o[prop])
                     _widen(residuals, key, now - foretold.scene[o.name][prop])
-        changes[TASK, "reward"] = real.reward
-        changes[TASK, "terminated"] = 1.0
         if foretold.ok:
             residuals |= self._task_residuals(real, foretold.scene)
         spoke = foretold.ok and all(map(math.isfinite, residuals.values()))

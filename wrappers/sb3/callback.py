@@ -53,14 +53,14 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
     -----
     Logged: ``relgym/transitions``, ``relgym/modes``, ``relgym/wrong`` (share of the latest steps with a wrong
     prediction), ``relgym/skipped`` and, with a background process, ``relgym/dropped``; `transitions`, `modes` and
-    `wrong` then only when training ends.
+    `wrong` are then those of the last `catch_up`.
 
     Examples
     --------
     >>> from stable_baselines3 import PPO  # doctest: +SKIP
     >>> watch = ModelCallback(background=4096)  # doctest: +SKIP
     >>> PPO("MlpPolicy", "CartPole-v1", n_steps=256).learn(10_000, callback=watch)  # doctest: +SKIP
-    >>> print(watch.world.describe())  # doctest: +SKIP
+    >>> print(watch.catch_up().describe())  # doctest: +SKIP
     """
 
     def __init__(
@@ -126,7 +126,6 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
         return True
 
     def _on_training_end(self) -> None:
-        self.observer.study.catch_up()
         self._log()
 
     def _take_up(
@@ -170,7 +169,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
 
     @property
     def world(self) -> WorldModel:
-        """What was learned; `model` is Stable-Baselines3's name of the algorithm."""
+        """What was learned, as of the last `catch_up`; `model` is Stable-Baselines3's name of the algorithm."""
         return self.observer.study.model
 
     @property
@@ -182,6 +181,10 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
     def dropped(self) -> int:
         """How many transitions found the queue to the background process full."""
         return self.observer.study.dropped
+
+    def catch_up(self) -> WorldModel:
+        """Wait until the background process has learned all it was sent; the model as it then is."""
+        return self.observer.study.catch_up()
 
     def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
         """Write model, spaces, view and some first scenes to one file, as `ModelLearner.save`."""

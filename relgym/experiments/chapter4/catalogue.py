@@ -14,6 +14,7 @@ from relgym.experiments.chapter4 import (
     figures_rollouts,
     figures_trees,
     plans,
+    tables_baselines,
     tables_clauses,
     tables_errors,
     tables_modes,
@@ -169,8 +170,8 @@ _ROWS: Final[Sequence[tuple[str, str, str, str, Callable[[Protocol], Plan], Any]
     ("rates", "All learners beside the thesis' rates", "§4.3.4, §4.4.4", "beyond", _rates,
      tables_errors.rates_shown),
     ("baselines", "All baselines at equal features", "§4.7", "beyond", _headline,
-     figures_comparison.headline_shown),
-    ("tuning", "Settings of the baselines", "§4.7", "beyond", plans.tunings, figures_comparison.tuning_shown),
+     tables_baselines.headline_shown),
+    ("tuning", "Settings of the baselines", "§4.7", "beyond", plans.tunings, tables_baselines.tuning_shown),
 )  # fmt: skip
 """Name, caption, section, group, tasks and rendering of every job, in the order of the thesis."""
 

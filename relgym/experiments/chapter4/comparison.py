@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.baselines.base import Classifier, Regressor
-from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, make_classifier, make_regressor
+from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, Columns, make_classifier, make_regressor
 from relgym.baselines.features import Features, columns, features
-from relgym.baselines.tuned import setting_of
 from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.lesson import fresh_blocks, taught_blocks
 from relgym.experiments.chapter4.scores import target_score
@@ -34,7 +33,7 @@ def regress(
     order: int,
     checkpoints: Sequence[int],
     tests: Mapping[str, Any],
-    setting: int | None = None,
+    setting: int = 0,
 ) -> dict[str, Any]:
     """Train a regressor on one batch; test after some numbers of blocks.
 
@@ -47,20 +46,20 @@ def regress(
     experiment, seed, order, checkpoints, tests
         As for our learner (`relgym.experiments.chapter4.lesson.lesson`).
     setting
-        Number of the setting; default: the tuned one.
+        Number of the setting (`relgym.baselines.tuned.setting_of` has the one that is reported).
 
     Returns
     -------
     Plain data: scores by checkpoint and target; seconds spent on learning and on all tests.
     """
     known = REGRESSORS[baseline]
-    number = setting_of(baseline, shown) if setting is None else setting
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
     fresh = fresh_blocks(experiment, tests)
     seen = features(shown, blocks[0].schema, "ball")
     velocity = columns(seen, _VELOCITY)
     rng = np.random.default_rng([seed, order])
-    model = make_regressor(baseline, known.settings[number], velocity=velocity, rng=rng)
+    meaning = Columns(velocity, seen.own, seen.objects)
+    model = make_regressor(baseline, known.settings[setting], columns=meaning, rng=rng)
     questions, answers = _examples(fresh, seen)
     scores, learning, asking = [], 0.0, 0.0
     for count, block in enumerate(blocks, start=1):
@@ -73,7 +72,12 @@ def regress(
             predicted += questions[:, list(velocity)] if known.change else 0.0
             asking += perf_counter() - start
             scores.append({"blocks": count, "targets": _scores(predicted, answers, fresh, experiment)})
-    return {"scores": scores, "setting": dict(known.settings[number]), "learning": learning, "asking": asking}
+    return {
+        "scores": scores,
+        "setting": dict(known.settings[setting]),
+        "learning": learning,
+        "asking": asking,
+    }
 
 
 def _teach(model: Regressor, x: NDArray[np.float64], y: NDArray[np.float64], present: Sequence[int]) -> None:
@@ -119,7 +123,7 @@ def classify(
     order: int,
     checkpoints: Sequence[int],
     tests: Mapping[str, Any],
-    setting: int | None = None,
+    setting: int = 0,
 ) -> dict[str, Any]:
     """Train a classifier on the true modes of one batch; test after some numbers of blocks (§4.7.2).
 
@@ -132,11 +136,10 @@ def classify(
     -------
     Plain data: examples and errors by checkpoint and target; seconds spent on learning and on all tests.
     """
-    number = setting_of(baseline, shown) if setting is None else setting
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
     fresh = fresh_blocks(experiment, tests)
     seen = features(shown, blocks[0].schema, "ball")
-    settings = CLASSIFIERS[baseline].settings[number]
+    settings = CLASSIFIERS[baseline].settings[setting]
     models = {
         t: make_classifier(baseline, settings, rng=np.random.default_rng([seed, order])) for t in TARGETS
     }

@@ -1,4 +1,4 @@
-"""Our learners beside the alternatives (figures 4.18-4.21), the headline at equal features, and the tuning."""
+"""Our learners beside the alternatives, and under noise (figures 4.18 to 4.21)."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from pathlib import Path
 from statistics import mean
 from typing import Any, Final
 
-from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS
-from relgym.baselines.tuned import setting_of
+from relgym.baselines.catalogue import CLASSIFIERS
 from relgym.experiments.chapter4.canvas import COLOURS, TITLES, above, canvas, error_axis, save
 from relgym.experiments.chapter4.figures_accuracy import scores_by_blocks
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import CLASSIFIER_ERRORS, LWR
-from relgym.experiments.chapter4.scores import pooled_scores, quantile
+from relgym.experiments.chapter4.scores import quantile
 from relgym.model.text import Cell, table
 
-__all__ = ["classifiers_shown", "headline_shown", "lwr_shown", "noise_shown", "tuning_shown"]
+__all__ = ["classifiers_shown", "lwr_shown", "noise_shown"]
 
 _STYLES: Final = ((0.95, "-"), (0.75, "--"), (0.5, ":"))
 
@@ -38,34 +37,27 @@ def lwr_shown(_: Protocol, values: Values, number: str) -> Shown:
         for blocks, score in scores.items()
     ]
 
-    def draw(path: Path) -> None:
-        figure, panels = canvas(8.0, 4.6)
-        panel = panels[0][0]
-        shades = iter(("#8e6eb0", "#cda443"))
-        for group, scores in found.items():
-            ours = group in COLOURS
-            colour = COLOURS[group] if ours else next(shades)
-            for q, style in _STYLES[:1] if ours else _STYLES:
-                line = [above(quantile(s["errors"], q)) for s in scores.values()]
-                label = f"{TITLES.get(group, group)}, {100 * q:g} %"
-                panel.plot(
-                    list(scores),
-                    line,
-                    style,
-                    marker="o",
-                    ms=3,
-                    lw=3 if ours else 1.2,
-                    color=colour,
-                    label=label,
-                )
-        last = list(next(iter(found.values())).values())[-1]
-        panel.axhline(last["change"] / last["examples"], color="black", lw=0.8, ls="--")
-        error_axis(panel)
-        panel.set_xlabel("training blocks")
-        panel.legend(fontsize=7, ncols=2)
-        save(figure, path)
+    text = f"{table(heading, lines)}\n\nprinted: {LWR[number]}"
+    return Shown(text, [heading, *lines], lambda path: _draw_lwr(path, found))
 
-    return Shown(f"{table(heading, lines)}\n\nprinted: {LWR[number]}", [heading, *lines], draw)
+
+def _draw_lwr(path: Path, found: Mapping[str, Mapping[int, Any]]) -> None:
+    figure, panels = canvas(8.0, 4.6)
+    panel, shades = panels[0][0], iter(("#8e6eb0", "#cda443"))
+    for group, scores in found.items():
+        ours = group in COLOURS
+        colour = COLOURS[group] if ours else next(shades)
+        for q, style in _STYLES[:1] if ours else _STYLES:
+            line = [above(quantile(s["errors"], q)) for s in scores.values()]
+            label = f"{TITLES.get(group, group)}, {100 * q:g} %"
+            width = 3.0 if ours else 1.2
+            panel.plot(list(scores), line, style, marker="o", ms=3, lw=width, color=colour, label=label)
+    last = list(next(iter(found.values())).values())[-1]
+    panel.axhline(last["change"] / last["examples"], color="black", lw=0.8, ls="--")
+    error_axis(panel)
+    panel.set_xlabel("training blocks")
+    panel.legend(fontsize=7, ncols=2)
+    save(figure, path)
 
 
 # ------------------------------------------------------------------ figure 4.21
@@ -164,99 +156,3 @@ def noise_shown(protocol: Protocol, values: Values) -> Shown:
 
     note = "y velocity, experiment 1. No error can be below the noise: the next state carries it, too."
     return Shown(f"{table(heading, lines)}\n\n{note}", [heading, *lines], draw)
-
-
-# ------------------------------------------------------------------ headline
-_OURS: Final[Mapping[str, str]] = {"thesis": "thesis", "contact": "default"}
-"""Which of our learners was shown what: chapter III's relations are the thesis' features, contact laws ours."""
-
-_MEASURES: Final = ("p50", "p95", "p99.9", "mean", "modes")
-
-
-def headline_shown(_: Protocol, values: Values) -> Shown:
-    """Every baseline against our learner that saw the same: who errs less, by training size and measure."""
-    heading = ["baseline", "features", "target", "blocks", *_MEASURES, "lost"]
-    lines: list[list[Cell]] = []
-    won = {seen: [0, 0] for seen in _OURS}
-    losses: list[str] = []
-    ours = {seen: values[name] for seen, name in _OURS.items()}
-    for target in ("ball.vx", "ball.vy"):
-        known = {seen: _measures(runs, target) for seen, runs in ours.items()}
-        for seen, name in _OURS.items():
-            lines += [[TITLES[name], seen, target, b, *_texts(m), ""] for b, m in known[seen].items()]
-        for group, runs in values.items():
-            if "/" not in group:
-                continue
-            baseline, seen = group.split("/")
-            for blocks, found in _measures(runs, target).items():
-                better = [
-                    m for m, f, o in zip(_MEASURES, found, known[seen][blocks], strict=True) if _beats(f, o)
-                ]
-                won[seen][0] += len(_MEASURES) - len(better)
-                won[seen][1] += len(_MEASURES)
-                title = REGRESSORS[baseline].title
-                lines.append([title, seen, target, blocks, *_texts(found), " ".join(better)])
-                losses += (
-                    [f"{title}, {seen}, {target}, {blocks} blocks: {', '.join(better)}"] if better else []
-                )
-    wins = "\n".join(
-        f"{TITLES[_OURS[seen]]} against all that saw the {seen} features: ahead or level in {a} of {b} cells "
-        f"({a / max(b, 1):.1%})"
-        for seen, (a, b) in won.items()
-    )
-    note = (
-        "Quantiles and mean of the absolute error over all test examples, corners included; modes: the median error "
-        "of each true mode,\naveraged, so that rare ones count. lost: measures in which the baseline errs less. Errors "
-        "below 1e-12 are level."
-    )
-    return Shown(f"{wins}\n\n{table(heading, lines)}\n\n{note}", [heading, *lines], None)
-
-
-def _measures(runs: Sequence[Any], target: str) -> dict[int, list[float]]:
-    found = {}
-    for k, each in enumerate(runs[0]["scores"]):
-        parts = [run["scores"][k]["targets"][target] for run in runs]
-        every = pooled_scores(part["all"] for part in parts)
-        modes: dict[str, list[Any]] = {}
-        for part in parts:
-            for score in part["modes"]:
-                modes.setdefault(score["name"], []).append(score)
-        medians = [quantile(pooled_scores(scores)["errors"], 0.5) for scores in modes.values()]
-        quantiles = [quantile(every["errors"], q) for q in (0.5, 0.95, 0.999)]
-        found[each["blocks"]] = [*quantiles, every["sum"] / every["examples"], mean(medians)]
-    return found
-
-
-def _beats(theirs: float, ours: float) -> bool:
-    return max(theirs, 1e-12) < max(ours, 1e-12)
-
-
-def _texts(measures: Sequence[float]) -> list[Cell]:
-    return [f"{m:.1e}" for m in measures]
-
-
-# ------------------------------------------------------------------ tuning
-def tuning_shown(protocol: Protocol, values: Values) -> Shown:
-    """Every setting's error on tuning seeds; stars: what is reported, and what tuning would choose now."""
-    heading = ["baseline", "features", "setting", "mean error", "wrong %", "reported", "best"]
-    lines: list[list[Cell]] = []
-    for group, runs in values.items():
-        _, name, seen = group.split("/")
-        losses = [_loss(run) for run in runs]
-        best = min(range(len(losses)), key=lambda k: losses[k])
-        for k, run in enumerate(runs):
-            setting = ", ".join(f"{key}={value}" for key, value in run["setting"].items()) or "-"
-            error, wrong = losses[k]
-            shown: list[Cell] = [f"{error:.3e}", round(100 * wrong, 3)]
-            marks = ["*" if k == setting_of(name, seen) else "", "*" if k == best else ""]
-            lines.append([name, seen, setting, *shown, *marks])
-    return Shown(table(heading, lines), [heading, *lines])
-
-
-def _loss(run: Mapping[str, Any]) -> tuple[float, float]:
-    """What tuning minimises: the mean error where there is one, then the share of errors; both targets."""
-    parts = [part.get("counted", part) for part in run["scores"][-1]["targets"].values()]
-    wrong = mean(part["wrong"] / part["examples"] for part in parts)
-    if "sum" not in parts[0]:
-        return 0.0, wrong
-    return mean(part["sum"] / part["change"] for part in parts), wrong

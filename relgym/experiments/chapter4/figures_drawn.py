@@ -135,10 +135,11 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
         )  # the ball begins above an object
         _picture(panels[0][0], block, 0, "path, coloured by time", path=True)
         panels[0][1].set_axis_off()
-        text = "\n".join(
-            f"{m['function']}\n      {' | '.join(clauses[m['mode']])[:110]}" for m in learned["modes"]
+        said = (" | ".join(clauses[m["mode"]])[:80] or "otherwise" for m in learned["modes"])
+        text = "\n\n".join(
+            f"{m['function']}\n    if {clause}" for m, clause in zip(learned["modes"], said, strict=True)
         )
-        panels[0][1].text(0.0, 0.5, text, va="center", fontsize=7, family="monospace")
+        panels[0][1].text(0.0, 0.5, text, va="center", fontsize=11, family="monospace")
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)

@@ -24,11 +24,20 @@ CAUSES: Final = (
     "bounce against a corner",
     "misclassified ramp bounce",
     "delayed falling",
+    "bad collision resolution, level surface",
     "several contacts at once",
     "misclassified contact with a level surface",
     "other",
 )
-"""Rows of Table 4.18, and three that it doesn't have."""
+"""Rows of Table 4.18, and four that it doesn't have."""
+
+_AFTERWARDS: Final = {
+    "vertical": "bad collision resolution, vertical",
+    "slope": "bad collision resolution, ramp slant",
+    "level": "bad collision resolution, level surface",
+    "slide": "delayed falling",
+}
+"""What a wrong step of free flight is called, by what the ball was last pushed by."""
 
 _SIGNIFICANT: Final = 1e-6
 """Position error, in units, with which a failed roll-out begins to go wrong; all before is rounding."""
@@ -144,7 +153,7 @@ def cause_of(block: Block, step: int, experiment: int) -> str:
         return "misclassified contact with a level surface"
     before = surfaces[max(0, step - _RECENT) : step]
     if surfaces[step] == "none":
-        for surface, cause in (("vertical", CAUSES[0]), ("slope", CAUSES[1]), ("slide", "delayed falling")):
+        for surface, cause in _AFTERWARDS.items():
             if surface in before:
                 return cause
     return "other"

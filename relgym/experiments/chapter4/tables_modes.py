@@ -113,7 +113,7 @@ def _function(axis: str, row: PublishedMode) -> str:
     signs = [w for w in (*row.weights, row.intercept) if w]
     terms += [f"{abs(row.intercept):g}"] if row.intercept else []
     text = " ".join(f"{'-' if w < 0 else '+'} {term}" for w, term in zip(signs, terms, strict=True))
-    return f"v{axis}' = " + (text.removeprefix("+ ") or "0")
+    return f"v{axis}' = " + (text.removeprefix("+ ").replace("- ", "-", text.startswith("- ")) or "0")
 
 
 # ------------------------------------------------------------------ box pushing

@@ -73,7 +73,7 @@ def _columns(
 
 
 def true_modes(block: Block, target: str, laws: AnalyticModes) -> NDArray[np.int64]:
-    """Number of each transition's analytic mode; where several contacts act at once, of the first that explains it.
+    """Number of each transition's analytic mode; where several contacts act at once, of the simplest that explains it.
 
     A ball that slides into a wall is touched twice, and each coordinate follows one of the two. Shape ``(n,)``; -1
     where no mode explains the step.
@@ -82,7 +82,11 @@ def true_modes(block: Block, target: str, laws: AnalyticModes) -> NDArray[np.int
     v = block.columns("ball", "vx", "vy")
     explaining = laws.explaining(target[-1], v[:-1], v[1:], TOLERANCE)
     unlabelled = (numbers < 0) & explaining.any(axis=1)
-    numbers[unlabelled] = explaining[unlabelled].argmax(axis=1)
+    sizes = [
+        sum(w != 0.0 for w in (*m.weights, m.intercept)) for m in (laws.x if target[-1] == "x" else laws.y)
+    ]
+    simplest = np.argsort(sizes, kind="stable")
+    numbers[unlabelled] = simplest[explaining[unlabelled][:, simplest].argmax(axis=1)]
     return numbers
 
 

@@ -11,6 +11,8 @@ from relgym.errors import ConfigError
 from relgym.experiments.chapter4 import comparison, pushing, rolled
 from relgym.experiments.chapter4.lesson import config_of, fresh_blocks, lesson, taught_blocks
 from relgym.experiments.chapter4.rolled import CAUSES, cause_of, trial_blocks
+from relgym.experiments.chapter4.testing import true_modes
+from relgym.experiments.data import BALL_EXPERIMENTS
 
 TESTS = {"seeds": [110], "blocks": 3}
 BATCH = {"experiment": 1, "seed": 100, "order": 0}
@@ -137,3 +139,21 @@ def test_causes_come_from_what_really_happened() -> None:
                 causes.setdefault(names[block.truth.mode["ball.vx"][step]], []).append(cause)
     assert set(causes["bounce, left face"]) == set(causes["bounce, slope"]) == {"misclassified ramp bounce"}
     assert set(causes["fly"]) == {"misclassified contact with a level surface"}
+
+
+def test_several_contacts_at_once_belong_to_the_simplest_mode_that_explains_them() -> None:
+    laws = BALL_EXPERIMENTS[1].modes()
+    found = 0
+    for block in trial_blocks(1, [110], 12):
+        for target in ("ball.vx", "ball.vy"):
+            logged, labels = block.truth.mode[target], true_modes(block, target, laws)
+            np.testing.assert_array_equal(labels[logged >= 0], logged[logged >= 0])
+            v = block.columns("ball", "vx", "vy")
+            names = block.truth.mode_names[target]
+            for step in np.flatnonzero((logged < 0) & (labels >= 0)):
+                mode = (laws.x if target == "ball.vx" else laws.y)[labels[step]]
+                assert abs(mode.predict(v[[step]])[0] - v[step + 1, int(target == "ball.vy")]) <= 1e-9
+                if target == "ball.vy" and v[step, 1] == 0.0 == v[step + 1, 1]:
+                    assert names[labels[step]] == "slide, floor"  # not a bounce at no speed
+                found += 1
+    assert found > 5

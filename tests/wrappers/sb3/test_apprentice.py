@@ -67,6 +67,17 @@ def test_only_a_model_of_this_world_is_trusted(halved: bool, rng: np.random.Gene
     assert model.seen == seen  # a frozen model is judged, and learns nothing
 
 
+def test_a_model_that_leaves_out_what_moves_is_not_trusted() -> None:
+    env = make()
+    model = relgym.WorldModel(env.get_wrapper_attr("schema"), targets=())
+    apprentice = Apprentice(model, env.get_wrapper_attr("task"), DynaConfig(shuffle=0, least=5))
+    for real in steps(40, seed=3):
+        apprentice.take_up(real)
+    assert apprentice.gate.known == 1.0  # nothing changes, it says
+    assert apprentice.gate.error > 0.5
+    assert not apprentice.gate.open
+
+
 def test_lessons_come_in_random_order() -> None:
     lessons = steps(30, seed=1)
 
