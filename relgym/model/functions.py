@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,17 @@ from relgym.config import ModelConfig
 from relgym.model.casting import Casting
 from relgym.scene.objects import SceneLayout
 
-__all__ = ["ModeFunctions", "bodies_of"]
+__all__ = ["ModeFunctions", "Verdict", "bodies_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a property model says of n examples: arrays of shape ``(n,)``; NaN where it predicts nothing."""
+
+    values: NDArray[np.float64]
+    modes: NDArray[np.int64]
+    outcomes: NDArray[np.int8]
+    margins: NDArray[np.float64]
 
 
 class ModeFunctions:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions, needed
-from relgym.model.functions import ModeFunctions, bodies_of
+from relgym.model.functions import ModeFunctions, Verdict, bodies_of
 from relgym.model.grouping import distinct, members
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Percept, Situation
@@ -40,16 +40,6 @@ MEASURE_EVERY = 256
 
 HOPELESS, DOUBTFUL = 200, 500
 """Without a mode after so many examples there is no law; with most of so many recent ones unexplained, hardly one."""
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """What a property model says of n examples: arrays of shape ``(n,)``; NaN where it predicts nothing."""
-
-    values: NDArray[np.float64]
-    modes: NDArray[np.int64]
-    outcomes: NDArray[np.int8]
-    margins: NDArray[np.float64]
 
 
 class PropertyModel(ModeFunctions):
