@@ -160,7 +160,7 @@ class LawLearner:
         self._count(cast, right, degree, single)
         news = [self._meet(contacts, pair, vector, after, right) for pair in single]
         if any(news) or (news and _doubled(self._store.seen, len(news))):
-            changed |= self._derive(sum(news))
+            changed |= self._hear(sum(news))
         return changed
 
     def _judge(self, cast: Cast, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
@@ -226,14 +226,17 @@ class LawLearner:
         """A free law changed: what was derived from it is derived again."""
         self.book.free = {name: f.law for name, f in self._free.items() if f.law is not None}
         self._settle()
-        if len(self._store):
-            self._derive(len(self._store))
+        self._derive()
 
-    def _derive(self, news: int) -> bool:
+    def _hear(self, news: int) -> bool:
         """Seek the law of pairs again, if enough contacts are news; whether it changed."""
         self._news += news
         if self._news and self._news <= self._stored_wrong // 4:
             return False
+        return self._derive()
+
+    def _derive(self) -> bool:
+        """Seek the law of pairs among the contacts kept; whether it changed."""
         encounters = self._store.encounters(self.book)
         if encounters is None or len(encounters) < FEWEST_CONTACTS:
             return False

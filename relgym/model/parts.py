@@ -59,7 +59,12 @@ class Parts:
         given = tuple(dict.fromkeys(pair for t in targets or () for pair in t.given))
         chained = tuple((t.type, t.property) for t in possible_targets(schema)) if self.open else ()
         self.perception = Perception(
-            schema, given, config.geometry, chained=chained, features=config.features
+            schema,
+            given,
+            config.geometry,
+            chained=chained,
+            features=config.features,
+            parting=config.classification.contact_facts,
         )
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}

@@ -14,6 +14,7 @@ from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import library_of
 from relgym.model.grouping import distinct
+from relgym.scene.contacts import APPROACH_EPS
 from relgym.scene.context import canonical_order, signature, slots
 from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, poses
 from relgym.scene.relations import Extractor, Relations
@@ -107,6 +108,9 @@ class Perception:
         The same for pairs whose causal order is still to be found.
     features
         Non-linear features, as in `ModelConfig.features`.
+    parting
+        Whether a body that the target is leaving is left out of its close set, if it touches another one (default).
+        It is a contact fact: the thesis knew none, and there such a body is as close as any that is touched.
     """
 
     def __init__(
@@ -117,8 +121,10 @@ class Perception:
         *,
         chained: tuple[tuple[str, str], ...] = (),
         features: tuple[str, ...] = (),
+        parting: bool = True,
     ) -> None:
         self.schema = schema
+        self.parting = parting
         self.given = given
         self.chained = chained
         self.libraries = {t.name: library_of(features, t.name, t.angles) for t in schema.types}
@@ -272,12 +278,18 @@ class Percept:
         contacts = relations.contacts(body)
         # Contact facts are facts of touching pairs (design §4): a normal towards something far says nothing.
         contacts[~relations.touched(body)] = np.nan
+        parting = contacts[..., -2] > APPROACH_EPS
+        # Where bodies part, the contact does nothing any more, whichever way it faces: only that they part is said.
+        contacts[parting, :-2] = contacts[parting, -1] = np.nan
         pair = np.concatenate([contacts, numbers], axis=2)
         pair[:, body] = np.nan
         table = perception.unary_table(self.layout)
         every = np.broadcast_to(table, (n, *table.shape))
         nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
-        return ExampleBatch(nothing, every, relations.context(body), pair, own, body)
+        close = relations.context(body)
+        if perception.parting:
+            close = _without(close, parting)
+        return ExampleBatch(nothing, every, close, pair, own, body)
 
     def _bodiless(self, target: int) -> ExampleBatch:
         """An object without a body stands alone: no relations, only numbers."""
@@ -303,3 +315,9 @@ def _free(t: ObjectType) -> tuple[str, ...]:
     """Properties that are no pose component: those that may be compared with thresholds (R2)."""
     pose = {k for k in t.pose_columns() if k >= 0} if t.has_body else set()
     return tuple(p for k, p in enumerate(t.properties) if k not in pose)
+
+
+def _without(close: NDArray[np.bool_], parting: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Close sets without the bodies that the target is leaving, where others are left beside itself."""
+    kept = close & ~parting
+    return np.where(kept.sum(axis=1, keepdims=True) > 1, kept, close)

@@ -155,10 +155,14 @@ def test_the_budget_is_the_same_for_all() -> None:
 
 
 def test_what_was_tuned_exists() -> None:
-    every = {**REGRESSORS, **CLASSIFIERS}
-    for (name, seen), number in TUNED.items():
-        assert seen in ("thesis", "contact") and 0 <= number < len(every[name].settings)
-    assert setting_of("lwr-50", "thesis-uncentred") == setting_of("lwr-50", "thesis")
+    known = {"regress": REGRESSORS, "classify": CLASSIFIERS}
+    for (task, name, seen), number in TUNED.items():
+        assert seen in ("thesis", "contact") and 0 <= number < len(known[task][name].settings)
+    wanted = {
+        (t, n, s) for t in known for n, b in known[t].items() for s in ("thesis", "contact") if b.settings[1:]
+    }
+    assert TUNED.keys() == wanted
+    assert setting_of("regress", "lwr-50", "thesis-uncentred") == setting_of("regress", "lwr-50", "thesis")
 
 
 @pytest.mark.parametrize(

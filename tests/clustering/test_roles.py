@@ -102,3 +102,14 @@ def test_one_row_gives_the_same_bits_as_many(seed: int) -> None:
     x = rng.normal(size=(7, 8))
     expected = [[binding.value(r, tuple(a)) for a in binding.assignments.tolist()] for r in x.tolist()]
     assert binding.values(x).tolist() == expected
+
+
+def test_values_with_the_same_players_are_single_values_to_the_last_bit() -> None:
+    rng = np.random.default_rng(0)
+    heavy = Role("box", (("friction", 0.1), ("mass", -1.7)))
+    binding = bind(mode_of(("v", 0.3), others=(heavy, friction(2.9)), constant=0.7), THREE)
+    assert binding is not None and len(binding.open) == 2
+    x = rng.normal(size=(50, len(THREE.columns)))
+    for slots in ((1, 2), (3, 1)):
+        expected = [binding.value(row.tolist(), slots) for row in x]
+        np.testing.assert_array_equal(binding.values_as(x, slots), expected)

@@ -364,6 +364,33 @@ def test_reward_and_end_can_be_learned() -> None:
     assert ends == [False, True, True, True]
 
 
+def test_a_dream_is_judged_by_the_real_envs_own_task() -> None:
+    real = gym.make("relgym/TruckPush-v0", task="push", n_boxes=1)
+    learner = ModelLearner(gym.make("relgym/TruckPush-v0", task="push", n_boxes=1), predict=False)
+    learner.action_space.seed(0)
+    for episode in range(60):
+        learner.reset(seed=episode)
+        ended = False
+        while not ended:
+            _, _, terminated, truncated, _ = learner.step(learner.action_space.sample())
+            ended = terminated or truncated
+    dream, rng, ends = LearnedModelEnv(learner.model, like=real), np.random.default_rng(0), 0
+    for episode in range(500, 510):
+        real.reset(seed=episode)
+        dream.reset(seed=episode)
+        ended = False
+        while not ended:
+            action = rng.uniform(0.2, 1.0, 1).astype(np.float32)
+            _, expected, terminated, ended, told = real.step(action)
+            _, reward, over, truncated, info = dream.step(action)
+            assert not truncated, info
+            assert reward == pytest.approx(expected, abs=1e-9)
+            assert (over, info["is_success"]) == (terminated, told["is_success"])
+            ends += terminated
+            ended = ended or terminated
+    assert ends > 5
+
+
 def test_what_is_given_goes_before_what_is_learned() -> None:
     dream = LearnedModelEnv(cart_model(), reward=lambda *_: 7.0)
     dream.reset(seed=0)

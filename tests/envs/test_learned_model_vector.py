@@ -124,6 +124,11 @@ def test_autoreset_is_that_of_gymnasiums_own_vector_env(mode: AutoresetMode) -> 
             np.testing.assert_array_equal(told["_final_obs"], infos["_final_obs"])
             for k in np.flatnonzero(over):
                 np.testing.assert_array_equal(told["final_obs"][k]["cart"], infos["final_obs"][k]["cart"])
+            for key in ("reason", "is_success"):  # what was said of the others stays where it is
+                there = {name for name in (key, f"_{key}") if name in infos}
+                assert there == {name for name in (key, f"_{key}") if name in told}
+                if there:
+                    np.testing.assert_array_equal(infos[f"_{key}"], told[f"_{key}"])
             told, infos = told["final_info"], infos["final_info"]
             np.testing.assert_array_equal(told["is_success"][over], infos["is_success"][over])
         if found[2].any():
@@ -178,6 +183,10 @@ def test_dreams_through_a_view_are_single_dreams_too() -> None:
         for a, b in zip(flags, found, strict=True):
             np.testing.assert_array_equal(a, b)
     assert found[2].all()
+    same = LearnedModelVectorEnv(flat_model(), 2, horizon=1, autoreset_mode="SameStep")
+    same.reset(seed=0)
+    *_, infos = same.step(pushes(2, rng))
+    assert all(last in same.single_observation_space for last in infos["final_obs"])
 
 
 @pytest.mark.parametrize("space", [spaces.Discrete(3), spaces.Box(-1, 1, (2,)), spaces.MultiDiscrete([2, 3])])

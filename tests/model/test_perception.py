@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from worlds import ROOM_TARGETS, Raw, room, scene, schema_of
 
 from relgym.model.perception import Percept, Perception
@@ -65,6 +66,39 @@ def test_contact_facts_are_facts_of_touching_pairs() -> None:
     left, right = (SCHEMA.layout().bodies.index(SCHEMA.layout().index(n)) for n in ("left", "right"))
     assert np.isfinite(example.pair[0, left][contact]).all()
     assert np.isnan(example.pair[0, right][contact]).all()
+
+
+def squeezed(vx: float) -> Scene:
+    """The ball touches both boxes and moves along the row."""
+    return world().replace({("right", "px"): 0.995, ("ball", "vx"): vx})
+
+
+@pytest.mark.parametrize(("vx", "met", "left"), [(-0.02, "left", "right"), (0.02, "right", "left")])
+def test_of_a_contact_that_is_being_left_only_that_is_said(vx: float, met: str, left: str) -> None:
+    percept = looked(squeezed(vx))
+    example = percept.situation(SCHEMA.layout().index("ball")).examples
+    names = percept.perception.vocabulary(BALL).pair
+    place = {n: SCHEMA.layout().bodies.index(SCHEMA.layout().index(n)) for n in (met, left)}
+    numbers = {n: dict(zip(names, example.pair[0, k].tolist(), strict=True)) for n, k in place.items()}
+    assert numbers[met]["approach"] == pytest.approx(-0.02)
+    assert abs(numbers[met]["normal-x"]) == 1.0 and numbers[met]["distance"] == pytest.approx(-0.005)
+    assert numbers[left]["approach"] == pytest.approx(0.02)
+    assert all(np.isnan(numbers[left][name]) for name in ("normal-x", "normal-y", "distance", "slip"))
+
+
+def test_what_the_target_leaves_is_not_close_while_it_touches_something_else() -> None:
+    ball, left, right = (SCHEMA.layout().index(n) for n in ("ball", "left", "right"))
+    bodies = SCHEMA.layout().bodies
+
+    def close(scene: Scene, parting: bool = True) -> set[int]:
+        percept = Perception(SCHEMA, parting=parting).percept(scene.layout, scene.vector[None])
+        return {bodies[k] for k in np.flatnonzero(percept.situation(ball).examples.close[0])}
+
+    assert close(squeezed(-0.02)) == {ball, left}
+    assert close(squeezed(0.02)) == {ball, right}
+    assert close(squeezed(-0.02), parting=False) == {ball, left, right}
+    leaving = world().replace({("ball", "vx"): 0.02})
+    assert close(leaving) == {ball, left}  # nothing else is touched
 
 
 def test_positions_are_no_numbers_for_thresholds() -> None:

@@ -11,7 +11,8 @@ from carts import run
 from plain_envs import Slider
 
 from relgym.envs.views import NumbersView
-from relgym.errors import ConfigError, RelgymError
+from relgym.errors import ConfigError, ObservationError, RelgymError
+from relgym.scene.objects import Transition
 from relgym.wrappers import ModelLearner
 from relgym.wrappers.background import Background
 
@@ -44,6 +45,18 @@ def test_what_finds_the_queue_full_is_dropped_and_counted() -> None:
     assert env.dropped > 0
     assert model.seen + env.dropped == 200
     env.close()
+
+
+def test_what_made_learning_fail_is_raised_where_it_is_asked_for() -> None:
+    model = ModelLearner(Slider()).model
+    bad = model.schema.scene({"self": [0.0, 0.0], "action": [0.0]})
+    bad.vector.flags.writeable = True
+    bad.vector[0] = np.nan
+    background = Background(model, None, queue=10)
+    assert background.put(Transition(bad, bad))
+    with pytest.raises(ObservationError, match="'self', property 'x0': expected a finite number, got nan"):
+        background.fetch()
+    background.close()
 
 
 def test_a_process_that_died_is_reported() -> None:

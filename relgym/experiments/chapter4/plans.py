@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Literal
 
 from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, installed
 from relgym.baselines.tuned import setting_of
@@ -137,7 +137,9 @@ def _comparing(protocol: Protocol) -> Sequence[Batch]:
     return protocol.runs(protocol.comparison_batches)
 
 
-def _baseline(protocol: Protocol, function: str, name: str, seen: str, run: Batch) -> Task:
+def _baseline(
+    protocol: Protocol, function: Literal["regress", "classify"], name: str, seen: str, run: Batch
+) -> Task:
     arguments = {
         "baseline": name,
         "shown": seen,
@@ -146,7 +148,7 @@ def _baseline(protocol: Protocol, function: str, name: str, seen: str, run: Batc
         "order": run.order,
         "checkpoints": list(protocol.after(2)),
         "tests": protocol.tests(),
-        "setting": setting_of(name, seen),
+        "setting": setting_of(function, name, seen),
     }
     return Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}")
 

@@ -101,14 +101,15 @@ def tuning_shown(protocol: Protocol, values: Values) -> Shown:
     heading = ["baseline", "features", "setting", "mean error", "wrong %", "reported", "best"]
     lines: list[list[Cell]] = []
     for group, runs in values.items():
-        _, name, seen = group.split("/")
+        function, name, seen = group.split("/")
+        reported = setting_of("classify" if function == "classify" else "regress", name, seen)
         losses = [_loss(run) for run in runs]
         best = min(range(len(losses)), key=lambda k: losses[k])
         for k, run in enumerate(runs):
             setting = ", ".join(f"{key}={value}" for key, value in run["setting"].items()) or "-"
             error, wrong = losses[k]
             shown: list[Cell] = [f"{error:.3e}", round(100 * wrong, 3)]
-            marks = ["*" if k == setting_of(name, seen) else "", "*" if k == best else ""]
+            marks = ["*" if k == reported else "", "*" if k == best else ""]
             lines.append([name, seen, setting, *shown, *marks])
     return Shown(table(heading, lines), [heading, *lines])
 
