@@ -150,12 +150,12 @@ def run(
     agent, dyna
         Parameters of the agent and of Dyna that differ from the course's.
     """
+    env: gym.Env[Any, Any] = make_env(course)
+    algorithm = make_agent(arm, env, seed=seed, **(agent or {}))  # says so where the extra is missing
     import torch
     from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
     torch.set_num_threads(1)  # nets this small lose by more
-    env: gym.Env[Any, Any] = make_env(course)
-    algorithm = make_agent(arm, env, seed=seed, **(agent or {}))
     own = make_dyna(arm, course, env, seed=seed, **(dyna or {}))
     tests = testing or Examination(course)
     curve: list[tuple[int, int]] = []

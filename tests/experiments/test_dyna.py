@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 
@@ -82,6 +83,14 @@ def test_agents_see_short_vectors_and_the_recorder_scenes() -> None:
     env.step(env.action_space.sample())
     (real,) = env.get_wrapper_attr("take")()
     assert {"truck", "goal"} <= set(real.start.layout.names)
+
+
+def test_without_the_extra_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    with pytest.raises(
+        ConfigError, match=r"Dyna needs the extra sb3 \(pip install 'relgym\[sb3\]', or make dyna\)"
+    ):
+        run(COURSES["truck"], ARMS["sac"], seed=0, testing=Examination(COURSES["truck"], episodes=1))
 
 
 @pytest.mark.sb3
