@@ -117,6 +117,7 @@ class Exemplars:
         *,
         hard: bool = False,
         roles: Sequence[int] = (),
+        weight: float = 1.0,
     ) -> int | None:
         """Offer an example; its slot if it was kept.
 
@@ -132,10 +133,12 @@ class Exemplars:
             Whether it contradicted a classifier; such examples are preferred.
         roles
             Object playing each role of the assigned mode.
+        weight
+            How many seen examples it stands for.
         """
         check_example(self.vocabulary, example)
         cell = self._cells[number := self._cell(assigned, example.key)]
-        cell.count += 1
+        cell.count += weight
         slot = self._room(cell, hard)
         if slot is None:
             return None
@@ -197,6 +200,10 @@ class Exemplars:
             self.columns["cell"][slot] = number
         self._trim()
         self.version += 1
+
+    def key_of(self, slot: int) -> bytes:
+        """Relational state of the example in a slot."""
+        return self._cells[int(self.columns["cell"][slot])].key
 
     def widen(self, vocabulary: Vocabulary, own: Floats) -> None:
         """Other own features: their names, and their values for every slot, shape ``(n, len(vocabulary.own))``."""

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from relgym.clustering.approximation import LEFT, LEFT_LINEAR, approximate
 from relgym.clustering.assignments import AssignmentLog
-from relgym.clustering.discovery import Scale, find_mode, least_examples
+from relgym.clustering.discovery import find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
+from relgym.clustering.population import ClusterReport, Population
 from relgym.clustering.unification import reordered
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
@@ -32,33 +33,11 @@ APPROXIMATE_AT = (256, 1024, 4096, 16384)
 MOST_ROWS, MANY_FEATURES = 1500, 200
 """At most so many rows determine an approximation; it may have twice as many terms if there are so many columns."""
 
+LEAST_MEMBERS = 4
+"""Examples that a mode of another model must explain here to be taken over."""
+
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
-
-
-@dataclass(frozen=True, slots=True)
-class ClusterReport:
-    """What one example changed.
-
-    Attributes
-    ----------
-    mode
-        Id of the mode the example was assigned to; `NOISE` if none explains it.
-    fits
-        Ids of all modes that explain it.
-    created, removed
-        Ids of modes that came and went.
-    """
-
-    mode: int
-    fits: tuple[int, ...]
-    created: tuple[int, ...] = ()
-    removed: tuple[int, ...] = ()
-
-    @property
-    def changed(self) -> bool:
-        """Whether the set of modes is another than before."""
-        return bool(self.created or self.removed)
 
 
 @dataclass(slots=True)
@@ -69,7 +48,7 @@ class _Search:
     failures: int = 0
 
 
-class ModeClusterer:
+class ModeClusterer(Population):
     """Segments a target's examples into modes, one example at a time.
 
     Parameters
@@ -83,10 +62,6 @@ class ModeClusterer:
 
     Attributes
     ----------
-    clusters
-        The modes at work, by id.
-    scale
-        Noise as assumed at present, and the tolerances that follow from it.
     approximate
         Whether the noise assumed is what an approximation leaves, for want of an exact law.
     floor
@@ -100,74 +75,14 @@ class ModeClusterer:
     """
 
     def __init__(self, target: Target, config: ClusteringConfig, *, seed: int) -> None:
-        self.target = target
-        self.config = config
-        self.clusters: dict[int, Cluster] = {}
-        self.scale = Scale(1e-12, config.inlier_stds, config.tail_stds)
+        super().__init__(target, config)
         self.floor = 1e-12
         self.approximate = False
         self._rng = np.random.default_rng(seed)
-        self._log = AssignmentLog()
-        self._next_id = 1
         self._searches: dict[int, _Search] = {}
         self._largest = 0.0  # number among the columns and the target's values
         self._reach = 0.0  # value of the target
         self._spread = 0.0  # noise found in the data, rounding apart
-        self._known_noise = 0  # of a model that was loaded without its examples
-
-    # ------------------------------------------------------------------ what is known
-    @property
-    def y(self) -> NDArray[np.float64]:
-        """Target values of all examples, shape ``(n,)``."""
-        return self._log.y
-
-    @property
-    def labels(self) -> NDArray[np.int32]:
-        """Mode id of every example, shape ``(n,)``."""
-        return self._log.labels
-
-    @property
-    def rows(self) -> NDArray[np.int64]:
-        """Row of every example in the example table, shape ``(n,)``."""
-        return self._log.rows
-
-    @property
-    def modes(self) -> tuple[Mode, ...]:
-        """All modes but noise, by id."""
-        if not len(self._log):
-            return tuple(c.mode for _, c in sorted(self.clusters.items()))
-        counts = np.bincount(self.labels, minlength=self._next_id)
-        dropped = self._log.forgotten
-        return tuple(
-            c.mode.with_examples(int(counts[i]) + dropped[i]) for i, c in sorted(self.clusters.items())
-        )
-
-    @property
-    def noise_examples(self) -> int:
-        """Number of examples no mode explains."""
-        if not len(self._log):
-            return self._known_noise
-        return int((self.labels == NOISE).sum()) + self._log.forgotten[NOISE]
-
-    @property
-    def seen(self) -> int:
-        """Number of examples that ever came, forgotten ones included."""
-        return self._log.seen
-
-    def keep(self, rows: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Forget the examples of dropped rows of the example table; see `AssignmentLog.keep`."""
-        return self._log.keep(rows)
-
-    def fits(
-        self, table: ExampleTable, examples: NDArray[np.intp]
-    ) -> tuple[tuple[int, ...], NDArray[np.bool_]]:
-        """Which modes explain the given examples: ids and a boolean array ``(len(examples), modes)``."""
-        ids = tuple(sorted(self.clusters))
-        found = np.zeros((len(examples), len(ids)), dtype=bool)
-        for k, i in enumerate(ids):
-            error, _ = self.clusters[i].errors(table, self.rows[examples], self.y[examples], self.scale)
-            found[:, k] = error <= self.scale.tolerance
-        return ids, found
 
     # ------------------------------------------------------------------ one example (Figure 3.2)
     def learn_one(self, table: ExampleTable, row: int, y: float) -> ClusterReport:
@@ -209,10 +124,6 @@ class ModeClusterer:
             self._largest, self._reach = max(largest, self._largest), max(abs(y), self._reach)
             self._rescale(table)
         return example
-
-    def _errors_of(self, table: ExampleTable, example: int) -> dict[int, float]:
-        rows, y = self.rows[example : example + 1], self.y[example : example + 1]
-        return {i: float(c.errors(table, rows, y, self.scale)[0][0]) for i, c in self.clusters.items()}
 
     def _grow(self, table: ExampleTable, mode: int) -> None:
         """§3.2.4, M-step: refit a mode whose examples have multiplied since its last fit."""
@@ -387,7 +298,10 @@ class ModeClusterer:
         known = Known(
             table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
         )
-        cluster = known.cluster(fit, signature)
+        self._admit(table, known, known.cluster(fit, signature))
+
+    def _admit(self, table: ExampleTable, known: Known, cluster: Cluster) -> int:
+        """Take up a mode that has no id yet; the id that it gets."""
         members = self._explained(table, cluster, self._noise())
         cluster, absorbed = generalise(known, cluster, members, rng=self._rng)
         inherited = sum(self._log.forgotten.pop(i, 0) for i in absorbed)
@@ -398,51 +312,48 @@ class ModeClusterer:
         self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
         self._log.forgotten[new] += inherited
         self._reassign(table, new)
+        return new
 
-    def _noise(self) -> NDArray[np.intp]:
-        return np.flatnonzero(self.labels == NOISE)
+    def absorb(
+        self, other: ModeClusterer, table: ExampleTable, rows: NDArray[np.int64], *, functions: bool
+    ) -> None:
+        """Take up another clusterer's examples and modes, as if this one had seen them.
 
-    def _explained(
-        self, table: ExampleTable, cluster: Cluster, examples: NDArray[np.intp]
-    ) -> NDArray[np.intp]:
-        error, _ = cluster.errors(table, self.rows[examples], self.y[examples], self.scale)
-        return examples[error <= self.scale.tolerance]
-
-    def _remove(self, mode: int) -> None:
-        """A deleted mode gives its examples back to the noise, from where others take them."""
-        del self.clusters[mode]
-        self._log.forgotten[NOISE] += self._log.forgotten.pop(mode, 0)
-        self.labels[self.labels == mode] = NOISE
-
-    def _reassign(self, table: ExampleTable, new: int) -> None:
-        """E-step for a new mode: it takes what it explains from the noise and from less simple modes."""
-        everyone = self._explained(table, self.clusters[new], np.arange(len(self._log)))
-        for example in everyone:
-            held = int(self.labels[example])
-            if held == NOISE or _simpler(self.clusters[new].mode, self.clusters[held].mode):
-                self.labels[example] = new
-        self._prune(table)
-        for i in [new] if new in self.clusters else []:
-            members = np.flatnonzero(self.labels == i)
-            self.clusters[i] = refit(self.clusters[i], table, self.rows[members], self.y[members], self.scale)
-
-    def _prune(self, table: ExampleTable) -> None:
-        """Delete modes that were left with fewer than T / 2 examples; their examples find other homes."""
-        least = least_examples(self.y, self.scale, self.config) / 2
-        for i in sorted(self.clusters):
-            if (self.labels == i).sum() >= least or len(self.clusters) == 1:
-                continue
-            orphans = np.flatnonzero(self.labels == i)
-            self._remove(i)
-            self._rehome(table, orphans)
-
-    def _rehome(self, table: ExampleTable, examples: NDArray[np.intp]) -> None:
-        ids, fits = self.fits(table, examples)
-        for example, row in zip(examples, fits, strict=True):
-            fitting = [i for i, ok in zip(ids, row, strict=True) if ok]
-            if fitting:
-                errors = self._errors_of(table, int(example))
-                self.labels[example] = preferred(fitting, errors, self.clusters, self.scale, self.config)
+        Parameters
+        ----------
+        other
+            Of the same property; unchanged.
+        table, rows
+            Where its examples lie now: row of each in the table, shape ``(n,)``.
+        functions
+            Whether its modes may be taken over: not if they were given other next values.
+        """
+        first = len(self._log)
+        for row, y in zip(rows.tolist(), other.y.tolist(), strict=True):
+            self._log.append(row, y)
+        self._largest, self._reach = max(self._largest, other._largest), max(self._reach, other._reach)
+        self._spread, self.floor = max(self._spread, other._spread), max(self.floor, other.floor)
+        self.approximate |= other.approximate
+        self.scale = replace(self.scale, sigma=max(self.scale.sigma, other.scale.sigma))
+        self._rehome(table, np.arange(first, len(self._log)))
+        matched = {NOISE: NOISE}
+        for i, cluster in sorted(other.clusters.items()):
+            alike = [k for k, c in sorted(self.clusters.items()) if c.mode.same_function(cluster.mode, 1e-6)]
+            if alike:
+                matched[i] = alike[0]
+            elif (
+                functions
+                and len(self._explained(table, Cluster(cluster.mode), self._noise())) >= LEAST_MEMBERS
+            ):
+                known = Known(
+                    table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
+                )
+                matched[i] = self._admit(
+                    table, known, Cluster(replace(cluster.mode, id=0, target=self.target))
+                )
+        for i, count in other._log.forgotten.items():
+            self._log.forgotten[matched.get(i, NOISE)] += count
+        self._log.seen += other._log.seen - len(other._log)
 
     # ------------------------------------------------------------------ saving
     def to_json(self) -> dict[str, Any]:
@@ -480,7 +391,3 @@ class ModeClusterer:
         self._rng.bit_generator.state = data["random"]
         if arrays:
             self._log = AssignmentLog.from_arrays(arrays)
-
-
-def _simpler(mode: Mode, rival: Mode) -> bool:
-    return mode.parameters < rival.parameters

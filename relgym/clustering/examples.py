@@ -64,6 +64,11 @@ class ExampleTable:
         """The how-manieth each row was that came, shape ``(n,)``."""
         return self._serial[: self._size]
 
+    @property
+    def stratum_keys(self) -> list[bytes]:
+        """Key of each relational state, by its number in `strata`."""
+        return list(self._strata)
+
     def keep(self, rows: NDArray[np.bool_]) -> None:
         """Forget all rows but these, shape ``(n,)``; those left are numbered anew, in their order."""
         n = int(rows.sum())

@@ -102,7 +102,8 @@ def collect(study: Study, steps: int, seed: int, policy: Policy = at_random) -> 
     rng = np.random.default_rng(seed)
     view = NumbersView(env.observation_space, env.action_space, names=study.names, angles=study.angles)
     observation, _ = env.reset(seed=seed)
-    scene, found = view.scene(observation), []
+    scene = view.scene(observation)
+    found: list[Transition] = []
     while len(found) < steps:
         action = policy(observation, env, rng)
         observation, _, terminated, truncated, _ = env.step(action)

@@ -7,16 +7,20 @@ others follow (``x' = x + k v'``) may test where they would get to if a mode hel
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.classification.binary import BinaryClassifier
 from relgym.classification.examples import Vocabulary
 from relgym.clustering.columns import PRIME, SlotSignature
+from relgym.clustering.mode import Mode
 from relgym.scene.objects import TASK, SceneSchema, Target
 
-__all__ = ["Conditions"]
+__all__ = ["Conditions", "needed"]
 
 
 class Conditions:
@@ -64,3 +68,19 @@ class Conditions:
         if len(slots) != 1 or not signature.has(slots[0], prop + PRIME):
             return -1
         return signature.column(slots[0], prop + PRIME)
+
+
+def needed(
+    target: Target, modes: Iterable[Mode], classifiers: Iterable[BinaryClassifier]
+) -> frozenset[tuple[str, str]]:
+    """Those of a target's given pairs whose next values a mode's function reads or a clause or tree tests."""
+    if not target.given:
+        return frozenset()
+    names = {name for mode in modes for role in mode.roles for name, _ in role.terms}
+    for c in classifiers:
+        names |= {literal.relation for clause in c.definition.clauses for literal in clause}
+        trees = [tree for tree in (*c.clause_trees, c.fall_through_tree) if tree is not None]
+        names |= {tree.columns[k] for tree in trees for k in tree.column if k >= 0}
+    words = {word for name in names for word in re.findall(r"[\w.]+'", name)}
+    bare = {word.rpartition(".")[2] for word in words}
+    return frozenset(pair for pair in target.given if pair[1] + PRIME in bare)

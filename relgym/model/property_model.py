@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,19 +13,20 @@ from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.mode_classifier import ModeClassifier
 from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
-from relgym.clustering.columns import PRIME, SlotSignature
+from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.mode import NOISE, Mode
-from relgym.clustering.roles import Binding, bind
+from relgym.clustering.mode import NOISE
+from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
-from relgym.model.conditions import Conditions
+from relgym.model.conditions import Conditions, needed
+from relgym.model.functions import ModeFunctions, Verdict, bodies_of
 from relgym.model.grouping import distinct, members
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
 from relgym.model.spread import Spreads, action_columns, measure
-from relgym.scene.objects import SceneLayout, SceneSchema, Target
+from relgym.scene.objects import SceneSchema, Target
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
@@ -42,17 +42,7 @@ HOPELESS, DOUBTFUL = 200, 500
 """Without a mode after so many examples there is no law; with most of so many recent ones unexplained, hardly one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """What a property model says of n examples: arrays of shape ``(n,)``; NaN where it predicts nothing."""
-
-    values: NDArray[np.float64]
-    modes: NDArray[np.int64]
-    outcomes: NDArray[np.int8]
-    margins: NDArray[np.float64]
-
-
-class PropertyModel:
+class PropertyModel(ModeFunctions):
     """Learns and predicts one target.
 
     Parameters
@@ -80,20 +70,15 @@ class PropertyModel:
         self, target: Target, vocabulary: Vocabulary, config: ModelConfig, schema: SceneSchema
     ) -> None:
         self.target = target
-        self.config = config
         self.schema = schema
         self.conditions = Conditions(schema, target)
         self._base = vocabulary
-        self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
+        clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
+        super().__init__(clusterer, Casting(vocabulary, config.classification), config)
         self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classification)
-        self.casting = Casting(vocabulary, config.classification)
         self.spreads = Spreads()
         self._unexplained = False
         self.limits = Limits()
-        self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_bindings": {}}  # keyed by identity, which a copy doesn't share
 
     @property
     def unexplained(self) -> bool:
@@ -109,27 +94,8 @@ class PropertyModel:
     @property
     def needs(self) -> frozenset[tuple[str, str]]:
         """(type, property) pairs whose next values a mode's function reads or a clause tests."""
-        if not self.target.given:
-            return frozenset()
-        names = {
-            name for c in self.clusterer.clusters.values() for role in c.mode.roles for name, _ in role.terms
-        }
-        for c in self.classifier.classifiers:
-            names |= {literal.relation for clause in c.definition.clauses for literal in clause}
-            trees = [tree for tree in (*c.clause_trees, c.fall_through_tree) if tree is not None]
-            names |= {tree.columns[k] for tree in trees for k in tree.column if k >= 0}
-        words = {word for name in names for word in re.findall(r"[\w.]+'", name)}
-        bare = {word.rpartition(".")[2] for word in words}
-        return frozenset(pair for pair in self.target.given if pair[1] + PRIME in bare)
-
-    @property
-    def modes(self) -> tuple[Mode, ...]:
-        """All modes but noise, by id."""
-        return self.clusterer.modes
-
-    def mode(self, number: int) -> Mode:
-        """The mode of that id."""
-        return self.clusterer.clusters[number].mode
+        modes = [c.mode for c in self.clusterer.clusters.values()]
+        return needed(self.target, modes, self.classifier.classifiers)
 
     # ------------------------------------------------------------------ learning
     def learn_one(
@@ -162,13 +128,41 @@ class PropertyModel:
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
         seen = replace(example, row=number, own=own)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
-        values = np.array(self._values_one(situation.signature, x[0].tolist()))
+        values = np.array(self._values_one(situation.signature, x[0].tolist(), self.classifier.modes))
         assigned = UNKNOWN if report.mode == NOISE or report.mode in self.limits else report.mode
         played = self._played(table, np.array([number]), report.mode)[0].tolist()
         self.classifier.observe(seen, assigned, fits, values, roles=played)
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
         return report
+
+    @property
+    def base_features(self) -> int:
+        """Number of own features that classifiers are shown, next values left aside."""
+        return len(self._base.own)
+
+    def follow(self, table: ExampleTable) -> None:
+        """The modes changed from outside: classifiers and spreads follow."""
+        self._follow(table)
+        self.spreads, self._unexplained = measure(self.clusterer, table), self._judge()
+
+    def start_over(self, table: ExampleTable) -> None:
+        """Learn all classifiers anew, of what they remember."""
+        self._widen(table, self.classifier.vocabulary.follows)
+
+    def remember(self, table: ExampleTable, example: Example, weight: float) -> None:
+        """Let the classifiers remember one more of the examples there are, by its number in ``example.row``."""
+        number = np.array([example.row])
+        assigned = int(self.clusterer.labels[example.row])
+        modes = self.classifier.modes
+        known, fits = self.clusterer.fits(table, number)
+        shown = np.array([bool(fits[0, known.index(i)]) for i in modes], dtype=bool)
+        values = self._values_many(table, self.clusterer.rows[number], modes)[0]
+        played = self._played(table, number, assigned)[0].tolist()
+        label = assigned if assigned in modes else UNKNOWN
+        self.classifier.exemplars.add(example, label, shown, values, roles=played, weight=weight)
+        if played:
+            self.casting.observe(self.mode(assigned), example, played)
 
     def keep(self, rows: NDArray[np.bool_]) -> None:
         """Forget the examples of dropped rows of the example table, shape ``(rows,)``."""
@@ -219,99 +213,7 @@ class PropertyModel:
         labels = self.clusterer.labels[numbers].astype(np.int64)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
-        self._recast(table)
-
-    def _recast(self, table: ExampleTable) -> None:
-        """Write down anew who plays the roles of the remembered examples' modes."""
-        numbers = self.classifier.exemplars.rows.astype(np.intp)
-        labels = self.clusterer.labels[numbers]
-        roles = self.classifier.exemplars.columns["roles"]
-        roles[:] = -1
-        for mode in np.unique(labels[labels != NOISE]):
-            part = np.flatnonzero(labels == mode)
-            played = self._played(table, numbers[part], int(mode))
-            width = min(played.shape[1], roles.shape[1])
-            roles[part, :width] = played[:, :width]
-
-    def _values_many(
-        self, table: ExampleTable, rows: NDArray[np.integer], ids: tuple[int, ...]
-    ) -> NDArray[np.float64]:
-        """What the modes predict on rows of the table, shape ``(n, len(ids))``; NaN where roles are open."""
-        values = np.full((len(rows), len(ids)), np.nan)
-        signatures = table.signature_ids[rows]
-        for number in np.unique(signatures):
-            part = np.flatnonzero(signatures == number)
-            values[part] = self._values(table.signatures[int(number)], table.x[rows[part]], ids)
-        return values
-
-    # ------------------------------------------------------------------ functions and roles
-    def _binding(self, signature: SlotSignature, mode: int) -> Binding | None:
-        key, present = (id(signature), mode), self.mode(mode)
-        known = self._bindings.get(key)
-        if known is None or known[0] is not present:  # a refit changes the function, not the mode's id
-            known = self._bindings[key] = (present, bind(present, signature))
-        return known[1]
-
-    def _values(
-        self, signature: SlotSignature, x: NDArray[np.float64], ids: tuple[int, ...]
-    ) -> NDArray[np.float64]:
-        values = np.full((len(x), len(ids)), np.nan)
-        for k, mode in enumerate(ids):
-            binding = self._binding(signature, mode)
-            if binding is not None and not binding.open:
-                values[:, k] = binding.values(x)[:, 0]
-        return values
-
-    def _values_one(self, signature: SlotSignature, x: list[float]) -> list[float]:
-        values = []
-        for mode in self.classifier.modes:
-            binding = self._binding(signature, mode)
-            known = binding is not None and not binding.open
-            values.append(binding.value(x) if known and binding is not None else float("nan"))
-        return values
-
-    def _played(self, table: ExampleTable, numbers: NDArray[np.intp], mode: int) -> NDArray[np.int64]:
-        """Bodies in a mode's embodied roles, by the assignment that fits each example best (§3.2.4).
-
-        Shape ``(n, roles)``.
-        """
-        if mode == NOISE or not self.casting.embodied(self.mode(mode)):
-            return np.zeros((len(numbers), 0), dtype=np.int64)
-        roles = self.mode(mode).open_roles
-        chosen = [k for k, role in enumerate(roles) if role in self.casting.embodied(self.mode(mode))]
-        rows, y = self.clusterer.rows[numbers], self.clusterer.y[numbers]
-        cluster, scale = self.clusterer.clusters[mode], self.clusterer.scale
-        _, assignment = cluster.errors(table, rows, y, scale)
-        played = np.full((len(numbers), len(chosen)), -1, dtype=np.int64)
-        signatures = table.signature_ids[rows]
-        for number in np.unique(signatures):
-            binding = cluster.binding(table, int(number))
-            if binding is None:
-                continue
-            part = np.flatnonzero(signatures == number)
-            slots = binding.slots[assignment[part]][:, chosen]
-            played[part] = np.take_along_axis(table.bodies[rows[part]], slots, axis=1)
-        return played
-
-    def _cast(
-        self, mode: int, binding: Binding, example: Example, order: NDArray[np.intp], layout: SceneLayout
-    ) -> tuple[int, ...] | None:
-        """Slots of a mode's open roles, by the role classifiers; None if they can't be filled."""
-        bodies = bodies_of(order, layout)
-        place = {body: slot for slot, body in enumerate(bodies) if body >= 0}
-        played = self.casting.assign(self.mode(mode), example, tuple(place), sure=self.config.abstain)
-        if played is None:
-            return None
-        cast = iter(played)
-        slots = []
-        for role, forced in zip(self.mode(mode).open_roles, binding.forced, strict=True):
-            embodied = role.type in self.casting.vocabulary.unary
-            body = next(cast) if embodied else -1
-            if forced < 0:
-                if not embodied:
-                    return None
-                slots.append(place[body])
-        return tuple(slots)
+        self._recast(table, self.classifier.exemplars)
 
     # ------------------------------------------------------------------ prediction (§3.6)
     def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
@@ -320,7 +222,7 @@ class PropertyModel:
         Arguments as of `predict_one`.
         """
         x = percept.rows(index, following[None])[0].tolist()
-        return self._values_one(percept.situation(index).signature, x)
+        return self._values_one(percept.situation(index).signature, x, self.classifier.modes)
 
     def example(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Example:
         """What the classifiers are shown of a single scene; arguments as of `predict_one`."""
@@ -359,7 +261,9 @@ class PropertyModel:
         casts = self._casts(situation.signature)
         row = percept.rows(index, following[None], ordered=casts)
         x, example = row[0].tolist(), self._shown(situation, row)
-        ranking = self.classifier.rank(example, self._values_one(situation.signature, x))
+        ranking = self.classifier.rank(
+            example, self._values_one(situation.signature, x, self.classifier.modes)
+        )
         if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
             return replace(nothing, outcome=Outcome.OUTSIDE)
         layout, order = percept.layout, situation.order[0] if casts else situation.plain
@@ -497,9 +401,3 @@ class PropertyModel:
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))
         self._bindings.clear()
-
-
-def bodies_of(order: NDArray[np.intp], layout: SceneLayout) -> tuple[int, ...]:
-    """Number of the body in each slot, -1 for bodiless objects."""
-    numbers = {index: body for body, index in enumerate(layout.bodies)}
-    return tuple(numbers.get(int(index), -1) for index in order)

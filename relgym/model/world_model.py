@@ -16,6 +16,7 @@ from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
 from relgym.model.learning import LearnReport, finish, learn
+from relgym.model.merging import merge
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import BatchPrediction, ScenePrediction
@@ -134,6 +135,28 @@ class WorldModel:
         report = learn(self._parts, self._perceive(transition.before), transition)
         self.seen += 1
         return report
+
+    def merge(self, other: WorldModel) -> None:
+        """Take up all that another model of the same world remembers, as if this one had seen it too.
+
+        Modes are united by function, clauses are learned again from both memories. Laws of motion are those of the
+        model that saw more transitions.
+
+        Raises
+        ------
+        ConfigError
+            Another schema, configuration (but for the seed), or targets.
+        ModelFileError
+            One of the two was loaded without its history.
+        """
+        if self.frozen or other.frozen:
+            raise ModelFileError(
+                "a model that was loaded without its history can't be merged; keep history=True"
+            )
+        merge(self._parts, other._parts, follow_laws=other.seen > self.seen)
+        self.seen += other.seen
+        self._percept = None
+        self.finish()
 
     def finish(self) -> int:
         """Re-learn every stale classifier now, without a budget; returns the work spent.

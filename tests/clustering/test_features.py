@@ -1,0 +1,114 @@
+"""Non-linear features: what a library offers, what it is called and what it is worth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from relgym.clustering.columns import SlotSignature
+from relgym.clustering.features import Library, library_of, register_function
+from relgym.clustering.mode import Mode, Role
+from relgym.clustering.roles import bind
+from relgym.errors import ConfigError
+from relgym.scene.objects import ACTION, TASK, ObjectType, Target
+
+CART = ObjectType("cart", ("x", "v"))
+PUSH = ObjectType(ACTION, ("a",))
+
+
+def names(*kinds: str, angles: tuple[str, ...] = ()) -> list[str]:
+    found = Library(kinds, angles).features(("x", "v", "action.a"), (True, True, False))
+    return [feature.name for feature in found]
+
+
+def test_sines_and_cosines_of_own_properties_at_three_frequencies() -> None:
+    assert names("trig")[:6] == ["sin(x)", "cos(x)", "sin(2 x)", "cos(2 x)", "sin(3 x)", "cos(3 x)"]
+    assert not any("action" in name for name in names("trig"))
+    assert len(names("trig")) == 12
+
+
+def test_named_angles_are_the_only_ones_to_turn() -> None:
+    assert {name[4:-1].split()[-1] for name in names("trig", angles=("x",))} == {"x"}
+
+
+def test_squares_products_and_higher_degrees() -> None:
+    assert names("squares") == ["x^2", "v^2", "action.a^2"]
+    assert names("products") == ["x^2", "x v", "x action.a", "v^2", "v action.a", "action.a^2"]
+    assert "x^2 v" in names("degree3")
+    assert "x^2 v^2" in names("degree4")
+    assert "v sin(x)" in names("trig", "products", angles=("x",))
+
+
+def test_next_values_enter_products_of_two_only() -> None:
+    found = Library(("degree3",)).features(("x", "v'"), (True, True))
+    assert "x v'" in {f.name for f in found}
+    assert not any("v'" in f.name and f.name.count("x") > 1 for f in found if len(f.atoms) > 2)
+
+
+def test_a_value_is_the_product_of_its_factors() -> None:
+    found = {f.name: f for f in Library(("trig", "products")).features(("x", "v"), (True, True))}
+    x = np.array([[0.5, -2.0], [1.5, 3.0]])
+    assert found["v cos(x)"].values(x) == pytest.approx(x[:, 1] * np.cos(x[:, 0]))
+    assert found["v^2"].values(x).tolist() == [4.0, 9.0]
+
+
+def test_a_registered_function_is_a_feature() -> None:
+    register_function("cube", lambda x: x**3)
+    library = library_of(("cube",), "cart", ())
+    found = {f.name: f for f in library.features(("x",), (True,))}
+    assert found["cube(x)"].values(np.array([[2.0]])).tolist() == [8.0]
+
+
+@pytest.mark.parametrize("entry", ["sines", "trig(", "tan", ""])
+def test_an_unknown_kind_is_refused_with_what_there_is(entry: str) -> None:
+    with pytest.raises(ConfigError, match="expected 'trig'"):
+        library_of((entry,), "cart", ())
+
+
+@pytest.mark.parametrize("name", ["trig", "two words", "cos", "products"])
+def test_a_function_needs_a_name_of_its_own(name: str) -> None:
+    with pytest.raises(ConfigError, match="identifier"):
+        register_function(name, np.abs)
+
+
+def test_an_entry_may_be_for_one_type_or_one_property() -> None:
+    entries = ("cart:products", "trig(th)")
+    assert library_of(entries, "cart", ()) == Library(("products", "trig"), ("th",))
+    assert library_of(entries, "pole", ()) == Library(("trig",), ("th",))
+    assert library_of(("trig",), "pole", ("phi",)) == Library(("trig",), ("phi",))
+
+
+def test_features_are_columns_behind_those_that_a_row_holds() -> None:
+    slots = SlotSignature((CART, PUSH), library=Library(("products",)))
+    assert len(slots.columns) == 3
+    assert slots.named(slots.column(0, "x v")) == "x v"
+    x = np.array([[2.0, 3.0, 1.0]])
+    assert slots.matrix(x, [0, slots.column(0, "x v")]).tolist() == [[2.0, 6.0]]
+    order, stages = slots.preference(Target("cart", "v"))
+    assert [slots.named(int(k)) for k in order[:3]] == ["v", "x", "action.a"]
+    assert stages == (3, 9)
+
+
+def test_reward_is_no_cause_and_has_none_of_its_own() -> None:
+    slots = SlotSignature((CART, PUSH, ObjectType(TASK, ("reward",))), library=Library(("products",)))
+    order, _ = slots.preference(Target("cart", "v"))
+    assert not any("reward" in slots.named(int(k)) for k in order)
+
+
+@given(st.lists(st.tuples(*[st.floats(-3.0, 3.0)] * 3), min_size=1, max_size=9))
+def test_one_row_and_many_give_the_same_bits(rows: list[tuple[float, float, float]]) -> None:
+    slots = SlotSignature((CART, PUSH), library=Library(("trig", "degree3")))
+    own = Role("cart", (("cos(3 x)", -0.0025), ("v", 1.0), ("x v action.a", 0.3)))
+    binding = bind(Mode(1, Target("cart", "v"), (own,), 0.1), slots)
+    assert binding is not None
+    x = np.array(rows)
+    assert binding.values(x)[:, 0].tolist() == [binding.value(list(row)) for row in rows]
+    assert binding.values_as(x, ()).tolist() == binding.values(x)[:, 0].tolist()
+
+
+def test_a_mode_stands_aside_where_its_feature_lacks_an_object() -> None:
+    own = Role("cart", (("v action.a", 1.0),))
+    mode = Mode(1, Target("cart", "v"), (own,), 0.0)
+    assert bind(mode, SlotSignature((CART,), library=Library(("products",)))) is None

@@ -1,0 +1,116 @@
+"""What isn't explained is called so, with what would explain it; approximations and laws are told apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from points import formulas, learned, schema_of, transitions
+
+from relgym.model.prediction import Outcome
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Transition
+
+SCHEMA = schema_of(("x", "v"), ("a",))
+
+
+def hills(n: int, seed: int = 0) -> list[Transition]:
+    """The slope under a car is a sine of where it is; x is drawn anew, so that only v is a matter of law."""
+    rng = np.random.default_rng(seed)
+    starts = np.column_stack([rng.uniform(-3.0, 3.0, n), rng.normal(size=n)])
+    actions = rng.normal(size=(n, 1))
+    return transitions(
+        SCHEMA, lambda s, u: [s[0] + 1.0, s[1] + 0.1 * u[0] + 0.3 * np.sin(2.0 * s[0])], starts, actions
+    )
+
+
+def dice(n: int) -> list[Transition]:
+    """What follows has nothing to do with what was."""
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=n).tolist()
+    return transitions(
+        SCHEMA, lambda s, u: [s[0], noise.pop()], rng.normal(size=(n, 2)), rng.normal(size=(n, 1))
+    )
+
+
+@pytest.fixture(scope="module")
+def plain() -> WorldModel:
+    return learned(SCHEMA, hills(300))
+
+
+def test_a_curve_has_no_linear_law(plain: WorldModel) -> None:
+    assert plain.modes("self", "v") == ()
+    assert formulas(plain, "x") == ["x' = x + 1"]
+
+
+def test_its_outcome_says_so(plain: WorldModel) -> None:
+    scene = hills(1, seed=5)[0].before
+    prediction = plain.predict_one(scene)
+    assert prediction["self", "v"].outcome is Outcome.UNEXPLAINED
+    assert prediction["self", "x"].ok
+    layout = scene.layout
+    batch = plain.predict_batch(layout, scene.vector[None])
+    assert batch.vectors[0].tolist() == prediction.scene.vector.tolist()
+
+
+def test_the_advice_names_the_smallest_library_that_explains_it(plain: WorldModel) -> None:
+    (advice,) = plain.advice()
+    assert (advice.target, advice.features) == ("self.v", ("trig",))
+    assert advice.law == "v' = v + 0.1 action.a + 0.3 sin(2 x)"
+    assert advice.remains < 1e-6
+    assert "ModelConfig(features=('trig',)) explains it" in plain.describe()
+
+
+def test_taken_it_gives_the_law() -> None:
+    model = learned(SCHEMA, hills(300), features=("trig",))
+    assert formulas(model, "v") == ["v' = v + 0.3 sin(2 x) + 0.1 action.a"]
+    assert model.advice() == ()
+
+
+def test_a_linear_law_wins_where_it_is_enough() -> None:
+    rng = np.random.default_rng(0)
+    steps = transitions(
+        SCHEMA,
+        lambda s, u: [s[0] + 0.1 * s[1], 0.9 * s[1] + u[0]],
+        rng.normal(size=(200, 2)),
+        rng.normal(size=(200, 1)),
+    )
+    model = learned(SCHEMA, steps, features=("trig", "products"))
+    assert formulas(model, "x") == ["x' = x + 0.1 v"]
+    assert formulas(model, "v") == ["v' = 0.9 v + action.a"]
+
+
+def test_what_no_library_explains_is_called_that() -> None:
+    model = learned(SCHEMA, dice(300))
+    (advice,) = model.advice()
+    assert advice.features == ()
+    assert "no library of features that was tried explains it" in str(advice)
+    assert model.modes("self", "v") == ()
+
+
+def test_too_few_examples_are_no_reason_for_advice() -> None:
+    assert learned(SCHEMA, hills(60)).advice() == ()
+
+
+def test_a_small_curve_drawn_at_random_counts_as_noise_and_is_told() -> None:
+    rng = np.random.default_rng(0)
+    starts = np.column_stack([rng.normal(size=400), rng.normal(size=400)])
+    steps = transitions(
+        SCHEMA,
+        lambda s, u: [s[0], s[1] + u[0] + 0.002 * np.sin(3.0 * s[1])],
+        starts,
+        rng.normal(size=(400, 1)),
+    )
+    model = learned(SCHEMA, steps)
+    clusterer = model.property_model("self", "v").clusterer
+    assert clusterer.scale.sigma == pytest.approx(0.002 / 2**0.5, rel=0.3)
+    assert "± 0.0014" in model.describe()
+
+
+def test_a_model_without_history_gives_no_advice(
+    plain: WorldModel, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.mktemp("models") / "hills.json"
+    plain.save(path)
+    again = WorldModel.load(path)
+    assert again.advice() == ()
+    assert again.predict_one(hills(1, seed=5)[0].before)["self", "v"].outcome is Outcome.UNEXPLAINED
