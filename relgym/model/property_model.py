@@ -227,9 +227,8 @@ class PropertyModel(ModeFunctions):
     def example(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Example:
         """What the classifiers are shown of a single scene; arguments as of `predict_one`."""
         situation = percept.situation(index)
-        x = percept.rows(
-            index, following[None], ordered=False
-        )  # conditions are of objects alone of their type
+        # Conditions are of objects alone of their type, so their order doesn't matter.
+        x = percept.rows(index, following[None], ordered=False)
         return replace(self._shown(situation, x), key=situation.keys[0])
 
     def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
@@ -237,9 +236,8 @@ class PropertyModel(ModeFunctions):
         first = situation.examples[0]
         if not self.conditions.pairs:
             return first
-        return replace(
-            first, own=np.concatenate([first.own, self.conditions.values(situation.signature, x)[0]])
-        )
+        ahead = self.conditions.values(situation.signature, x)[0]
+        return replace(first, own=np.concatenate([first.own, ahead]))
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.

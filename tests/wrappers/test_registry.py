@@ -70,7 +70,7 @@ def test_any_env_is_wrapped_and_says_what_it_says_bare(name: str) -> None:
     env.close()
 
 
-@pytest.mark.parametrize("name", ["CartPole-v1", "Pendulum-v1", "Blackjack-v1"])
+@pytest.mark.parametrize("name", ["CartPole-v1", "Pendulum-v1", "Blackjack-v1", "CliffWalking-v1"])
 def test_the_checker_says_the_same_as_bare(name: str) -> None:
     _check(name)
 
