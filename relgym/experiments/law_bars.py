@@ -92,8 +92,10 @@ def _rooms(seeds: Sequence[int]) -> Rows:
                     rng=np.random.default_rng([TESTS[0], seed]),
                     steps=400,
                 )
-                values.append(score(model, found).bad)
-            measures.append(measured(f"laws of {experiment}, {objects} objects: of {400 * count}", 0, values))
+                values.append(score(model, found))
+            name = f"laws of {experiment}, {objects} objects"
+            measures.append(measured(f"{name}: wrong of {400 * count}", 0, [s.wrong for s in values]))
+            measures.append(measured(f"{name}: silent of {400 * count}", 0, [s.silent for s in values]))
     return "rooms never seen", [*measures, *scaling()], []
 
 
