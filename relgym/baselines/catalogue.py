@@ -30,8 +30,8 @@ _T = TypeVar("_T")
 
 
 def installed(among: Mapping[str, Baseline[Any]]) -> tuple[str, ...]:
-    """Names of those whose library is installed."""
-    return tuple(name for name, known in among.items() if find_spec(known.library) is not None)
+    """Names of those whose package is installed."""
+    return tuple(name for name, known in among.items() if find_spec(known.package) is not None)
 
 
 def make_regressor(

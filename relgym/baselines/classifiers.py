@@ -107,7 +107,7 @@ CLASSIFIERS: Final[Mapping[str, Baseline[Classifier]]] = {
             "Hoeffding tree (river)",
             _hoeffding_classifier,
             grid("grace_period", 200, 50, 100, 500),
-            library="river",
+            package="river",
         ),
     )
 }

@@ -59,7 +59,7 @@ class Baseline(Generic[_T]):
     change
         Whether it is taught the change of a value rather than the value: today's habit, and kind to all that don't
         extrapolate. Linear ones don't care.
-    library
+    package
         Import name of what it needs.
     """
 
@@ -68,7 +68,7 @@ class Baseline(Generic[_T]):
     make: Callable[[Setting, Columns, np.random.Generator], _T]
     settings: tuple[Setting, ...] = ({},)
     change: bool = False
-    library: str = "sklearn"
+    package: str = "sklearn"
 
 
 def seed_of(rng: np.random.Generator) -> int:

@@ -218,7 +218,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
                 {"hidden": 128, "train_steps": 100, "learning_rate": 3e-3},
             ),
             change=True,
-            library="torch",
+            package="torch",
         ),
         Baseline[Regressor](
             "interactions",
@@ -231,7 +231,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
                 {"hidden": 128, "learning_rate": 3e-3},
             ),
             change=True,
-            library="torch",
+            package="torch",
         ),
         Baseline[Regressor](
             "amrules",
@@ -239,7 +239,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
             _rules,
             grid("n_min", 200, 50, 100, 500),
             change=True,
-            library="river",
+            package="river",
         ),
         Baseline[Regressor](
             "hoeffding",
@@ -247,7 +247,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
             _hoeffding,
             grid("grace_period", 200, 50, 100, 500),
             change=True,
-            library="river",
+            package="river",
         ),
     )
 }

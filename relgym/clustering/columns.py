@@ -53,18 +53,18 @@ class SlotSignature:
     chained
         The same for pairs among which the order is still to be found: columns only of the target itself, of bodiless
         objects, and, for reward and termination, of any object that is alone of its type.
-    library
+    nonlinear
         Non-linear features offered.
     """
 
     types: tuple[ObjectType, ...]
     given: tuple[tuple[str, str], ...] = ()
     chained: tuple[tuple[str, str], ...] = ()
-    library: Library = NO_FEATURES
+    nonlinear: Library = NO_FEATURES
 
     @cached_property
     def _hash(self) -> int:
-        return hash((self.types, self.given, self.chained, self.library))
+        return hash((self.types, self.given, self.chained, self.nonlinear))
 
     def __hash__(self) -> int:
         return self._hash
@@ -93,7 +93,7 @@ class SlotSignature:
             if (self.types[self.columns[k].slot].name != TASK) and (self.columns[k].slot or not task)
         ]
         own = [self.columns[k].slot == 0 or task for k in offered]
-        found = self.library.features([self.named(k) for k in offered], own)
+        found = self.nonlinear.features([self.named(k) for k in offered], own)
         return tuple(feature.moved(offered) for feature in found)
 
     def named(self, index: int) -> str:

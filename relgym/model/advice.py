@@ -134,7 +134,7 @@ def _try(
     rows = rows[ids == ids[-1]]
     known = table.signatures[int(ids[-1])]
     slots: SlotSignature = replace(
-        known, library=library_of(kinds, known.types[0].name, known.types[0].angles)
+        known, nonlinear=library_of(kinds, known.types[0].name, known.types[0].angles)
     )
     order, stages = slots.preference(model.target)
     order = order[: stages[min(1, len(stages) - 1)]]

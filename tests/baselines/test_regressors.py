@@ -33,7 +33,7 @@ def _taught(model: object, x: np.ndarray, y: np.ndarray) -> None:
         model.learn_one(row, values)  # type: ignore[attr-defined]
 
 
-LIGHT = sorted(name for name, known in REGRESSORS.items() if known.library != "torch")
+LIGHT = sorted(name for name, known in REGRESSORS.items() if known.package != "torch")
 
 
 @pytest.mark.parametrize(

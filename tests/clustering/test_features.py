@@ -81,7 +81,7 @@ def test_an_entry_may_be_for_one_type_or_one_property() -> None:
 
 
 def test_features_are_columns_behind_those_that_a_row_holds() -> None:
-    slots = SlotSignature((CART, PUSH), library=Library(("products",)))
+    slots = SlotSignature((CART, PUSH), nonlinear=Library(("products",)))
     assert len(slots.columns) == 3
     assert slots.named(slots.column(0, "x v")) == "x v"
     x = np.array([[2.0, 3.0, 1.0]])
@@ -92,14 +92,14 @@ def test_features_are_columns_behind_those_that_a_row_holds() -> None:
 
 
 def test_reward_is_no_cause_and_has_none_of_its_own() -> None:
-    slots = SlotSignature((CART, PUSH, ObjectType(TASK, ("reward",))), library=Library(("products",)))
+    slots = SlotSignature((CART, PUSH, ObjectType(TASK, ("reward",))), nonlinear=Library(("products",)))
     order, _ = slots.preference(Target("cart", "v"))
     assert not any("reward" in slots.named(int(k)) for k in order)
 
 
 @given(st.lists(st.tuples(*[st.floats(-3.0, 3.0)] * 3), min_size=1, max_size=9))
 def test_one_row_and_many_give_the_same_bits(rows: list[tuple[float, float, float]]) -> None:
-    slots = SlotSignature((CART, PUSH), library=Library(("trig", "degree3")))
+    slots = SlotSignature((CART, PUSH), nonlinear=Library(("trig", "degree3")))
     own = Role("cart", (("cos(3 x)", -0.0025), ("v", 1.0), ("x v action.a", 0.3)))
     binding = bind(Mode(1, Target("cart", "v"), (own,), 0.1), slots)
     assert binding is not None
@@ -111,4 +111,4 @@ def test_one_row_and_many_give_the_same_bits(rows: list[tuple[float, float, floa
 def test_a_mode_stands_aside_where_its_feature_lacks_an_object() -> None:
     own = Role("cart", (("v action.a", 1.0),))
     mode = Mode(1, Target("cart", "v"), (own,), 0.0)
-    assert bind(mode, SlotSignature((CART,), library=Library(("products",)))) is None
+    assert bind(mode, SlotSignature((CART,), nonlinear=Library(("products",)))) is None
