@@ -1,0 +1,230 @@
+"""What the model of one target answers: votes, roles filled, and the value (§3.6)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.examples import Example
+from relgym.classification.mode_classifier import ModeClassifier
+from relgym.classification.ranking import RankingBatch
+from relgym.clustering.clusterer import ModeClusterer
+from relgym.clustering.columns import SlotSignature
+from relgym.clustering.roles import Binding
+from relgym.config import ModelConfig
+from relgym.model.casting import Casting
+from relgym.model.conditions import Conditions
+from relgym.model.functions import ModeFunctions, Verdict
+from relgym.model.grouping import distinct, members
+from relgym.model.limits import Limits
+from relgym.model.perception import Percept, Situation
+from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.model.spread import Spreads, action_columns
+
+__all__ = ["Answers"]
+
+_PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
+    OUTCOMES.index(o)
+    for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
+)
+
+
+class Answers(ModeFunctions):
+    """Predicts one target, in single scenes and in many, from what others have learned.
+
+    Parameters
+    ----------
+    clusterer, classifier, casting
+        Who knows the modes, when each holds, and who plays their roles.
+    conditions
+        Next values that clauses may test.
+    config
+        Free parameters.
+
+    Attributes
+    ----------
+    spreads
+        How far examples scatter about their modes.
+    limits
+        Which modes are limits: they take no part in the vote but cut off what its winner predicts.
+    """
+
+    def __init__(
+        self,
+        clusterer: ModeClusterer,
+        classifier: ModeClassifier,
+        casting: Casting,
+        conditions: Conditions,
+        config: ModelConfig,
+    ) -> None:
+        super().__init__(clusterer, casting, config)
+        self.classifier = classifier
+        self.conditions = conditions
+        self.spreads = Spreads()
+        self.limits = Limits()
+        self._unexplained = False
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether it is known by now that modes don't describe the target, or just some of its examples."""
+        return self._unexplained
+
+    def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
+        """What every mode would predict, in the order of ``classifier.modes``; NaN where its roles are open.
+
+        Arguments as of `predict_one`.
+        """
+        x = percept.rows(index, following[None])[0].tolist()
+        return self._values_one(percept.situation(index).signature, x, self.classifier.modes)
+
+    def example(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Example:
+        """What the classifiers are shown of a single scene; arguments as of `predict_one`."""
+        situation = percept.situation(index)
+        # Conditions are of objects alone of their type, so their order doesn't matter.
+        x = percept.rows(index, following[None], ordered=False)
+        return replace(self._shown(situation, x), key=situation.keys[0])
+
+    def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
+        """`example` without the key, by which examples are kept and not classified."""
+        first = situation.examples[0]
+        if not self.conditions.pairs:
+            return first
+        ahead = self.conditions.values(situation.signature, x)[0]
+        return replace(first, own=np.concatenate([first.own, ahead]))
+
+    def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
+        """Predict for one object of a single scene; the caller fills in names.
+
+        Parameters
+        ----------
+        percept
+            The scene.
+        index
+            The object.
+        following
+            Next values predicted so far, shape ``(width,)``.
+        """
+        situation = percept.situation(index)
+        outcome = Outcome.UNEXPLAINED if self._unexplained else Outcome.NO_MODE
+        nothing = Prediction("", "", float("nan"), outcome)
+        if self._unexplained or not self.classifier.modes:
+            return nothing
+        casts = self._casts(situation.signature)
+        row = percept.rows(index, following[None], ordered=casts)
+        x, example = row[0].tolist(), self._shown(situation, row)
+        ranking = self.classifier.rank(
+            example, self._values_one(situation.signature, x, self.classifier.modes)
+        )
+        if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
+            return replace(nothing, outcome=Outcome.OUTSIDE)
+        layout, order = percept.layout, situation.order[0] if casts else situation.plain
+        for place, mode in enumerate(ranking.modes):
+            binding = self._binding(situation.signature, mode)
+            if binding is None:
+                continue
+            slots: tuple[int, ...] | None = ()
+            if binding.open:
+                slots = self._cast(mode, binding, example, order, layout)
+            if slots is None:
+                if not self.config.abstain:
+                    continue
+                # What lost the vote doesn't become likely because the winner's players are in doubt.
+                return replace(nothing, outcome=Outcome.OUTSIDE)
+            rest = iter(slots)
+            played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
+            roles = tuple(layout.names[order[s]] for s in played)
+            margin = ranking.margin if place == 0 else 0.0
+            found = Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
+            found = self.limits.cut_off(found)
+            action = tuple(x[k] for k in action_columns(situation.signature).tolist())
+            return replace(found, spread=self.spreads.of(found.mode, action))
+        return replace(nothing, outcome=Outcome.NO_ROLES)
+
+    def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
+        """Predict for one object of n scenes; bit for bit what `predict_one` gives.
+
+        Parameters
+        ----------
+        percept
+            The scenes.
+        index
+            The object.
+        following
+            Next values predicted so far, shape ``(n, width)``.
+        """
+        n = len(percept)
+        verdict = Verdict(
+            np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.full(n, _NO_MODE, dtype=np.int8), np.zeros(n)
+        )
+        modes = self.classifier.modes
+        if self._unexplained:
+            verdict.outcomes[:] = _UNEXPLAINED
+        if self._unexplained or not modes:
+            return verdict
+        situation = percept.situation(index)
+        x = percept.rows(index, following, ordered=self._casts(situation.signature))
+        ranking = self._rank_batch(situation, x)
+        verdict.outcomes[:] = _NO_ROLES
+        waiting = np.ones(n, dtype=bool)
+        if self.config.abstain and len(modes) > 1:
+            waiting = ranking.seen.copy()
+            verdict.outcomes[~waiting] = _OUTSIDE
+        for place in range(len(modes)):
+            for mode in np.unique(ranking.modes[waiting, place]):
+                binding = self._binding(situation.signature, int(mode))
+                if binding is None:
+                    continue
+                part = np.flatnonzero(waiting & (ranking.modes[:, place] == mode))
+                done, values = self._apply(int(mode), binding, percept, situation, x, part)
+                verdict.values[done], verdict.modes[done] = values, mode
+                verdict.outcomes[done] = _PREDICTED
+                verdict.margins[done] = ranking.margin[done] if place == 0 else 0.0
+                waiting[done] = False
+                if self.config.abstain:  # in doubt about the players
+                    verdict.outcomes[part[waiting[part]]] = _OUTSIDE
+                    waiting[part] = False
+            if not waiting.any():
+                break
+        self.limits.cut_off_all(verdict.values, verdict.modes)
+        return verdict
+
+    def _apply(
+        self,
+        mode: int,
+        binding: Binding,
+        percept: Percept,
+        situation: Situation,
+        x: NDArray[np.float64],
+        part: NDArray[np.intp],
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Those of the given examples whose roles can be filled, and the mode's values there."""
+        if not binding.open:
+            return part, binding.values(x[part])[:, 0]
+        examples, order = situation.examples, situation.order
+        done, values = np.zeros(len(part), dtype=np.bool_), np.full(len(part), np.nan)
+        # Players depend on the relations and the order alone: one search for all scenes that share them.
+        first, which = distinct(examples.table[part], order[part])
+        for i, alike in zip(part[first].tolist(), members(which), strict=True):
+            slots = self._cast(mode, binding, examples[i], order[i], percept.layout)
+            if slots is not None:
+                done[alike], values[alike] = True, binding.values_as(x[part[alike]], slots)
+        return part[done], values[done]
+
+    def _casts(self, signature: SlotSignature) -> bool:
+        """Whether some mode has a role that several objects could play."""
+        bindings = (self._binding(signature, mode) for mode in self.classifier.modes)
+        return any(binding is not None and bool(binding.open) for binding in bindings)
+
+    def _rank_batch(self, situation: Situation, x: NDArray[np.float64]) -> RankingBatch:
+        """Rank the modes for n examples; a single mode has no rival and needs no look at the scene."""
+        modes, n = self.classifier.modes, len(x)
+        if len(modes) == 1:
+            sure = np.ones(n, dtype=np.bool_)
+            return RankingBatch(np.full((n, 1), modes[0]), np.zeros((n, 1)), np.full(n, np.inf), sure, sure)
+        shown = situation.glimpse(self.classifier.relations)
+        if self.conditions.pairs:
+            ahead = self.conditions.values(situation.signature, x)
+            shown = replace(shown, own=np.concatenate([shown.own, ahead], axis=1))
+        return self.classifier.rank_batch(shown, self._values(situation.signature, x, modes))
