@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_action
-from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
-from relgym.model.world_model import WorldModel
 from relgym.wrappers.follower import BadObservations
+from relgym.wrappers.learning import Learning
 from relgym.wrappers.observer import Observer
-from relgym.wrappers.prequential import Prequential, StepReport
+from relgym.wrappers.prequential import StepReport
 from relgym.wrappers.settings import PlainTarget
 from relgym.wrappers.study import NOTHING
 from relgym.wrappers.views import ViewLike, chosen_view
@@ -27,7 +26,7 @@ from relgym.wrappers.views import ViewLike, chosen_view
 __all__ = ["VectorModelLearner", "info_at"]
 
 
-class VectorModelLearner(gym.vector.VectorWrapper[Any, Any, Any, Any, Any]):
+class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, Any]):
     """Learns one `WorldModel` from n envs at once; what they return stays as it is.
 
     The envs' transitions are taken up one after the other, in their order, as if one env had made them all: predict,
@@ -166,49 +165,6 @@ class VectorModelLearner(gym.vector.VectorWrapper[Any, Any, Any, Any, Any]):
 
     def _single(self, observations: Any) -> list[Any]:
         return list(iterate(self.observation_space, observations))
-
-    # ------------------------------------------------------------------ learning
-    @property
-    def view(self) -> View:
-        """How observations and actions become scenes; final after the first reset, where angles are open."""
-        return self._observer.view
-
-    @property
-    def model(self) -> WorldModel:
-        """What was learned from all envs together."""
-        return self._observer.study.model
-
-    @property
-    def prequential(self) -> Prequential:
-        """How many predictions were wrong, in total and lately; a step of one env counts as one."""
-        return self._observer.study.prequential
-
-    @property
-    def learning(self) -> bool:
-        """Whether transitions are being learned from."""
-        return self._observer.study.learning
-
-    @learning.setter
-    def learning(self, learn: bool) -> None:
-        self._observer.study.learning = learn
-
-    @property
-    def skipped(self) -> int:
-        """How many bad observations were skipped."""
-        return self._observer.skipped
-
-    @property
-    def dropped(self) -> int:
-        """How many transitions found the queue to the background process full."""
-        return self._observer.study.dropped
-
-    def catch_up(self) -> WorldModel:
-        """Wait until the background process has learned all it was sent; the model as it then is."""
-        return self._observer.study.catch_up()
-
-    def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
-        """Write model, spaces, view and some first scenes to one file, as `ModelLearner.save`."""
-        self._observer.save(path, history=history)
 
 
 def info_at(infos: Mapping[str, Any], k: int) -> dict[str, Any]:
