@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.clustering.approximation import LEFT, approximate
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.features import library_of
+from relgym.clustering.features import MOST_FEATURES, library_of
 from relgym.clustering.mode import NOISE, sum_text
 from relgym.model.parts import Parts
 from relgym.model.property_model import PropertyModel
@@ -136,6 +136,8 @@ def _try(
     slots: SlotSignature = replace(
         known, nonlinear=library_of(kinds, known.types[0].name, known.types[0].angles)
     )
+    if slots.library_size > MOST_FEATURES:
+        return None
     order, stages = slots.preference(model.target)
     order = order[: stages[min(1, len(stages) - 1)]]
     x, y = slots.matrix(table.x[clusterer.rows[rows]], order), clusterer.y[rows]
