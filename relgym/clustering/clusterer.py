@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.approximation import LEFT, LEFT_LINEAR, approximate
 from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
+from relgym.clustering.last_resort import last_resort
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
@@ -29,9 +29,6 @@ ESTIMATE_AT = (64, 512, 4096)
 
 APPROXIMATE_AT = (256, 1024, 4096, 16384)
 """Numbers of examples after which an approximation is sought, if most of them are unexplained."""
-
-MOST_ROWS, MANY_FEATURES = 1500, 200
-"""At most so many rows determine an approximation; it may have twice as many terms if there are so many columns."""
 
 LEAST_MEMBERS = 4
 """Examples that a mode of another model must explain here to be taken over."""
@@ -239,25 +236,13 @@ class ModeClusterer(Population):
         return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
 
     def _approximate(self, table: ExampleTable) -> None:
-        recent = np.arange(max(0, len(self._log) - MOST_ROWS), len(self._log))
-        signature = int(table.signature_ids[self.rows[-1]])
-        recent = recent[table.signature_ids[self.rows[recent]] == signature]
-        slots = table.signatures[signature]
-        order, stages = slots.preference(self.target)
-        order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
-        terms = self.config.max_terms * (2 if len(order) > MANY_FEATURES else 1)
-        x, y = slots.matrix(table.x[self.rows[recent]], order), self.y[recent]
-        left = LEFT if slots.features else LEFT_LINEAR
-        stds = self.scale.inlier_stds
-        present = slots.present(table.x[self.rows[recent]], self.target)
-        found = approximate(x, y, present, floor=self.floor, terms=terms, stds=stds, left=left)
-        explained = 2 * self.noise_examples <= self._log.seen
-        if found is None or (explained and found.sigma > 0.5 * self.scale.sigma):
+        found = last_resort(self, table, floor=self.floor, again=self.approximate)
+        if found is None:
             return
         self._spread, self.approximate = found.sigma, True
         self.scale = replace(self.scale, sigma=max(self.floor, found.sigma))
         self._start_over()
-        self._adopt(table, signature, reordered(found.fit, order), recent[found.inliers])
+        self._adopt(table, found.signature, found.fit, found.members)
 
     def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
         """Noise examples of one signature that aren't some mode's tail, oldest first."""
