@@ -206,7 +206,8 @@ class ModeClusterer(Population):
         signature = int(table.signature_ids[self.rows[example]])
         search = self._searches.setdefault(signature, _Search())
         search.waiting += 1
-        if search.waiting <= self._patience(search, bool(table.signatures[signature].features)):
+        slots = table.signatures[signature]
+        if search.waiting <= self._patience(search, bool(slots.features or slots.chained)):
             return
         for _ in range(MOST_DISCOVERIES):
             pool = self._pool(table, signature)
@@ -218,11 +219,14 @@ class ModeClusterer(Population):
             search.failures = 0
         search.waiting = 0
 
-    def _patience(self, search: _Search, wide: bool) -> int:
-        """News to wait for until the next search: the more, the oftener it was in vain and the dearer it is."""
+    def _patience(self, search: _Search, doubtful: bool) -> int:
+        """News to wait for until the next search: the more, the oftener it was in vain.
+
+        It is longer where searches are dear, for features, or may be in vain, since nobody said that there are laws.
+        """
         if self.approximate:  # what an approximation leaves is mostly its own tail
             return search.failures * search.failures
-        return search.failures if wide else search.failures // 6
+        return search.failures if doubtful else search.failures // 6
 
     def _hopeless(self) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""

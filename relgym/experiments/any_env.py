@@ -93,7 +93,7 @@ def _one_step(setting: Setting, seeds: Pairs, *, quick: bool) -> list[Measure]:
         model = _model(study, setting, lesson, verbose=not number)
         for what, value in _judged(study, model, fresh).items():
             found.setdefault((what, setting.bar), []).append(value)
-        for prop, term, value in study.weights:
+        for prop, term, value in () if setting.pumped else study.weights:
             off = abs(weight(model, prop, term) / value - 1.0)
             found.setdefault((f"{prop}: {value:g} {term}, off by", 0.01), []).append(off)
     return [measured(what, bar, values) for (what, bar), values in found.items()]
