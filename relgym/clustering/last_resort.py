@@ -24,11 +24,10 @@ BETTER = 0.95
 
 @dataclass(frozen=True, slots=True)
 class LastResort:
-    """An approximation: the signature of its columns, the function on them, its examples, and what it leaves."""
+    """An approximation: the signature of its columns, the function on them, and what it leaves of its examples."""
 
     signature: int
     fit: LinearFit
-    members: NDArray[np.intp]
     sigma: float
 
 
@@ -71,7 +70,7 @@ def last_resort(
             return None
     elif 2 * population.noise_examples <= population.seen and found.sigma > 0.5 * population.scale.sigma:
         return None
-    return LastResort(signature, reordered(found.fit, order), recent[found.inliers], found.sigma)
+    return LastResort(signature, reordered(found.fit, order), found.sigma)
 
 
 def _reach(errors: NDArray[np.float64]) -> float:
