@@ -33,6 +33,9 @@ EQUAL, CLOSE = 3.0, 1.5
 LEAST, ROWS, UNEXPLAINED = 100, 1000, 0.1
 """Fewer examples than this say nothing; the newest so many are looked at; so large a share of noise needs advice."""
 
+ROUGH = 4.0
+"""So many times the rounding noise can't be rounding."""
+
 _EXACT, FINE = 1e-5, 1e-3
 """Shares of the change that count as nothing, and as nothing to be mended."""
 
@@ -100,19 +103,27 @@ def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
     recent = np.arange(max(0, len(clusterer.y) - ROWS), len(clusterer.y))
     noise = float((clusterer.labels[recent] == NOISE).mean())
     change = clusterer.y[recent] - _present(model, table, recent)
-    left = (
-        min(1.0, clusterer.scale.sigma / max(float(change.std()), 1e-300)) if clusterer.approximate else 1.0
-    )
-    if left <= FINE or (noise <= UNEXPLAINED and not clusterer.approximate):
+    rough = clusterer.approximate or _supposed(model, table)
+    left = min(1.0, clusterer.scale.sigma / max(float(change.std()), 1e-300)) if rough else 1.0
+    if left <= FINE or (noise <= UNEXPLAINED and not rough):
         return None
     known = frozenset(model.config.features)
     trials = [_try(model, table, recent, kinds) for kinds in LIBRARIES if not known.issuperset(kinds)]
     if min((t.left for t in trials if t is not None), default=1.0) > GOOD:
         trials.append(_try(model, table, recent, LAST_RESORT))
     best = _choose([t for t in trials if t is not None], left)
-    if best is None:
-        return Advice(str(model.target), noise, left, (), "", 1.0)
-    return Advice(str(model.target), noise, left, best.features, best.law, best.left)
+    if best is not None:
+        return Advice(str(model.target), noise, left, best.features, best.law, best.left)
+    if noise <= UNEXPLAINED and not clusterer.approximate:
+        return None  # it is noise indeed
+    return Advice(str(model.target), noise, left, (), "", 1.0)
+
+
+def _supposed(model: PropertyModel, table: ExampleTable) -> bool:
+    """Whether a noise is supposed, in a world that nobody described, that may be a curve for features to follow."""
+    clusterer = model.clusterer
+    described = not table.signatures[int(table.signature_ids[clusterer.rows[-1]])].chained
+    return not described and clusterer.scale.sigma > ROUGH * clusterer.floor
 
 
 def advices(parts: Parts) -> tuple[Advice, ...]:

@@ -104,6 +104,9 @@ def test_a_small_curve_drawn_at_random_counts_as_noise_and_is_told() -> None:
     clusterer = model.property_model("self", "v").clusterer
     assert clusterer.scale.sigma == pytest.approx(0.002 / 2**0.5, rel=0.3)
     assert "± 0.0014" in model.describe()
+    (advice,) = model.advice()
+    assert advice.features == ("trig",)
+    assert "0.002 sin(3 v)" in advice.law
 
 
 def test_a_model_without_history_gives_no_advice(
