@@ -17,7 +17,7 @@ from relgym.clustering.discovery import likeness
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, forward_stepwise
 
-__all__ = ["LEFT", "LEFT_LINEAR", "NEARLY_ALL", "Approximation", "approximate", "terms_of"]
+__all__ = ["LEFT", "LEFT_LINEAR", "NEARLY_ALL", "NORMAL", "Approximation", "approximate", "terms_of"]
 
 LEFT, LEFT_LINEAR = 0.1, 0.01
 """Largest share of the change's standard deviation that an approximation may leave: with features that were asked

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.approximation import LEFT, approximate, terms_of
+from relgym.clustering.approximation import LEFT, NEARLY_ALL, NORMAL, approximate, terms_of
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.features import MOST_FEATURES, library_of
@@ -104,7 +104,7 @@ def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
     noise = float((clusterer.labels[recent] == NOISE).mean())
     change = clusterer.y[recent] - _present(model, table, recent)
     rough = clusterer.approximate or _supposed(model, table)
-    left = min(1.0, clusterer.scale.sigma / max(float(change.std()), 1e-300)) if rough else 1.0
+    left = min(1.0, _remains(model, table, recent) / max(float(change.std()), 1e-300)) if rough else 1.0
     if left <= FINE or (noise <= UNEXPLAINED and not rough):
         return None
     known = frozenset(model.config.features)
@@ -124,6 +124,14 @@ def _supposed(model: PropertyModel, table: ExampleTable) -> bool:
     clusterer = model.clusterer
     described = not table.signatures[int(table.signature_ids[clusterer.rows[-1]])].chained
     return not described and clusterer.scale.sigma > ROUGH * clusterer.floor
+
+
+def _remains(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> float:
+    """Standard deviation of what the modes leave of nearly all examples, whichever of them is taken."""
+    c = model.clusterer
+    parts = [k.errors(table, c.rows[rows], c.y[rows], c.scale)[0] for k in c.clusters.values()]
+    reach = float(np.quantile(np.min(parts, axis=0), NEARLY_ALL)) / NORMAL if parts else np.inf
+    return max(c.scale.sigma, reach)
 
 
 def advices(parts: Parts) -> tuple[Advice, ...]:
