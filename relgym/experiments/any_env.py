@@ -146,15 +146,13 @@ ROWS: Final = (*SETTINGS, "lander", "stream", "memory")
 """All rows."""
 
 
-def row(name: str, seeds: Pairs, *, quick: bool) -> str:
-    """Measure one row; its table of bars."""
-    others: dict[str, Callable[..., list[Measure]]] = {
-        "lander": flight,
-        "stream": prequential,
-        "memory": memory,
-    }
+def row(name: str, seeds: Pairs, *, quick: bool, steps: int | None = None) -> str:
+    """Measure one row; its table of bars. `steps` is the length of a long life, if not a million."""
+    others: dict[str, Callable[..., list[Measure]]] = {"lander": flight, "stream": prequential}
     if name in others:
         return report(name, others[name](seeds, quick=quick))
+    if name == "memory":
+        return report(name, memory(seeds, quick=quick, steps=steps, bound=steps and steps // 5))
     return report(name, _one_step(SETTINGS[name], seeds, quick=quick))
 
 
@@ -163,6 +161,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("rows", nargs="*", default=list(ROWS), choices=[*ROWS, []])
     parser.add_argument("--seeds", type=int, default=1, help="how many training seeds, each with a test seed")
+    parser.add_argument("--steps", type=int, help="length of the row 'memory', of which a fifth is kept")
     parser.add_argument("--tuning", action="store_true")
     parser.add_argument("--quick", action="store_true")
     given = parser.parse_args(arguments)
@@ -170,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     tests = (TUNING_TEST_SEED,) if given.tuning else TEST_SEEDS
     seeds = [(s, tests[k % len(tests)]) for k, s in enumerate(training[: given.seeds])]
     for name in given.rows or ROWS:
-        print(row(name, seeds, quick=given.quick), "\n", flush=True)
+        print(row(name, seeds, quick=given.quick, steps=given.steps), "\n", flush=True)
 
 
 if __name__ == "__main__":
