@@ -30,6 +30,8 @@ class Args:
     """transitions of fresh episodes to test on"""
     seed: int = 0
     """seed of episodes and actions; tests begin 10,000 later"""
+    features: str = "trig"
+    """what to switch on beside properties, as the default configuration advises; nothing: the default"""
 
 
 def highway() -> gym.Env[Any, Any]:
@@ -48,7 +50,7 @@ def highway() -> gym.Env[Any, Any]:
     )
 
 
-def learner_of(env: gym.Env[Any, Any]) -> ModelLearner:
+def learner_of(env: gym.Env[Any, Any], features: str) -> ModelLearner:
     """The first row is the agent's own car, the others are whoever is near: matched by where they should be."""
     view = TableView(
         env.observation_space,
@@ -59,7 +61,8 @@ def learner_of(env: gym.Env[Any, Any]) -> ModelLearner:
         match={"x": 4.0, "y": 2.0, "vx": 5.0},
         actions=("lane_left", "idle", "lane_right", "faster", "slower"),
     )
-    return ModelLearner(env, view=view, targets=["ego.x", "car.x"])
+    config = {"features": tuple(features.split(",")) if features else ()}
+    return ModelLearner(env, view=view, targets=["ego.x", "car.x"], config=config)
 
 
 def live(env: ModelLearner, steps: int, seed: int) -> dict[str, tuple[list[float], list[float]]]:
@@ -83,11 +86,13 @@ def live(env: ModelLearner, steps: int, seed: int) -> dict[str, tuple[list[float
 
 def main(args: Args) -> None:
     """Learn, print the laws, then test on fresh episodes without learning."""
-    env = learner_of(highway())
+    env = learner_of(highway(), args.features)
     live(env, args.steps, args.seed)
     for target in env.model.targets:
         for mode in env.model.modes(target.type, target.property):
             print(f"{target}: {mode.formula(4)}   ({mode.examples} transitions)")
+    for advice in env.model.advice():
+        print(f"{advice.target}: {advice}")
     env.pause()
     said = live(env, args.test, args.seed + 10_000)
     for target, (errors, changes) in said.items():
