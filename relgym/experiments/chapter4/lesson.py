@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from time import perf_counter
 from typing import Any, Final
 
@@ -132,7 +133,7 @@ def fresh_blocks(experiment: int, tests: Mapping[str, Any]) -> list[Block]:
     return [
         block
         for seed in seeds
-        for block in list(ball_blocks(experiment, seed=seed, blocks=cycle, test=True))[:each]
+        for block in islice(ball_blocks(experiment, seed=seed, blocks=cycle, test=True), each)
     ]
 
 

@@ -105,7 +105,7 @@ def test_a_regressor_of_changes_is_asked_for_values() -> None:
     )
     score = found["scores"][-1]["targets"]["ball.vx"]["all"]
     assert score["wrong"] < 0.2 * score["examples"]
-    assert found["setting"] == {"neighbours": 1, "weights": "uniform"}
+    assert found["setting"] == {"n_neighbors": 1, "weights": "uniform"}
 
 
 def test_classifiers_are_right_where_the_mode_explains() -> None:
