@@ -154,7 +154,8 @@ class ClassificationConfig:
     @classmethod
     def original(cls, **changes: Any) -> ClassificationConfig:
         """The constants of the thesis' own system: FOIL gain, 90 % precision, trees where 25 % of a stage are wrong."""
-        trees = {"clause_tree_threshold": 0.25, "fall_through_tree_threshold": 0.25, "tree_errors": "stage"}
+        trees: dict[str, Any] = {"clause_tree_threshold": 0.25, "fall_through_tree_threshold": 0.25}
+        trees["tree_errors"] = "stage"
         return replace(_THESIS, literal_choice="gain", mdl=False, min_precision=0.9, **(trees | changes))
 
 

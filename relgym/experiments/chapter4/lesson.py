@@ -27,21 +27,30 @@ _BLOCKS_PER_SEED: Final = 40
 
 
 def config_of(learner: str) -> ModelConfig:
-    """Configuration of a learner by name (`relgym.experiments.chapter4.protocol.LEARNERS`).
+    """Configuration of a learner by name (`relgym.experiments.chapter4.protocol`: `LEARNERS`, `ABLATIONS`).
 
     ``"one-polarity"`` is the thesis' learner without §3.4.5: the first mode of a pair is always the positive class.
     """
-    thesis = ModelConfig.thesis()
+    thesis, original = ModelConfig.thesis(), ModelConfig.original()
     known = {
-        "original": ModelConfig.original(),
+        "original": original,
+        "original, trees for rare modes": _with_rules(original, tree_errors="class"),
+        "original, simplest of equals": replace(
+            original, clustering=replace(original.clustering, stickiness="simple")
+        ),
+        "original, contact facts": _with_rules(original, contact_facts=True),
         "thesis": thesis,
-        "one-polarity": replace(thesis, classification=replace(thesis.classification, both_polarities=False)),
+        "one-polarity": _with_rules(thesis, both_polarities=False),
         "world": ModelConfig(frames="world"),
         "default": ModelConfig(),
     }
     if learner not in known:
         raise ConfigError(f"learner {learner!r}: expected one of {sorted(known)}")
     return known[learner]
+
+
+def _with_rules(config: ModelConfig, **changes: Any) -> ModelConfig:
+    return replace(config, classification=replace(config.classification, **changes))
 
 
 def lesson(
