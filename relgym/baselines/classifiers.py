@@ -48,9 +48,10 @@ CLASSIFIERS: Final[Mapping[str, Baseline[Classifier]]] = {
             _fitted(_boosting, seeded=True, scale=False, early_stopping=False),
             (
                 {"learning_rate": 0.1, "max_iter": 50},
-                {"learning_rate": 0.03, "max_iter": 50},
-                {"learning_rate": 0.1, "max_iter": 100},
-                {"learning_rate": 0.03, "max_iter": 100},
+                # Rare modes need the penalty: without one their leaves' values run away.
+                {"learning_rate": 0.1, "max_iter": 50, "l2_regularization": 1.0},
+                {"learning_rate": 0.1, "max_iter": 100, "l2_regularization": 10.0},
+                {"learning_rate": 0.1, "max_iter": 100, "l2_regularization": 1.0, "min_samples_leaf": 5},
             ),
         ),
         Baseline[Classifier](

@@ -15,10 +15,10 @@ from typing import Final
 __all__ = [
     "CLASSIFIER_ERRORS",
     "CONFUSIONS",
-    "LWR",
     "MODES",
+    "RATES",
+    "REMARKS",
     "ROLLOUT_FAILURES",
-    "TRANSFER",
     "Confusion",
     "PublishedClause",
     "PublishedMode",
@@ -176,8 +176,8 @@ REMARKS: Final[Mapping[str, str]] = {
     "figure-4.15": "x 3.6 %, y 1.3 % after 160 blocks",
     "figure-4.16": "no number; the extra modes are accommodated",
     "figure-4.17": "slightly higher than in experiment 2",
-    "figure-4.18": "expecting too little: modes are lost once the noise exceeds it (none learned at 1e-5); expecting 1e-5: "
-    "overgeneral modes",
+    "figure-4.18": "expecting too little, modes are lost once the noise exceeds it (none learned at 1e-5); expecting "
+    "1e-5, they are overgeneral",
     "figure-4.19": "median above our 95th percentile until 128 blocks, then a drop; the third quartile never below the "
     "change",
     "figure-4.20": "uncentred: all three worse than in Figure 4.19",

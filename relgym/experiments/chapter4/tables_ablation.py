@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from relgym.experiments.chapter4.canvas import first_case
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import ABLATIONS, Protocol
 from relgym.experiments.chapter4.published import RATES
@@ -52,7 +53,7 @@ def _worst(parts: Sequence[Mapping[str, Any]]) -> str:
             counts[0] += mode["wrong"]
             counts[1] += mode["examples"]
     name, (errors, examples) = max(wrong.items(), key=lambda item: item[1][0])
-    return f"{name.split(', ')[0]}: {errors} of {examples:,}" if errors else "-"
+    return f"{first_case(name)}: {errors} of {examples:,}" if errors else "-"
 
 
 _NOTE: Final = (
