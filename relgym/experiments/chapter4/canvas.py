@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +18,7 @@ __all__ = [
     "above",
     "canvas",
     "error_axis",
+    "first_case",
     "mean_change",
     "save",
     "text_figure",
@@ -74,6 +76,17 @@ def text_figure(path: Path, text: str) -> None:
 def save(figure: Any, path: Path) -> None:
     """Write a figure as PNG, the same bytes every time."""
     figure.savefig(path, dpi=_DOTS, metadata={"Software": None}, bbox_inches="tight", pad_inches=0.1)
+
+
+def first_case(name: str) -> str:
+    """The first of the cases that make up a mode's name.
+
+    Examples
+    --------
+    >>> first_case("floor (forward, mu 0.2), ceiling (forward, mu 0.2)")
+    'floor (forward, mu 0.2)'
+    """
+    return re.split(r", (?![^(]*\))", name)[0]
 
 
 def above(value: float) -> float:

@@ -1,4 +1,4 @@
-"""Tables and figures whose making is killed again and again are those of an uninterrupted run (real jobs, tiny tasks)."""
+"""Tables and figures whose making is killed again and again are those of an uninterrupted run (small tasks)."""
 
 from __future__ import annotations
 
