@@ -178,9 +178,7 @@ def _with_trees(found: BinaryClassifier, lesson: Lesson, config: ClassificationC
     )
 
 
-def _rate(
-    lesson: Lesson, wrong: _Rows, here: _Rows, suffering: Bools, config: ClassificationConfig
-) -> float:
+def _rate(lesson: Lesson, wrong: _Rows, here: _Rows, suffering: Bools, config: ClassificationConfig) -> float:
     """Share of errors among the examples decided here, or in the class that suffers them if larger.
 
     The second makes rare modes count: 20 among 16,000 are no share to speak of, but may be all there are.

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.chapter4 import comparison, pushing, rolled
 from relgym.experiments.chapter4.lesson import config_of, fresh_blocks, lesson, taught_blocks
+from relgym.experiments.chapter4.protocol import ABLATIONS
 from relgym.experiments.chapter4.rolled import CAUSES, cause_of, trial_blocks
 from relgym.experiments.chapter4.testing import true_modes
 from relgym.experiments.data import BALL_EXPERIMENTS
@@ -74,6 +76,16 @@ def test_test_blocks_come_from_every_seed_in_equal_parts() -> None:
     blocks = fresh_blocks(1, {"seeds": [110, 111], "blocks": 4})
     assert len(blocks) == 4
     assert len({str(sorted(b.configuration.items())) for b in blocks}) == 4
+
+
+def test_ablations_take_one_cause_away_each() -> None:
+    original, *others = (config_of(name) for name in ABLATIONS)
+    assert original == ModelConfig.original() and len({*others, original}) == len(ABLATIONS)
+    for config in others:
+        mine, theirs = (
+            {**c.to_json()["clustering"], **c.to_json()["classification"]} for c in (config, original)
+        )
+        assert sum(mine[name] != theirs[name] for name in mine) == 1
 
 
 def test_unknown_learner() -> None:
