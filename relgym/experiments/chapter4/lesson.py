@@ -14,6 +14,7 @@ from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.testing import TARGETS, confusions, scores_of
+from relgym.experiments.chapter4.weight import weight_of
 from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_blocks
 from relgym.model.report import report
 from relgym.model.text import plain
@@ -83,7 +84,7 @@ def lesson(
     Returns
     -------
     Plain data: scores by checkpoint and target, the learned model's report, confusions of its modes, its trees, seconds
-    spent on learning.
+    spent on learning, bytes that it keeps.
     """
     laws = BALL_EXPERIMENTS[experiment].modes()
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1], stages))
@@ -108,6 +109,7 @@ def lesson(
         "confusions": confusions(model, fresh, laws),
         "training": _mode_examples(blocks),
         "seconds": seconds,
+        "bytes": weight_of(model),
         "corner_blocks": float(np.mean([b.truth.corner.any() for b in fresh])),
     }
 

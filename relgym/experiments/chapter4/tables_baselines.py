@@ -112,15 +112,17 @@ _NOTE: Final = (
 
 
 def _cost(values: Values) -> str:
-    """Seconds of learning a batch, and of answering the questions of all its tests; means over the batches."""
+    """Seconds of learning a batch and of answering its tests' questions, and memory kept; means over the batches."""
     lines: list[list[Cell]] = []
     for group, runs in values.items():
         name, _, seen = group.partition("/")
         title = TITLES[name] if name in TITLES else REGRESSORS[name].title
         learning = mean(run.get("learning", run.get("seconds", 0.0)) for run in runs)
         asking = [f"{mean(run['asking'] for run in runs):.2g}"] if "asking" in runs[0] else ["-"]
-        lines.append([title, seen or "-", f"{learning:.2g}", *asking])
-    return table(["learner", "features", "learning, s", "asking, s"], lines)
+        kept = mean(run.get("bytes", 0) for run in runs) / 1e6
+        lines.append([title, seen or "-", f"{learning:.2g}", *asking, f"{kept:.2g}"])
+    heading = ["learner", "features", "learning, s", "asking, s", "kept, MB"]
+    return f"{table(heading, lines)}\n\nLibraries that fit in one go learn when they are asked first."
 
 
 def _measures(runs: Sequence[Any], target: str) -> dict[int, list[float]]:

@@ -63,7 +63,8 @@ def _numbers(folder: Path) -> dict[str, Any]:
     """All that a run leaves behind, times of computing set aside."""
     values = {p.name: json.loads(p.read_text())["value"] for p in folder.glob("cache/*/[!.]*.json")}
     for value in values.values():
-        value.pop("seconds", None)
+        for cost in ("seconds", "bytes"):
+            value.pop(cost, None)
     outputs = {p.name: p.read_bytes() for p in folder.glob("*.*") if p.suffix != ".json"}
     return values | outputs
 
