@@ -107,7 +107,7 @@ _BALL_DREAMS: Final[Mapping[str, Any]] = {
 COURSES: Final = {
     course.name: course
     for course in (
-        Course("truck", "TruckPush, task push", "relgym/TruckPush-v0", "truck", {"task": "push"}),
+        Course("truck", "TruckPush, task push", "relgym/TruckPush-v0", "truck"),
         Course("ball", "BallGoal", "relgym/BallGoal-v0", "ball", repeat=5, horizon=100, dreams=_BALL_DREAMS),
     )
 }

@@ -64,7 +64,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     >>> import gymnasium as gym, relgym
     >>> from relgym.wrappers.sb3 import Dyna, TransitionRecorder, replay_options
     >>> from stable_baselines3 import SAC  # doctest: +SKIP
-    >>> env = TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push"))
+    >>> env = TransitionRecorder(gym.make("relgym/TruckPush-v0"))
     >>> model = relgym.WorldModel(env.get_wrapper_attr("schema"))
     >>> agent = SAC("MultiInputPolicy", env, **replay_options(env.observation_space))  # doctest: +SKIP
     >>> agent.learn(2_000, callback=Dyna(model))  # doctest: +SKIP
