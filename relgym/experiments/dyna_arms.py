@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import gymnasium as gym
 
 import relgym
+from relgym.envs.flat import FlatSpec
 from relgym.errors import ConfigError
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.flat import FlatView
@@ -21,7 +22,19 @@ from relgym.wrappers.sb3.settings import DynaConfig
 if TYPE_CHECKING:
     from relgym.wrappers.sb3.dyna import Dyna
 
-__all__ = ["ARMS", "COURSES", "WARM_UP", "Arm", "Course", "make_agent", "make_dyna", "make_env"]
+__all__ = [
+    "AGENT",
+    "ARMS",
+    "COURSES",
+    "WARM_UP",
+    "Arm",
+    "Change",
+    "ChangingWorld",
+    "Course",
+    "make_agent",
+    "make_dyna",
+    "make_env",
+]
 
 WARM_UP: Final = 500
 """Random steps that every arm begins with."""
@@ -32,7 +45,7 @@ AGENT: Final[Mapping[str, Any]] = {
     "gamma": 0.99,
     "tau": 0.01,
     "learning_starts": WARM_UP,
-    "policy_kwargs": {"net_arch": [64, 64]},
+    "policy_kwargs": {"net_arch": [64, 64], "optimizer_kwargs": {"fused": True}},  # a sixth faster
     "device": "cpu",
 }
 """SAC's parameters, the same in all arms; the others are Stable-Baselines3's defaults."""
@@ -66,6 +79,22 @@ class Course:
     repeat: int = 1
     horizon: int = 20
     dreams: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Change:
+    """How a world changes in mid-run.
+
+    Attributes
+    ----------
+    after
+        With the first episode that begins after so many env steps.
+    arguments
+        What the env is made with from then on, where it differs.
+    """
+
+    after: int
+    arguments: Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,13 +154,62 @@ ARMS: Final = {
 }
 
 
-def make_env(course: Course, **arguments: Any) -> gym.Env[Any, Any]:
-    """The course's env as agents see it: flat, relative, with decisions of several steps where it has them."""
-    env: gym.Env[Any, Any] = gym.make(
-        course.env_id, disable_env_checker=True, **{**course.arguments, **arguments}
-    )
+class ChangingWorld(gym.Wrapper[Any, Any, Any, Any]):
+    """One env at first, another one of the same kind later; both with the same seed.
+
+    Parameters
+    ----------
+    env, later
+        The envs.
+    after
+        Steps after which the next reset begins an episode of the later one.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], later: gym.Env[Any, Any], after: int) -> None:
+        super().__init__(env)
+        self._later, self._left = later, after
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode, in the later world when its time has come."""
+        if seed is not None:
+            self._later.reset(seed=seed)
+        if self._left <= 0:
+            self.env = self._later
+        return super().reset(seed=seed, options=options)
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """A step of the world as it is."""
+        self._left -= 1
+        return super().step(action)
+
+
+def make_env(
+    course: Course, change: Change | None = None, *, spec: FlatSpec | None = None, **arguments: Any
+) -> gym.Env[Any, Any]:
+    """The course's env as agents see it: flat, relative, with decisions of several steps where it has them.
+
+    Parameters
+    ----------
+    course
+        Where.
+    change
+        How the world changes, if it does.
+    spec
+        What the flat view shows, where it isn't what the env declares.
+    arguments
+        Of the env, where they differ from the course's.
+    """
+
+    def made(**own: Any) -> gym.Env[Any, Any]:
+        return gym.make(course.env_id, disable_env_checker=True, **{**course.arguments, **arguments, **own})
+
+    env = made()
+    if change is not None:
+        env = ChangingWorld(env, made(**change.arguments), change.after)
     env = TransitionRecorder(env)
-    return FlatView(ActionRepeat(env, course.repeat) if course.repeat > 1 else env)
+    return FlatView(ActionRepeat(env, course.repeat) if course.repeat > 1 else env, spec)
 
 
 def make_agent(arm: Arm, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -> Any:
@@ -156,10 +234,12 @@ def make_agent(arm: Arm, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -
     return SAC("MlpPolicy", env, seed=seed, gradient_steps=updates, **{**AGENT, **mixing, **changes})
 
 
-def make_dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -> Any:
+def make_dyna(
+    arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, model: Any = None, **changes: Any
+) -> Any:
     """The arm's callback: a `Dyna`, a `PermutedReplay`, or none.
 
-    `changes` go to its `DynaConfig`.
+    `model` is dreamed in instead of a new one; `changes` go to its `DynaConfig`.
     """
     if arm.model == "none":
         if not arm.varied:
@@ -167,10 +247,11 @@ def make_dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **
         from relgym.wrappers.sb3.permuting import PermutedReplay
 
         return PermutedReplay(seed=seed)
-    return _dyna(arm, course, env, seed=seed, **changes)
+    model = _model(arm, env, seed) if model is None else model
+    return _dyna(arm, course, model, seed=seed, **changes)
 
 
-def _dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -> Dyna:
+def _dyna(arm: Arm, course: Course, model: Any, *, seed: int, **changes: Any) -> Dyna:
     from relgym.wrappers.sb3.dyna import Dyna
 
     settings = {
@@ -180,7 +261,6 @@ def _dyna(arm: Arm, course: Course, env: gym.Env[Any, Any], *, seed: int, **chan
         "redraw": arm.varied,
         "seed": seed,
     }
-    model = _model(arm, env, seed)
     chosen = DynaConfig(**{**settings, **course.dreams, **changes})
     return Dyna(model, chosen, judge="learned" if arm.learned else None)
 
