@@ -16,8 +16,8 @@ from relgym.envs.flat import FlatSpec
 from relgym.errors import ConfigError
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.flat import FlatView
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
-from relgym.wrappers.sb3.settings import DynaConfig
 
 if TYPE_CHECKING:
     from relgym.wrappers.sb3.dyna import Dyna

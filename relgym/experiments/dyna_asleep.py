@@ -14,7 +14,7 @@ from relgym.envs.flat import FlatSpec
 from relgym.experiments.dyna_arms import AGENT, Course, make_env
 from relgym.wrappers.flat import VectorFlatView
 from relgym.wrappers.sb3.apprentice import Apprentice
-from relgym.wrappers.sb3.settings import DynaConfig
+from relgym.wrappers.sb3.config import DynaConfig
 
 __all__ = ["trained_among", "trained_asleep"]
 

@@ -11,11 +11,11 @@ import numpy as np
 from relgym.errors import ConfigError
 from relgym.model.scenes import mismatch
 from relgym.scene.objects import TASK, Scene
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.gate import Key, TrustGate, Verdict
 from relgym.wrappers.sb3.judges import Judge
 from relgym.wrappers.sb3.lens import Lens
 from relgym.wrappers.sb3.recorder import Experience
-from relgym.wrappers.sb3.settings import DynaConfig
 from relgym.wrappers.sb3.stock import DreamModel, SceneStock, changing
 
 __all__ = ["Apprentice", "check_model"]

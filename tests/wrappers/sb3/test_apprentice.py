@@ -13,8 +13,8 @@ from relgym.envs.truck_push import BOX_MASS, GRAVITY, TRUCK_MASS
 from relgym.envs.truck_scenes import loads, stacks_of
 from relgym.scene.objects import Transition
 from relgym.wrappers.sb3.apprentice import Apprentice
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
-from relgym.wrappers.sb3.settings import DynaConfig
 
 
 def make() -> Any:
