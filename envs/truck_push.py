@@ -165,13 +165,14 @@ class TruckPushEnv(SceneEnv):
         self._boxes = tuple(f"box{k + 1}" for k in range(checked_count("n_boxes", n_boxes, 1, 12)))
         count = checked_count("bystanders", bystanders, 0, 100)
         self._bystanders = tuple(f"bystander{k + 1}" for k in range(count))
-        frictions = checked_range("friction_range", friction_range or _WATCHED_FRICTIONS)
-        self._frictions = Range(*frictions, 0.0, 1e3)
         self._banded = task is not None and friction_range is None
+        frictions = _WATCHED_FRICTIONS if friction_range is None else friction_range
+        self._frictions = Range(*checked_range("friction_range", frictions), 0.0, 1e3)
         self._redraw = redraw
         self._gravity = checked_least("gravity", gravity, 0.0)
         names = (*self._boxes, *self._bystanders)
-        forces = checked_range("force_range", force_range or (FORCES if task else _WATCHED_FORCES))
+        usual = FORCES if task else _WATCHED_FORCES
+        forces = checked_range("force_range", usual if force_range is None else force_range)
         schema = truck_schema(names, forces, exogenous=redraw == "step", goal=task is not None)
         super().__init__(
             schema,
