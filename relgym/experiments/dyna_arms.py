@@ -114,6 +114,9 @@ class Arm:
     varied
         Whether objects of one type are exchanged and distances redrawn: in dreams, or without a model in the
         replay buffer (objects only).
+    doubted
+        Whether the model must earn its trust (`TrustGate`), or is trusted as soon as it speaks, as in MBPO: nets that
+        are never exact would hardly ever be trusted, and that arm would be SAC.
     """
 
     name: str
@@ -122,6 +125,7 @@ class Arm:
     updates: int = 1
     learned: bool = False
     varied: bool = False
+    doubted: bool = True
 
 
 _BALL_DREAMS: Final[Mapping[str, Any]] = {
@@ -147,7 +151,7 @@ ARMS: Final = {
         Arm("sac", "SAC", "none"),
         Arm("sac20", "SAC, 20 updates a step", "none", updates=20),
         Arm("sac-permuted", "SAC, objects permuted", "none", varied=True),
-        Arm("ensemble", "Dyna, MLP ensemble", "neural", updates=20, learned=True),
+        Arm("ensemble", "Dyna, MLP ensemble", "neural", updates=20, learned=True, doubted=False),
         Arm("relgym", "Dyna, relgym", "relational", updates=20, learned=True, varied=True),
         Arm("relgym-given", "Dyna, relgym, reward given", "relational", updates=20, varied=True),
     )
@@ -254,13 +258,15 @@ def make_dyna(
 def _dyna(arm: Arm, course: Course, model: Any, *, seed: int, **changes: Any) -> Dyna:
     from relgym.wrappers.sb3.dyna import Dyna
 
-    settings = {
+    settings: dict[str, Any] = {
         "horizon": course.horizon,
         "updates": arm.updates,
         "permute": arm.varied,
         "redraw": arm.varied,
         "seed": seed,
     }
+    if not arm.doubted:
+        settings |= {"open_at": 1.0, "shut_at": 1.0}
     chosen = DynaConfig(**{**settings, **course.dreams, **changes})
     return Dyna(model, chosen, judge="learned" if arm.learned else None)
 

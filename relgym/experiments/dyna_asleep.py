@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from time import perf_counter
 from typing import Any, Final
 
 import gymnasium as gym
@@ -11,12 +12,13 @@ from gymnasium.vector import AutoresetMode
 
 import relgym
 from relgym.envs.flat import FlatSpec
-from relgym.experiments.dyna_arms import AGENT, Course, make_env
+from relgym.experiments.dyna import Examination
+from relgym.experiments.dyna_arms import AGENT, COURSES, Course, make_env
 from relgym.wrappers.flat import VectorFlatView
 from relgym.wrappers.sb3.apprentice import Apprentice
 from relgym.wrappers.sb3.config import DynaConfig
 
-__all__ = ["trained_among", "trained_asleep"]
+__all__ = ["among", "asleep", "trained_among", "trained_asleep"]
 
 DREAMS: Final = 32
 """At once; one decision in all of them is followed by `UPDATES` gradient steps."""
@@ -24,6 +26,47 @@ DREAMS: Final = 32
 UPDATES: Final = 16
 
 _AGENT: Final = {**AGENT, "learning_starts": 20 * DREAMS, "buffer_size": 100_000, "gradient_steps": UPDATES}
+
+
+def asleep(*, course: str, seed: int, real: int, updates: int) -> dict[str, Any]:
+    """An agent that trained in its dream alone, in the real world.
+
+    Parameters
+    ----------
+    course, seed
+        Name in `COURSES`, and of everything random; reward and termination are given.
+    real
+        Random real decisions that the model learned from.
+    updates
+        Gradient steps.
+    """
+    started = perf_counter()
+    agent = trained_asleep(COURSES[course], seed=seed, real=real, updates=updates)
+    seconds = perf_counter() - started
+    return {"successes": Examination(COURSES[course]).successes(agent), "seconds": seconds}
+
+
+def among(*, seed: int, real: int, updates: int, bystanders: list[int]) -> dict[str, Any]:
+    """An agent that dreamed of boxes beside the track, of which its model never saw one; in the real world.
+
+    Parameters
+    ----------
+    seed, real, updates
+        As for `asleep`.
+    bystanders
+        How many there are in one scene or the other.
+
+    Returns
+    -------
+    Successes of 100 real episodes by number of bystanders, and the seconds of training.
+    """
+    course, started = COURSES["truck"], perf_counter()
+    agent, spec = trained_among(course, bystanders, seed=seed, real=real, updates=updates)
+    seconds = perf_counter() - started
+    found = {
+        str(count): Examination(course, spec=spec, bystanders=count).successes(agent) for count in bystanders
+    }
+    return {"successes": found, "seconds": seconds}
 
 
 def trained_asleep(course: Course, *, seed: int, real: int, updates: int) -> Any:

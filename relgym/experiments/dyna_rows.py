@@ -21,7 +21,13 @@ __all__ = ["ROWS", "Found", "Row", "Shown"]
 Found: TypeAlias = Sequence[tuple[Mapping[str, Any], Any]]
 """Arguments and results of the tasks that have been run."""
 
-_TRIALS: Final = "relgym.experiments.dyna_trials"
+_MODULES: Final = {
+    "learning": "relgym.experiments.dyna_trials",
+    "misled": "relgym.experiments.dyna_trials",
+    "asleep": "relgym.experiments.dyna_asleep",
+    "among": "relgym.experiments.dyna_asleep",
+    "speed": "relgym.experiments.dyna_speed",
+}
 _RATES: Final = 100_000, 3.0  # env-steps per second of dreams, and how many times the engine's
 
 _LIGHT: Final[Mapping[str, Any]] = {"gravity": 5.0}
@@ -74,7 +80,7 @@ class Row:
 
 def _task(function: str, **arguments: Any) -> Task:
     kind = " ".join(str(arguments[key]) for key in ("course", "arm") if key in arguments)
-    return Task(f"{_TRIALS}:{function}", arguments, f"{function} {kind}")
+    return Task(f"{_MODULES[function]}:{function}", arguments, f"{function} {kind}")
 
 
 def _learning(course: str, arms: Sequence[str], steps: int, **more: Any) -> list[Task]:
@@ -226,7 +232,7 @@ ROWS: Final[Mapping[int, Row]] = {
     ),
     6: Row(
         "Speed of dreams",
-        [Task("relgym.experiments.dyna_speed:speed", {"world": world}, "speed") for world in WORLDS],
+        [_task("speed", world=world) for world in WORLDS],
         _speed,
     ),
 }

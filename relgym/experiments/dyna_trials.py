@@ -1,21 +1,19 @@
-"""What the Dyna experiments compute, as functions of plain data that give plain data: tasks for the store."""
+"""Courses of learning as functions of plain data that give plain data: tasks for the store of results."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict
-from time import perf_counter
 from typing import Any, Final
 
 import numpy as np
 
-from relgym.experiments.dyna import EPISODES, Examination, run
+from relgym.experiments.dyna import EPISODES, run
 from relgym.experiments.dyna_arms import ARMS, COURSES, Change, Course, make_env
-from relgym.experiments.dyna_asleep import trained_among, trained_asleep
 from relgym.model.world_model import WorldModel
 
-__all__ = ["among", "asleep", "learning", "misled"]
+__all__ = ["learning", "misled"]
 
 _LESSONS: Final = 1_500
 """Random steps from which a model of another world is learned, and a third of them more on which it is tested."""
@@ -108,47 +106,6 @@ def _random_steps(env: Any, steps: int, seed: int) -> list[Any]:
             env.reset()
         found += env.get_wrapper_attr("take")()
     return found[:steps]
-
-
-def asleep(*, course: str, seed: int, real: int, updates: int) -> dict[str, Any]:
-    """An agent that trained in its dream alone, in the real world.
-
-    Parameters
-    ----------
-    course, seed
-        As for `learning`; reward and termination are given.
-    real
-        Random real decisions that the model learned from.
-    updates
-        Gradient steps.
-    """
-    started = perf_counter()
-    agent = trained_asleep(COURSES[course], seed=seed, real=real, updates=updates)
-    seconds = perf_counter() - started
-    return {"successes": Examination(COURSES[course]).successes(agent), "seconds": seconds}
-
-
-def among(*, seed: int, real: int, updates: int, bystanders: list[int]) -> dict[str, Any]:
-    """An agent that dreamed of boxes beside the track, of which its model never saw one; in the real world.
-
-    Parameters
-    ----------
-    seed, real, updates
-        As for `asleep`.
-    bystanders
-        How many there are in one scene or the other.
-
-    Returns
-    -------
-    Successes of `EPISODES` real episodes by number of bystanders, and the seconds of training.
-    """
-    course, started = COURSES["truck"], perf_counter()
-    agent, spec = trained_among(course, bystanders, seed=seed, real=real, updates=updates)
-    seconds = perf_counter() - started
-    found = {
-        str(count): Examination(course, spec=spec, bystanders=count).successes(agent) for count in bystanders
-    }
-    return {"successes": found, "seconds": seconds}
 
 
 class _Heard:

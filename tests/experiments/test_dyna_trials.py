@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from relgym.experiments import dyna_trials
+from relgym.experiments import dyna, dyna_asleep, dyna_trials
 
 pytestmark = pytest.mark.sb3
 
@@ -18,12 +18,12 @@ def plain(value: Any) -> Any:
 
 @pytest.fixture(autouse=True)
 def few_tests(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Few(dyna_trials.Examination):
+    class Few(dyna.Examination):
         def __init__(self, course: Any, episodes: int = 3, **arguments: Any) -> None:
             super().__init__(course, episodes, **arguments)
 
-    monkeypatch.setattr("relgym.experiments.dyna.Examination", Few)
-    monkeypatch.setattr(dyna_trials, "Examination", Few)
+    monkeypatch.setattr(dyna, "Examination", Few)
+    monkeypatch.setattr(dyna_asleep, "Examination", Few)
 
 
 def test_a_course_through_a_world_that_changes_goes_on_to_its_end() -> None:
@@ -44,7 +44,7 @@ def test_a_model_of_another_world_is_right_there_and_not_trusted_here(
 
 
 def test_agents_that_train_in_dreams_alone() -> None:
-    found = plain(dyna_trials.asleep(course="truck", seed=100, real=200, updates=320))
+    found = plain(dyna_asleep.asleep(course="truck", seed=100, real=200, updates=320))
     assert 0 <= found["successes"] <= 3 and found["seconds"] > 0.0
-    among = plain(dyna_trials.among(seed=100, real=300, updates=640, bystanders=[2, 4]))
+    among = plain(dyna_asleep.among(seed=100, real=300, updates=640, bystanders=[2, 4]))
     assert sorted(among["successes"]) == ["2", "4"]
