@@ -47,7 +47,7 @@ def asleep(*, course: str, seed: int, real: int, updates: int) -> dict[str, Any]
 
 
 def among(*, seed: int, real: int, updates: int, bystanders: list[int]) -> dict[str, Any]:
-    """An agent that dreamed of boxes beside the track, of which its model never saw one; in the real world.
+    """An agent that dreamed of more boxes beside the track than its model ever saw; in the real world.
 
     Parameters
     ----------
@@ -97,12 +97,14 @@ def trained_asleep(course: Course, *, seed: int, real: int, updates: int) -> Any
 def trained_among(
     course: Course, bystanders: Sequence[int], *, seed: int, real: int, updates: int
 ) -> tuple[Any, FlatSpec]:
-    """SAC that trained in dreams of objects that were not there while its model learned.
+    """SAC that trained in dreams of more objects than there were while its model learned.
+
+    One bystander was there then: without any, nothing would tell that boxes exist that aren't pushed.
 
     Parameters
     ----------
     course
-        Where the model learns, without bystanders; reward and termination are given.
+        Where the model learns; reward and termination are given.
     bystanders
         How many there are in the dreams, by turns. First scenes are those of real resets; no step is real.
     seed, real, updates
@@ -114,7 +116,7 @@ def trained_among(
     """
     from relgym.wrappers.sb3.vec_env import VectorAsVecEnv
 
-    env = make_env(course)
+    env = make_env(course, bystanders=1)
     model = _watched(env, DynaConfig(seed=seed), real=real, seed=seed).model
     kind = env.get_wrapper_attr("schema").type_of("box1").name
     spec = replace(env.get_wrapper_attr("flat_spec"), slots={kind: 3 + max(bystanders)})

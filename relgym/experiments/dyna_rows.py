@@ -226,7 +226,7 @@ ROWS: Final[Mapping[int, Row]] = {
         _no_harm,
     ),
     5: Row(
-        "TruckPush: dreams among boxes that the model never saw",
+        "TruckPush: dreams among more boxes than the model saw",
         [_task("among", seed=seed, bystanders=[2, 3, 4, 5, 6, 7], **_DREAMS) for seed in TRAINING_SEEDS],
         _among,
     ),
