@@ -28,9 +28,11 @@ class ClassificationConfig:
         Default true: a pair says nothing sensible of examples of a third mode. False: the most votes win, as in
         the thesis.
     context
-        Which objects clauses of mode classifiers speak of. ``"touching"``: the target and all that touch it,
-        or else the nearest one. ``"all"``: every object. ``"auto"`` (default): both vocabularies are tried
-        for every pair, the shorter description wins, ``"touching"`` on ties.
+        Which objects clauses of mode classifiers speak of. ``"approached"``: the target and what it approaches
+        fastest (a contact fact). ``"touching"``: the target and all that touch it, or else the nearest one.
+        ``"all"``: every object. ``"auto"`` (default): these are tried for every pair, the shortest description
+        wins, and the narrower context on ties: what decides a collision is the likelier cause of two that training
+        can't tell apart.
     contact_facts
         Whether relations and features that the vocabulary marks as contact facts are offered (approach
         velocity, normal, slip). Default true; the thesis had none, hence its confusion of bouncing and
@@ -99,7 +101,7 @@ class ClassificationConfig:
 
     votes: Literal["soft", "hard"] = "soft"
     runoff: bool = True
-    context: Literal["auto", "touching", "all"] = "auto"
+    context: Literal["auto", "approached", "touching", "all"] = "auto"
     contact_facts: bool = True
     numeric_literals: bool = True
     mode_function_features: bool = True
@@ -124,7 +126,7 @@ class ClassificationConfig:
     relearn_growth: float = 2.0
 
     def __post_init__(self) -> None:
-        _one_of(self, votes=("soft", "hard"), context=("auto", "touching", "all"))
+        _one_of(self, votes=("soft", "hard"), context=("auto", "approached", "touching", "all"))
         _one_of(self, ambiguous=("drop", "keep"), literal_choice=("gain", "negatives"))
         _at_least(self, 1, "max_literals", "max_clauses", "beam", "tree_min_leaf", "tree_max_depth")
         _at_least(self, 1, "exemplars_per_state", "noise_per_state")

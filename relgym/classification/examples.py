@@ -102,6 +102,9 @@ class Example:
     close
         The target and all objects that touch it, or else the nearest one, shape ``(K,)``: the context
         (§3.4.2).
+    approached
+        The target and what it approaches fastest of what it touches, shape ``(K,)``: a narrower context, which holds
+        what decides a collision. Default: as `close`.
     pair
         Features of (target, other), shape ``(K, F)``; NaN where undefined.
     own
@@ -122,6 +125,12 @@ class Example:
     target: int = 0
     key: bytes = b""
     row: int = -1
+    approached: Bools | None = None
+
+    @property
+    def struck(self) -> Bools:
+        """`approached`, or its default."""
+        return self.close if self.approached is None else self.approached
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,13 +146,20 @@ class ExampleBatch:
     pair: Floats
     own: Floats
     target: int = 0
+    approached: Bools | None = None
+
+    @property
+    def struck(self) -> Bools:
+        """`approached`, or its default."""
+        return self.close if self.approached is None else self.approached
 
     def __len__(self) -> int:
         return len(self.table)
 
     def __getitem__(self, index: int) -> Example:
         i = index
-        return Example(self.table[i], self.unary[i], self.close[i], self.pair[i], self.own[i], self.target)
+        arrays = self.table[i], self.unary[i], self.close[i], self.pair[i], self.own[i]
+        return Example(*arrays, self.target, approached=self.struck[i])
 
     @classmethod
     def of(cls, example: Example) -> ExampleBatch:
@@ -160,6 +176,7 @@ class ExampleBatch:
             np.stack([e.pair for e in examples]),
             np.stack([e.own for e in examples]),
             examples[0].target,
+            np.stack([e.struck for e in examples]),
         )
 
 
@@ -170,6 +187,7 @@ def check_example(vocabulary: Vocabulary, example: Example) -> None:
         "table": (len(vocabulary.relations), k, k),
         "unary": (len(vocabulary.unary), k),
         "close": (k,),
+        "struck": (k,),
         "pair": (k, len(vocabulary.pair)),
         "own": (len(vocabulary.own),),
     }

@@ -92,8 +92,7 @@ def situations(view: View, used: Used) -> _Hashes:
     """
     result = np.zeros(len(view), dtype=np.uint64)
     for context, relations, unary in used:
-        exists = view.close if context == "touching" else view.exists
-        result = _mix(result + _situation(view, exists, list(relations), list(unary)))
+        result = _mix(result + _situation(view, view.shown(context), list(relations), list(unary)))
     return result
 
 
@@ -101,7 +100,7 @@ def _alike(view: View, used: Used) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Group examples that show the same in what clauses use: one of each group, and every example's group."""
     columns = sorted({column for _, relations, _ in used for column in relations})
     unary = sorted({column for _, _, columns in used for column in columns})
-    shown = (view.close, view.exists, view.table[:, columns], view.unary[:, unary])
+    shown = (view.approached, view.close, view.exists, view.table[:, columns], view.unary[:, unary])
     bits = np.packbits(np.concatenate([part.reshape(len(view), -1) for part in shown], axis=1), axis=1)
     whole = np.concatenate([bits, view.target[:, None].view(np.uint8)], axis=1)
     # As strings, of equal length, rows are sorted fast.

@@ -1,8 +1,7 @@
-"""Learning one pair: FOIL in both contexts and polarities, then trees where clauses err (§3.4)."""
+"""Learning one pair: FOIL in all contexts and both polarities, then trees where clauses err (§3.4)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -12,17 +11,17 @@ from numpy.typing import NDArray
 from relgym.classification.binary import BinaryClassifier, majority, tree_columns, tree_features
 from relgym.classification.examples import Bools, Floats
 from relgym.classification.exemplars import dyadic
-from relgym.classification.views import Context, Scope, View
+from relgym.classification.views import CONTEXTS, Context, Scope, View
 from relgym.config import ClassificationConfig
 from relgym.logic.clause import Clause, Definition
 from relgym.logic.csp import matches
 from relgym.logic.foil import FoilConfig, learn, learn_both
 from relgym.numeric.tree import DecisionTree, learn_tree
 
-__all__ = ["Draft", "Lesson", "foil_config", "learn_pair"]
+__all__ = ["SHORT", "Draft", "Lesson", "foil_config", "learn_pair"]
 
-_SHORT: Final = 3  # a faultless definition of so few literals isn't challenged by the other context
-_BITS: Final = 1e-9  # description lengths closer than this are equal
+SHORT: Final = 3
+"""A faultless definition of so few literals isn't challenged by a wider context, nor by more examples that agree."""
 
 _Rows = NDArray[np.int64]
 
@@ -112,17 +111,16 @@ class Draft:
         if not all(lesson.counts):
             return majority(i, j, scope, lesson.counts)
         taught = lesson.balanced(config.class_balance)
-        contexts: Sequence[Context] = ("touching", "all") if config.context == "auto" else (config.context,)
-        context = next(each for each in contexts if each not in self.definitions)
+        contexts = _contexts(lesson) if config.context == "auto" else [config.context]
+        context = next((each for each in contexts if each not in self.definitions), contexts[-1])
         found = self.definitions[context] = _define(taught, context, scope, config)
         self.work += found.work
-        simple = found.errors == 0 and sum(map(len, found.clauses)) <= _SHORT
-        if len(self.definitions) < len(contexts) and not simple:
+        if context != contexts[-1] and not _settles(found, context):
             return None
-        least = min(each.bits for each in self.definitions.values())
-        best = next(
-            each for each in self.definitions.items() if each[1].bits <= least + _BITS
-        )  # ties: touching
+        # as between polarities, errors count first; the narrowest context wins ties
+        best = min(
+            self.definitions.items(), key=lambda each: (round(each[1].errors, 7), round(each[1].bits, 7))
+        )
         classifier = _with_trees(BinaryClassifier(i, j, scope, *best, work=self.work), taught, config)
         classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
         return classifier
@@ -135,6 +133,25 @@ class Draft:
     def from_list(cls, data: list[list[Any]]) -> Draft:
         """Inverse of `to_list`."""
         return cls({context: Definition.from_dict(plain) for context, plain in data})
+
+
+def _settles(found: Definition, context: Context) -> bool:
+    """Whether a definition is so good that wider contexts needn't be looked at.
+
+    In the narrowest one, thresholds on the target's own numbers may stand in for objects that it doesn't show.
+    """
+    if found.errors > 0 or found.size > SHORT:
+        return False
+    own = any(literal.op is not None and not literal.args for clause in found.clauses for literal in clause)
+    return context != "approached" or (len(found.clauses) <= 1 and not own)
+
+
+def _contexts(lesson: Lesson) -> list[Context]:
+    """The contexts to try, the narrowest first; those that show a lesson's examples no differently are left out."""
+    narrow, usual, wide = (lesson.view.shown(each)[lesson.rows] for each in CONTEXTS)
+    found = [CONTEXTS[0]] if not np.array_equal(narrow, usual) else []
+    found.append(CONTEXTS[1])
+    return found if np.array_equal(usual, wide) else [*found, CONTEXTS[2]]
 
 
 def _define(lesson: Lesson, context: Context, scope: Scope, config: ClassificationConfig) -> Definition:

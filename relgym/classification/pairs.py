@@ -10,7 +10,7 @@ import numpy as np
 from relgym.classification.binary import BinaryClassifier, majority
 from relgym.classification.examples import NOISE
 from relgym.classification.exemplars import Exemplars
-from relgym.classification.learning import Draft, Lesson
+from relgym.classification.learning import SHORT, Draft, Lesson
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
@@ -76,8 +76,8 @@ class PairState:
         wrong = self.classifier.for_i[outcome] != is_i
         self.classifier.count(outcome, is_i)
         self.contradictions += wrong
-        # A faultless definition learned whole is only confirmed by agreeing examples, however many.
-        imperfect = self.errors > 0 or self.mended
+        # A short faultless definition learned whole is only confirmed by agreeing examples, however many.
+        imperfect = self.errors > 0 or self.mended or self.classifier.definition.size > SHORT
         grown = imperfect and min(self.seen) >= growth * max(min(self.learned), 1.0)
         self.stale = self.stale or self.contradictions > self.errors or grown
         return wrong

@@ -23,8 +23,8 @@ from relgym.numeric.tree import DecisionTree
 
 __all__ = ["Key", "Plan", "Planner"]
 
-Key: TypeAlias = tuple[int, bytes, bytes, bytes]
-"""Target, close objects, binary and unary relations of an example."""
+Key: TypeAlias = tuple[int, bytes, bytes, bytes, bytes]
+"""Target, approached and close objects, binary and unary relations of an example."""
 
 _SOME: Final = "some object"  # stands for a numeric test of a variable while objects are looked for
 _MOST_PLANS: Final = 4096
@@ -156,23 +156,26 @@ class Planner:
         close, table, unary = example.close, example.table, example.unary
         if not self._everything:
             table, unary = table & (close[:, None] & close), unary & close
-        key = (example.target, close.tobytes(), table.tobytes(), unary.tobytes())
+        struck = example.struck
+        key = (example.target, struck.tobytes(), close.tobytes(), table.tobytes(), unary.tobytes())
         plan = self._plans.get(key)
         if plan is None:
             if len(self._plans) >= _MOST_PLANS:
                 self._plans.clear()
-            plan = self._plans[key] = self._new_plan(key, table, unary, close)
+            plan = self._plans[key] = self._new_plan(key, table, unary, (struck, close))
         if plan.version != self._version:
             self._update(plan)
         return plan
 
-    def _new_plan(self, key: Key, table: Bools, unary: Bools, close: Bools) -> Plan:
+    def _new_plan(self, key: Key, table: Bools, unary: Bools, near: tuple[Bools, Bools]) -> Plan:
         v = self.vocabulary
         # Copies: a query's arrays may be views of a large batch that should not be kept alive.
         relations = dict(zip(v.relations, table.copy(), strict=True)) | dict(
             zip(v.unary, unary.copy(), strict=True)
         )
-        exists: dict[Context, Bools] = {"touching": close.copy(), "all": np.ones(len(close), dtype=np.bool_)}
+        struck, close = near
+        every = np.ones(len(close), dtype=np.bool_)
+        exists: dict[Context, Bools] = {"approached": struck.copy(), "touching": close.copy(), "all": every}
         worlds = {context: World(relations | {_SOME: mask}, mask) for context, mask in exists.items()}
         objects = {context: tuple(np.flatnonzero(mask).tolist()) for context, mask in exists.items()}
         return Plan(key, worlds, objects, target=key[0])

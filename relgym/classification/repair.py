@@ -20,7 +20,7 @@ from relgym.logic.clause import ANY, Clause, Definition
 from relgym.logic.csp import matches
 from relgym.logic.facts import Facts
 from relgym.logic.foil import learn
-from relgym.logic.thresholds import rounding
+from relgym.logic.thresholds import merit, rounding, simplest_between
 
 __all__ = ["mend"]
 
@@ -128,7 +128,7 @@ class _Mending:
 
 
 def _best_threshold(values: Floats, positive: Bools, weights: Floats, at_most: bool) -> float | None:
-    """Threshold with the fewest errors, in the widest such gap; none if there is no gap at all."""
+    """Threshold with the fewest errors: zero, or else in the widest such gap; none if there is no gap at all."""
     order = np.argsort(values, kind="stable")
     values, signs = values[order], np.where(positive[order] == at_most, weights[order], -weights[order])
     cuts = np.flatnonzero(np.diff(values) > rounding(values))
@@ -136,7 +136,5 @@ def _best_threshold(values: Floats, positive: Bools, weights: Floats, at_most: b
         return None
     right = np.cumsum(signs)[cuts]  # weight that a cut puts on its right side, up to a constant
     widest = cuts[right >= right.max() - 1e-9]
-    cut = widest[np.argmax(values[widest + 1] - values[widest])]
-    low, high = float(values[cut]), float(values[cut + 1])
-    middle = low + (high - low) / 2
-    return middle if middle < high else low
+    cut = widest[np.argmax(merit(values[widest], values[widest + 1]))]
+    return simplest_between(float(values[cut]), float(values[cut + 1]))

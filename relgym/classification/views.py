@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,13 @@ from relgym.logic.clause import Clause
 from relgym.logic.csp import matches
 from relgym.logic.facts import Facts
 
-__all__ = ["Context", "Scope", "View", "bound_features", "lift", "projection"]
+__all__ = ["CONTEXTS", "Context", "Scope", "View", "bound_features", "lift", "projection"]
 
-Context: TypeAlias = Literal["touching", "all"]
-"""Which objects clauses speak of: those close to the target, or every one."""
+Context: TypeAlias = Literal["approached", "touching", "all"]
+"""Which objects clauses speak of: what the target approaches fastest, those close to it, or every one."""
+
+CONTEXTS: Final[tuple[Context, ...]] = ("approached", "touching", "all")
+"""All contexts, the narrowest first."""
 
 _Rows: TypeAlias = NDArray[np.int64]
 
@@ -86,7 +89,7 @@ class View:
 
     Parameters
     ----------
-    table, unary, exists, close, pair, own
+    table, unary, exists, approached, close, pair, own
         As in `Example`, with a leading axis.
     target
         Shape ``(n,)``.
@@ -99,6 +102,7 @@ class View:
     table: Bools
     unary: Bools
     exists: Bools
+    approached: Bools
     close: Bools
     pair: Floats
     own: Floats
@@ -112,7 +116,16 @@ class View:
         """All exemplars, as views of their arrays: valid until they change."""
         c = exemplars.columns
         return cls(
-            *(c["table"], c["unary"], c["exists"], c["close"], c["pair"], c["own"], c["target"]),
+            *(
+                c["table"],
+                c["unary"],
+                c["exists"],
+                c["approached"],
+                c["close"],
+                c["pair"],
+                c["own"],
+                c["target"],
+            ),
             modes=exemplars.modes,
             values=c["values"],
         )
@@ -123,16 +136,20 @@ class View:
         b = batch
         exists = np.ones(b.close.shape, dtype=np.bool_)
         target = np.full(len(b), b.target, dtype=np.int64)
-        return cls(b.table, b.unary, exists, b.close, b.pair, b.own, target, modes, values)
+        return cls(b.table, b.unary, exists, b.struck, b.close, b.pair, b.own, target, modes, values)
 
     def __len__(self) -> int:
         return len(self.table)
 
     def take(self, rows: NDArray[np.integer[Any]]) -> View:
         """Some of the examples."""
-        arrays = (self.table, self.unary, self.exists, self.close, self.pair, self.own, self.target)
-        table, unary, exists, close, pair, own, target = (array[rows] for array in arrays)
-        return View(table, unary, exists, close, pair, own, target, self.modes, self.values[rows])
+        contexts = (self.exists[rows], self.approached[rows], self.close[rows])
+        numbers = (self.pair[rows], self.own[rows], self.target[rows])
+        return View(self.table[rows], self.unary[rows], *contexts, *numbers, self.modes, self.values[rows])
+
+    def shown(self, context: Context) -> Bools:
+        """Which objects a context shows, shape ``(n, K)``."""
+        return {"approached": self.approached, "touching": self.close, "all": self.exists}[context]
 
     def tuples(self, rows: _Rows) -> _Rows:
         """FOIL's target tuples (world, target object) of some rows, shape ``(len(rows), 2)`` (§3.4.2)."""
@@ -156,7 +173,7 @@ class View:
             relations = {name: self.table[:, column] for name, column in scope.relations}
             relations |= {name: self.unary[:, column] for name, column in scope.unary}
             # Facts masks what doesn't "exist": in the touching context, everything that isn't close (§3.4.2).
-            found = Facts(relations, self.close if context == "touching" else self.exists)
+            found = Facts(relations, self.shown(context))
             self._facts[context, bare] = found
         return found
 

@@ -13,6 +13,7 @@ from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
+from relgym.clustering.extension import extended
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
@@ -220,6 +221,8 @@ class ModeClusterer(Population):
                 break
             search.failures = 0
         search.waiting = 0
+        if len(pool) and (wider := extended(self._known(table), signature, pool)) is not None:
+            self._adopt(table, signature, wider)
 
     def _patience(self, search: _Search, wide: bool) -> int:
         """News to wait for until the next search: the more, the oftener it was in vain and the dearer it is."""
@@ -257,7 +260,7 @@ class ModeClusterer(Population):
         self._spread, self.approximate = found.sigma, True
         self.scale = replace(self.scale, sigma=max(self.floor, found.sigma))
         self._start_over()
-        self._adopt(table, signature, reordered(found.fit, order), recent[found.inliers])
+        self._adopt(table, signature, reordered(found.fit, order))
 
     def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
         """Noise examples of one signature that aren't some mode's tail, oldest first."""
@@ -290,15 +293,18 @@ class ModeClusterer(Population):
         )
         if found is None:
             return False
-        self._adopt(table, signature, reordered(found.fit, order), pool[found.inliers])
+        self._adopt(table, signature, reordered(found.fit, order))
         return True
 
-    def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit, members: NDArray[np.intp]) -> None:
+    def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit) -> None:
         """Make a mode of a function: unify it with the known ones (§3.2.5), reassign examples (§3.2.4)."""
-        known = Known(
+        known = self._known(table)
+        self._admit(table, known, known.cluster(fit, signature))
+
+    def _known(self, table: ExampleTable) -> Known:
+        return Known(
             table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
         )
-        self._admit(table, known, known.cluster(fit, signature))
 
     def _admit(self, table: ExampleTable, known: Known, cluster: Cluster) -> int:
         """Take up a mode that has no id yet; the id that it gets."""
@@ -345,12 +351,8 @@ class ModeClusterer(Population):
                 functions
                 and len(self._explained(table, Cluster(cluster.mode), self._noise())) >= LEAST_MEMBERS
             ):
-                known = Known(
-                    table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
-                )
-                matched[i] = self._admit(
-                    table, known, Cluster(replace(cluster.mode, id=0, target=self.target))
-                )
+                own = Cluster(replace(cluster.mode, id=0, target=self.target))
+                matched[i] = self._admit(table, self._known(table), own)
         for i, count in other._log.forgotten.items():
             self._log.forgotten[matched.get(i, NOISE)] += count
         self._log.seen += other._log.seen - len(other._log)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus, consensus, refine
-from relgym.numeric.stepwise import LinearFit, least_squares, varying_columns
+from relgym.numeric.stepwise import PIVOT, LinearFit, least_squares, varying_columns
 
-__all__ = ["Scale", "find_mode", "identified", "least_examples", "plans"]
+__all__ = ["Scale", "find_mode", "identified", "least_examples", "plans", "verifying_bits"]
 
 SEARCH = 400
 """At most this many rows are searched at a time."""
@@ -53,10 +53,14 @@ def least_examples(y: NDArray[np.float64], scale: Scale, config: ClusteringConfi
     """T: examples that found a mode, from the number of bits by which each verifies the function."""
     if config.min_examples != "auto":
         return int(config.min_examples)
-    spread = float(np.ptp(y)) if len(y) else 0.0
-    bits = math.log2(max(spread / scale.tolerance, 2.0))
-    share = min(max((24.0 - bits) / 12.0, 0.0), 1.0)
+    share = min(max((24.0 - verifying_bits(y, scale)) / 12.0, 0.0), 1.0)
     return round(10 + 30 * share)
+
+
+def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
+    """By how many bits an example that fits a function speaks for it: those that tell its value from all seen."""
+    spread = float(np.ptp(y)) if len(y) else 0.0
+    return math.log2(max(spread / scale.tolerance, 2.0))
 
 
 def find_mode(
@@ -226,7 +230,9 @@ def _unsupported(
             left = _own_part(x[kept], fit, column)
             if len(left) <= len(fit.columns) + 2:
                 break
-            kept[np.flatnonzero(kept)[np.argmax(np.abs(left))]] = False
+            # Not the largest residual: a row far out in the other columns too draws the regression to itself.
+            stake = np.abs(left) / np.maximum(1.0 - _leverage(x[kept], fit, column), PIVOT)
+            kept[np.flatnonzero(kept)[np.argmax(stake)]] = False
         remaining = np.abs(weight * _own_part(x[kept], fit, column))
         if remaining.max(initial=0.0) <= 10.0 * tolerance:
             return column, kept
@@ -239,6 +245,24 @@ def _own_part(x: NDArray[np.float64], fit: LinearFit, column: int) -> NDArray[np
     rest = least_squares(x, x[:, column], others, intercept=fit.intercept != 0.0)
     part: NDArray[np.float64] = x[:, column] - rest.predict(x)
     return part
+
+
+def _leverage(x: NDArray[np.float64], fit: LinearFit, column: int) -> NDArray[np.float64]:
+    """Share of itself that each row decides in a regression on the function's other terms, in [0, 1]."""
+    design = x[:, [c for c in fit.columns if c != column]]
+    if fit.intercept != 0.0:
+        design = np.concatenate([np.ones((len(x), 1)), design], axis=1)
+    shares = np.zeros(len(x))
+    spanned: list[NDArray[np.float64]] = []
+    for own in design.T:
+        rest = own
+        for other in spanned:  # not LAPACK, whose results may depend on its threads
+            rest = rest - (other * rest).sum() * other
+        size = float(np.sqrt(np.square(rest).sum()))
+        if size > PIVOT * float(np.sqrt(np.square(own).sum())):
+            spanned.append(rest / size)
+            shares += np.square(spanned[-1])
+    return shares
 
 
 def _lively(column: NDArray[np.float64]) -> bool:

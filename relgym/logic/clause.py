@@ -280,6 +280,11 @@ class Definition:
         return sum(count.negatives for count in self.coverage) + self.uncovered.positives
 
     @property
+    def size(self) -> int:
+        """Number of literals."""
+        return sum(map(len, self.clauses))
+
+    @property
     def performance(self) -> float:
         """Share of the training tuples that the definition gets right, "train perf." in table 3.2."""
         total = sum(count.total for count in self.coverage) + self.uncovered.total

@@ -92,7 +92,7 @@ class Cuts:
 
 
 def best_cuts(bins: Bins, score: Score, counts: Counts) -> tuple[Int, Int]:
-    """Choose each function's best threshold; among equally good ones, that in the widest gap.
+    """Choose each function's best threshold; among equally good ones zero, or else that in the widest gap.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def best_cuts(bins: Bins, score: Score, counts: Counts) -> tuple[Int, Int]:
     -------
     Functions that have a threshold at all, and the bin behind which it lies.
     """
-    gaps = bins.gaps
+    gaps = bins.merits
     if not gaps.size:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     scores = np.where(np.isnan(gaps), -np.inf, score(counts))

@@ -35,6 +35,8 @@ class DescriptionLength:
         self._name = math.log2(max(names, 1))
         self.threshold = math.log2(max(values, 1) + 1.0) * evidence
         """Bits of one threshold."""
+        self.sign = evidence
+        """Bits of the threshold zero: there is nothing to choose but to take it."""
 
     def clause(self, clause: Clause) -> float:
         """Return a clause's bits, see `literals`."""
@@ -46,9 +48,15 @@ class DescriptionLength:
         for literal in literals:
             # one argument is any variable so far, a new one or *
             bits += 1.0 + self._name + len(literal.args) * math.log2(variables + 1.0)
-            bits += self.threshold if literal.op is not None else 0.0
+            bits += self.number(literal)
             variables = max(variables, max(literal.variables, default=-1) + 1)
         return bits - math.lgamma(len(literals) + 1.0) / _LOG2
+
+    def number(self, literal: Literal) -> float:
+        """Return the bits of a literal's threshold, 0 if it has none."""
+        if literal.op is None:
+            return 0.0
+        return self.sign if literal.threshold == 0.0 else self.threshold
 
     def clauses(self, clauses: Iterable[Clause]) -> float:
         """Return the bits of several clauses, whose order is free too."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from relgym.logic.batch import extremes, matches
 from relgym.logic.clause import Clause, Coverage, Literal
 from relgym.logic.facts import Bool, Facts, Float, Int
-from relgym.logic.thresholds import rounding, simplest_between
+from relgym.logic.thresholds import merit, rounding, simplest_between
 
 __all__ = ["Problem", "center_thresholds", "prune"]
 
@@ -102,7 +101,7 @@ def _centered(clause: Clause, index: int, literal: Literal, problem: Problem) ->
 
 
 def _widest_cut(values: Float, inside: Bool, problem: Problem, below: bool) -> tuple[float, float] | None:
-    """Return the gap that divides best, and of equal ones the widest.
+    """Return the gap that divides best, and of equal ones that around zero, or else the widest.
 
     None of them may have more negatives or fewer positives inside than there are now.
     """
@@ -114,7 +113,8 @@ def _widest_cut(values: Float, inside: Bool, problem: Problem, below: bool) -> t
     good = np.cumsum(np.where(positive, problem.weights[order], 0.0))[:-1]
     bad = np.cumsum(np.where(positive, 0.0, problem.weights[order]))[:-1]
     now = problem.count(inside & np.isfinite(values))
-    gaps = np.abs(np.diff(values[order]))
+    ends = np.sort([values[order][:-1], values[order][1:]], axis=0)
+    gaps = ends[1] - ends[0]
     slack = 1e-9 * (1.0 + now.total)
     allowed = (
         (gaps > rounding(values[order])) & (good >= now.positives - slack) & (bad <= now.negatives + slack)
@@ -122,6 +122,5 @@ def _widest_cut(values: Float, inside: Bool, problem: Problem, below: bool) -> t
     if not allowed.any():
         return None
     best = np.where(allowed, good - bad, -np.inf).max() - slack
-    place = int(np.argmax(np.where(allowed & (good - bad >= best), gaps, -1.0)))
-    ends: Sequence[float] = sorted(values[order][place : place + 2].tolist())
-    return ends[0], ends[1]
+    place = int(np.argmax(np.where(allowed & (good - bad >= best), merit(ends[0], ends[1]), -1.0)))
+    return float(ends[0, place]), float(ends[1, place])

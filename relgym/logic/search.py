@@ -16,6 +16,7 @@ from relgym.logic.description import DescriptionLength
 from relgym.logic.growing import EPS, Counts, Growing, Score, Weights, extend
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
+from relgym.logic.thresholds import signs_differ
 
 __all__ = ["Harvest", "grow"]
 
@@ -126,7 +127,7 @@ class _Candidates:
         length: DescriptionLength,
     ) -> None:
         self._tables = tables
-        self._threshold_bits = length.threshold if config.mdl else 0.0
+        self._length = length if config.mdl else None
         self._blocks = [
             (growing, block)
             for growing in beam
@@ -146,10 +147,14 @@ class _Candidates:
             numeric = self._join(lambda _, block: np.full(len(block.templates), block.op is not None))
             self._ties = (names, -self._positives, self._introduced, negated, numeric)
 
-    def _price(self, growing: Growing, block: Block) -> float:
+    def _price(self, growing: Growing, block: Block) -> NDArray[np.float64]:
         """Bits of the thresholds: a gain must pay for them, or numbers would stand in for plain relations."""
-        numeric = [each.op is not None for each in growing.literals]
-        return self._threshold_bits * (sum(numeric) + (block.op is not None))
+        price = np.zeros(len(block.templates))
+        if self._length is None:
+            return price
+        if block.gaps is not None:
+            price += np.where(signs_differ(*block.gaps), self._length.sign, self._length.threshold)
+        return price + sum(self._length.number(each) for each in growing.literals)
 
     def _join(self, part: Callable[[Growing, Block], NDArray[Any]]) -> NDArray[Any]:
         return np.concatenate([part(growing, block) for growing, block in self._blocks])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.logic.facts import Float, Int
 
-__all__ = ["Bins", "bin_values", "rounding", "simplest_between"]
+__all__ = ["Bins", "bin_values", "merit", "rounding", "signs_differ", "simplest_between"]
 
 _MAX_BINS: Final = 128
 """Finest histogram; where classes alternate more often, cuts are taken at every m-th boundary."""
@@ -22,6 +22,10 @@ _MAX_BINS: Final = 128
 
 _ROUNDING: Final = 1e-10
 """Values that differ by less, relative to the greatest of them, are the same number, computed in two ways."""
+
+
+_CLEAR: Final = 0.01
+"""Zero counts as inside a gap if it keeps this share of the gap's width from either end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +51,11 @@ class Bins:
     def gaps(self) -> Float:
         """Shape (F, B - 1): distance from one bin to the next, NaN behind a function's last bin."""
         return self.low[:, 1:] - self.high[:, :-1]
+
+    @property
+    def merits(self) -> Float:
+        """Shape (F, B - 1): `merit` of the gaps, NaN behind a function's last bin."""
+        return merit(self.high[:, :-1], self.low[:, 1:])
 
 
 def bin_values(values: Float, split: int) -> Bins:
@@ -102,12 +111,33 @@ def rounding(values: Float) -> float:
     return _ROUNDING * float(np.abs(values).max(initial=0.0))
 
 
+def signs_differ(low: Float | float, high: Float | float) -> NDArray[np.bool_] | bool:
+    """Whether zero lies well inside each gap: there, the sign alone tells the two sides apart.
+
+    Ends that are zero but for rounding are no sides: whether such a number is positive is chance.
+    """
+    margin = _CLEAR * (high - low)
+    return (low < -margin) & (high > margin)
+
+
+def merit(low: Float, high: Float) -> Float:
+    """How good each gap is for a threshold: its width, but infinite where the sign alone decides.
+
+    Zero is the one threshold that isn't fitted to the data: "moves left", "this mode predicts more than that one".
+    """
+    return np.where(signs_differ(low, high), np.inf, high - low)
+
+
 def simplest_between(low: float, high: float) -> float:
-    """Return the number with the fewest digits in the middle half of a gap, so that thresholds read well.
+    """Return zero if it lies well inside a gap, else the number with the fewest digits in its middle half.
 
     >>> simplest_between(-0.0231, 0.0107)
-    -0.006
+    0.0
+    >>> simplest_between(0.0107, 0.0231)
+    0.02
     """
+    if signs_differ(low, high):
+        return 0.0
     middle, margin = low + (high - low) / 2, (high - low) / 4
     for digits in range(1, 18):
         number = float(f"{middle:.{digits}g}")

@@ -135,6 +135,7 @@ def _exemplars(
                 int(c["target"][slot]),
                 kept.key_of(slot),
                 number,
+                c["approached"][slot][:k],
             ),
             weight,
         )

@@ -286,10 +286,10 @@ class Percept:
         table = perception.unary_table(self.layout)
         every = np.broadcast_to(table, (n, *table.shape))
         nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
-        close = relations.context(body)
+        close, struck = relations.context(body), None
         if perception.parting:
-            close = _without(close, parting)
-        return ExampleBatch(nothing, every, close, pair, own, body)
+            close, struck = _without(close, parting), _approached(contacts[..., -2], body)
+        return ExampleBatch(nothing, every, close, pair, own, body, struck)
 
     def _bodiless(self, target: int) -> ExampleBatch:
         """An object without a body stands alone: no relations, only numbers."""
@@ -315,6 +315,23 @@ def _free(t: ObjectType) -> tuple[str, ...]:
     """Properties that are no pose component: those that may be compared with thresholds (R2)."""
     pose = {k for k in t.pose_columns() if k >= 0} if t.has_body else set()
     return tuple(p for k, p in enumerate(t.properties) if k not in pose)
+
+
+def _approached(approach: NDArray[np.float64], body: int) -> NDArray[np.bool_]:
+    """The target, and of the bodies that it touches and doesn't leave the one that it approaches fastest.
+
+    Parameters
+    ----------
+    approach
+        The target's and each touched body's relative normal velocity, NaN for the others, shape ``(n, K)``.
+    body
+        The target's number.
+    """
+    closing = np.where(approach <= APPROACH_EPS, approach, np.inf)
+    found: NDArray[np.bool_] = closing <= closing.min(axis=1, keepdims=True) + APPROACH_EPS
+    found &= closing < np.inf
+    found[:, body] = True
+    return found
 
 
 def _without(close: NDArray[np.bool_], parting: NDArray[np.bool_]) -> NDArray[np.bool_]:

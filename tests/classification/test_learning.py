@@ -129,6 +129,34 @@ def test_all_context_is_used_only_if_it_tells_more() -> None:
     assert touching.describe()[-1][1] < 60
 
 
+def test_of_contexts_that_do_equally_well_the_narrowest_is_taken() -> None:
+    # What is struck is red or isn't; a body that is merely touched is as red, as it happens.
+    rng = np.random.default_rng(0)
+    vocabulary = Vocabulary(relations=("intersect",), unary=("red",))
+    examples, labels = [], []
+    for _ in range(60):
+        red = rng.random() < 0.5
+        table = np.zeros((1, 3, 3), dtype=np.bool_)
+        table[0, 0, 1:] = table[0, 1:, 0] = True
+        unary, every, struck = (
+            np.array([[False, red, red]]),
+            np.ones(3, dtype=bool),
+            np.array([True, True, False]),
+        )
+        examples.append(Example(table, unary, every, np.empty((3, 0)), np.empty(0), approached=struck))
+        labels.append(red)
+    view = View.of_batch(ExampleBatch.stack(examples), (0, 1), np.full((60, 2), np.nan))
+    lesson = Lesson(view, np.arange(60), np.array(labels), np.ones(60))
+    scope = Scope.of(vocabulary, ClassificationConfig(), (0, 1))
+    found = learn_pair(0, 1, lesson, scope, ClassificationConfig())
+    assert found.context == "approached"
+    # a white body is struck while a red one is touched: what is struck decides
+    table, unary = examples[0].table, np.array([[False, False, True]])
+    query = Example(table, unary, every, np.empty((3, 0)), np.empty(0), approached=struck)
+    beside = View.of_batch(ExampleBatch.of(query), (0, 1), np.full((1, 2), np.nan))
+    assert not found.says_i_batch(beside, np.arange(1))[0]
+
+
 @pytest.mark.parametrize("only", [FLY, BOUNCE])
 def test_one_class_always_wins(items: list[Labelled], only: int) -> None:
     mine = [item for item in items if item.mode == only]

@@ -30,6 +30,17 @@ def test_a_weight_that_one_example_determines_is_dropped(rng: np.random.Generato
     assert found.inliers.tolist() == [k != 7 for k in range(30)]
 
 
+def test_an_example_far_out_in_every_column_backs_no_weight_either(rng: np.random.Generator) -> None:
+    # It draws a regression of w on v to itself, so that others have larger residuals.
+    x = np.column_stack([-0.02 - 0.04 * rng.random(12), 1e-18 * rng.normal(size=12)])
+    y = -0.78 * x[:, 0] - 0.0006
+    x[5], y[5] = (0.0355, -0.0041), 0.0032
+    found = judged(x, y, least_squares(x, y, (0, 1)))
+    assert found is not None
+    assert found.fit.columns == (0,)
+    assert found.inliers.tolist() == [k != 5 for k in range(12)]
+
+
 @pytest.mark.parametrize(("backing", "columns"), [(2, (0,)), (3, (0, 1)), (10, (0, 1))])
 def test_three_examples_must_back_each_weight(
     backing: int, columns: tuple[int, ...], rng: np.random.Generator

@@ -14,8 +14,13 @@ def test_a_literal_costs_its_name_its_sign_and_its_arguments() -> None:
     # 8 names, 2 signs, 2 arguments of: A, a new variable
     assert LENGTH.clause(Clause((Literal("near", (0, 1)),))) == pytest.approx(3 + 1 + 2)
     # 1024 thresholds
-    assert LENGTH.clause(Clause((Literal("vx", (0,), op=">"),))) == pytest.approx(3 + 1 + 1 + 10)
+    assert LENGTH.clause(Clause((Literal("vx", (0,), op=">", threshold=0.5),))) == pytest.approx(
+        3 + 1 + 1 + 10
+    )
     assert DescriptionLength(8, 1023, evidence=3).threshold == pytest.approx(30)
+    # zero is one more choice than to have a threshold at all
+    assert LENGTH.clause(Clause((Literal("vx", (0,), op=">"),))) == pytest.approx(3 + 1 + 1 + 1)
+    assert DescriptionLength(8, 1023, evidence=3).sign == pytest.approx(3)
     # the second one chooses from three, and the order of the two is free
     two = Clause((Literal("near", (0, 1)), Literal("red", (1,))))
     assert LENGTH.clause(two) == pytest.approx(6 + 4 + math.log2(3) - 1)

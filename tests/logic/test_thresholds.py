@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relgym.logic.thresholds import bin_values, simplest_between
+from relgym.logic.thresholds import bin_values, merit, simplest_between
 
 
 def test_neighbours_of_one_class_share_a_bin() -> None:
@@ -60,6 +60,14 @@ def test_thresholds_read_well() -> None:
     assert simplest_between(-1.0, 1.0) == 0.0
     assert simplest_between(0.30001, 0.3217) == 0.31
     assert simplest_between(0.0, 1e-8) == 5e-9
+
+
+def test_the_sign_decides_where_it_can() -> None:
+    assert simplest_between(-0.3, 0.01) == 0.0  # however unequal the sides
+    assert simplest_between(-1e-3, 1.0) != 0.0  # but not from the very edge: that may be rounding
+    assert simplest_between(0.0, 1.0) == simplest_between(-1e-18, 1.0) == 0.5
+    low, high = np.array([-1.0, 0.0, 2.0]), np.array([0.5, 9.0, 3.0])
+    assert merit(low, high).tolist() == [np.inf, 9.0, 1.0]
 
 
 def test_the_narrowest_gap_can_be_cut() -> None:

@@ -101,6 +101,22 @@ def test_what_the_target_leaves_is_not_close_while_it_touches_something_else() -
     assert close(leaving) == {ball, left}  # nothing else is touched
 
 
+def test_what_is_approached_fastest_is_the_narrowest_context() -> None:
+    ball, left, right = (SCHEMA.layout().index(n) for n in ("ball", "left", "right"))
+    bodies = SCHEMA.layout().bodies
+
+    def struck(scene: Scene, parting: bool = True) -> set[int]:
+        percept = Perception(SCHEMA, parting=parting).percept(scene.layout, scene.vector[None])
+        return {bodies[k] for k in np.flatnonzero(percept.situation(ball).examples.struck[0])}
+
+    assert struck(squeezed(-0.02)) == {ball, left}
+    assert struck(squeezed(0.02)) == {ball, right}
+    assert struck(squeezed(0.0)) == {ball, left, right}  # none faster than the other
+    assert struck(world().replace({("ball", "vx"): 0.02})) == {ball}  # it touches one body, and leaves it
+    # without contact facts there is no such context: as close
+    assert struck(squeezed(-0.02), parting=False) == {ball, left, right}
+
+
 def test_positions_are_no_numbers_for_thresholds() -> None:
     vocabulary = looked(world()).perception.vocabulary(BALL)
     assert set(vocabulary.own) == {"vx", "mass", "action.force"}

@@ -1,0 +1,122 @@
+"""Extending a mode by a term that its first examples could not show.
+
+A ball that slides to a ramp's foot has no vertical velocity when it hits the ramp: nineteen such hits say nothing of
+how the bounce depends on it. The mode that they found is right where it was found, and too special. Later a hit with a
+vertical velocity comes, and no mode explains it; the next such hit confirms the weight that the first one asks for.
+Too few to found a mode of their own that could be unified with the first (§3.2.5), they still identify its missing
+term, if the data are exact: that two examples ask for the same weight to many digits is no coincidence.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.discovery import SEARCH, verifying_bits
+from relgym.clustering.merging import Known
+from relgym.clustering.mode import Mode
+from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
+
+__all__ = ["extended"]
+
+EXACT: Final = 24.0
+"""Bits by which each example must verify a function, for one to be enough."""
+
+CONSTANT: Final = 1e-9
+"""A column that varies by less, relative to what it does in the unexplained examples, is constant."""
+
+APART: Final = 1e-3
+"""Examples whose values differ by less, relative to what they differ from the constant, verify nothing."""
+
+
+def extended(known: Known, signature: int, pool: NDArray[np.intp]) -> LinearFit | None:
+    """A known mode's function with one more term, which explains the newest example and another unexplained one.
+
+    Parameters
+    ----------
+    known
+        Unchanged.
+    signature
+        Of the examples.
+    pool
+        Numbers of unexplained examples of this signature, oldest first.
+
+    Returns
+    -------
+    The function, on the signature's columns; of several, that of the mode with most examples.
+
+    Notes
+    -----
+    Only for modes of the target's own properties, and where each example verifies a function by `EXACT` bits.
+    Cost O(modes * columns * (examples of the mode + pool)), both at most `SEARCH`.
+    """
+    if len(pool) < 2 or verifying_bits(known.y, known.scale) < EXACT:
+        return None
+    pool = pool[-SEARCH:]
+    for i in sorted(known.clusters, key=lambda k: (-known.clusters[k].fitted, k)):
+        mode = known.clusters[i].mode
+        if not any(role.terms for role in mode.open_roles):
+            members = known.members(i)
+            members = members[known.table.signature_ids[known.rows[members]] == signature]
+            found = _extended(known, signature, mode, members[-SEARCH:], pool)
+            if found is not None:
+                return found
+    return None
+
+
+def _extended(
+    known: Known, signature: int, mode: Mode, members: NDArray[np.intp], pool: NDArray[np.intp]
+) -> LinearFit | None:
+    slots = known.table.signatures[signature]
+    order, stages = slots.preference(known.target)
+    used = [slots.column(0, name) for name, _ in mode.roles[0].terms]
+    if len(members) < len(used) + 2 or not stages:
+        return None
+    both = np.concatenate([members, pool])
+    y = known.y[both]
+    x = slots.matrix(known.table.x[known.rows[both]], order[: stages[0]])
+    weights = {slots.column(0, name): weight for name, weight in mode.roles[0].terms}
+    left = (
+        y - mode.intercept - sum(weights[c] * slots.values(known.table.x[known.rows[both]], c) for c in used)
+    )
+    for at in range(x.shape[1]):
+        if int(order[at]) in weights:
+            continue
+        agree = _agreeing(x[:, at], left, len(members), known.scale.tolerance)
+        if agree is None:
+            continue
+        columns = [k for k in range(x.shape[1]) if int(order[k]) in weights] + [at]
+        rows = np.concatenate([np.arange(len(members)), agree])
+        fit = least_squares(x[rows], y[rows], tuple(sorted(columns)))
+        fit = eliminate_backward(x[rows], y[rows], fit, sigma=known.scale.sigma)
+        if (
+            len(fit.columns) == len(columns)
+            and np.abs(y[rows] - fit.predict(x[rows])).max() <= known.scale.tolerance
+        ):
+            return LinearFit(tuple(int(order[c]) for c in fit.columns), fit.weights, fit.intercept, fit.rss)
+    return None
+
+
+def _agreeing(
+    column: NDArray[np.float64], left: NDArray[np.float64], members: int, tolerance: float
+) -> NDArray[np.intp] | None:
+    """Rows that one weight of a column explains, the last one among them; none unless another one verifies it.
+
+    Parameters
+    ----------
+    column, left
+        Values of the column, and what the mode leaves, in its `members` examples and then in the unexplained ones.
+    """
+    usual = float(np.median(column[:members]))
+    off = column - usual
+    last = float(off[-1])
+    if last == 0.0 or np.abs(off[:members]).max() > CONSTANT * abs(last):
+        return None
+    weight = float(left[-1]) / last
+    fits = np.abs(left - weight * off) <= tolerance
+    fits[:members] = False
+    fits &= np.abs(off) > APART * abs(last)
+    verify = fits & (np.abs(off - last) > APART * abs(last))
+    return np.flatnonzero(fits) if verify.any() else None
