@@ -21,7 +21,6 @@ __all__ = [
     "PushTask",
     "draw_distance",
     "draw_frictions",
-    "friction_options",
 ]
 
 FORCES: Final = (0.0, 250.0)
@@ -89,11 +88,6 @@ class PushTask(Task):
         middle = truck["px"] + truck["sx"] / 2 + scene["goal"]["ahead"]
         ground = truck["py"] - truck["sy"] / 2
         return (Region(middle - self.half_width, ground - _PAD_DEPTH, 2 * self.half_width, _PAD_DEPTH),)
-
-
-def friction_options() -> tuple[str, ...]:
-    """Reset options that the task adds."""
-    return ("friction_order", "goal_distance")
 
 
 def draw_frictions(boxes: tuple[str, ...], draws: Draws) -> dict[str, float]:

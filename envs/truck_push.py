@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import check_options, checked_count, checked_range, physical_action
+from relgym.envs.arguments import (
+    check_options,
+    checked_count,
+    checked_least,
+    checked_range,
+    physical_action,
+)
 from relgym.envs.base import SceneEnv
 from relgym.envs.draws import Draws, Range
 from relgym.envs.truck_goal import (
@@ -18,7 +24,6 @@ from relgym.envs.truck_goal import (
     PushTask,
     draw_distance,
     draw_frictions,
-    friction_options,
 )
 from relgym.envs.truck_scenes import Stacks, draw_row, layouts, loads, option_names, stacks_of
 from relgym.envs.truck_schema import body_values, truck_schema
@@ -41,10 +46,10 @@ _BOUNDS = {
     **dict.fromkeys(POSE[:3], (-1e6, 1e6)),
 }
 
-_TASKS = (None, "push")
-"""What an agent may be asked to do."""
+_TASKS = ("auto", "push", None)
+"""What an agent may be asked to do; ``"auto"``: push, unless frictions are redrawn while it does."""
 
-_WATCHED_FORCES = (0.0, 500.0)
+_WATCHED_FORCES, _WATCHED_FRICTIONS = (0.0, 500.0), (0.05, 0.5)
 
 _APPROACH, _BELOW, _PICTURE_WIDTH, _PICTURE_HEIGHT = 48.0, 12.0, 68.0, 32.0
 """The picture of the goal pad, in units: what it shows on the left of it, below it, and in all."""
@@ -83,13 +88,13 @@ class TruckPushEnv(SceneEnv):
                           the truck's nose
     ====================  ========================================  =======  ========  =======
 
-    Objects: ``truck``, ``box1`` … ``boxN``, and ``bystander1`` … on request, which are boxes too. With the task
+    Objects: ``truck``, ``box1`` … ``boxN``, and ``bystander1`` … on request, which are boxes too; with the task
     ``push`` also ``goal``, which has no body. The observation is Markov.
 
     Rewards
     -------
-    0 without a task. With ``push``, d for ``goal.ahead`` and a prime for the next scene,
-    ``0.1 (|d| - |d'|) - 0.02``, and 2 more when the truck stands (v' = 0) with ``|d'| <= 1``: `PushTask`.
+    With ``push``, d for ``goal.ahead`` and a prime for the next scene, ``0.1 (|d| - |d'|) - 0.02``, and 2 more
+    when the truck stands (v' = 0) with ``|d'| <= 1``: `PushTask`. Without a task 0.
 
     Starting State
     --------------
@@ -111,8 +116,8 @@ class TruckPushEnv(SceneEnv):
 
     Episode End
     -----------
-    Without a task never; truncated after 40 steps by the registered time limit. With ``push`` the first stop
-    counts: terminated when v' = 0 after v > 0, and when d' < -1; truncated after 20 steps.
+    With ``push`` the first stop counts: terminated when v' = 0 after v > 0, and when d' < -1; truncated after 20
+    steps. Without a task never; truncated after 40 steps by the registered time limit.
 
     Info
     ----
@@ -126,15 +131,19 @@ class TruckPushEnv(SceneEnv):
         Number of boxes to push (1 to 12).
     redraw
         When the frictions are drawn: ``"block"`` at reset, ``"step"`` before every step; then the schema
-        declares them exogenous.
+        declares them exogenous, and nobody could plan: there is no task.
     friction_range
-        From where they're drawn; with ``push`` only those of bystanders.
+        From where the frictions of all boxes are drawn; default: 0.05 to 0.5, but with ``push`` those of pushed
+        boxes as above.
     force_range
-        Forces (>= 0) that -1 and 1 stand for; by default 0 to 500, with ``push`` 0 to 250.
+        Forces (>= 0) that -1 and 1 stand for; default: 0 to 250 with ``push``, else 0 to 500.
     bystanders
         How many boxes stand beside the track.
     task
-        ``None``: watch what pushing does. ``"push"``: bring the stacks to the goal and stop there.
+        ``"push"``: bring the stacks to the goal and stop there. ``None``: the thesis' world, where one watches
+        what pushing does. ``"auto"``: ``None`` with ``redraw="step"``, else ``"push"``.
+    gravity
+        G, at least 0.
 
     Version History
     ---------------
@@ -145,28 +154,25 @@ class TruckPushEnv(SceneEnv):
         self,
         n_boxes: int = 3,
         redraw: str = "block",
-        friction_range: tuple[float, float] = (0.05, 0.5),
+        friction_range: tuple[float, float] | None = None,
         force_range: tuple[float, float] | None = None,
         bystanders: int = 0,
-        task: str | None = None,
+        task: str | None = "auto",
         render_mode: str | None = None,
+        gravity: float = GRAVITY,
     ) -> None:
-        if redraw not in ("block", "step"):
-            raise ConfigError(f"redraw={redraw!r}: expected 'block' or 'step'")
-        if task not in _TASKS:
-            raise ConfigError(f"task={task!r}: expected one of {list(_TASKS)}")
-        if task is not None and redraw != "block":
-            raise ConfigError(
-                f"task={task!r} with redraw={redraw!r}: nobody can plan for frictions yet to be drawn"
-            )
+        task = _checked_task(task, redraw)
         self._boxes = tuple(f"box{k + 1}" for k in range(checked_count("n_boxes", n_boxes, 1, 12)))
         count = checked_count("bystanders", bystanders, 0, 100)
         self._bystanders = tuple(f"bystander{k + 1}" for k in range(count))
-        self._frictions = Range(*checked_range("friction_range", friction_range), 0.0, 1e3)
+        self._banded = task is not None and friction_range is None
+        frictions = _WATCHED_FRICTIONS if friction_range is None else friction_range
+        self._frictions = Range(*checked_range("friction_range", frictions), 0.0, 1e3)
         self._redraw = redraw
+        self._gravity = checked_least("gravity", gravity, 0.0)
         names = (*self._boxes, *self._bystanders)
-        forces = force_range or (FORCES if task else _WATCHED_FORCES)
-        forces = checked_range("force_range", forces)
+        usual = FORCES if task else _WATCHED_FORCES
+        forces = checked_range("force_range", usual if force_range is None else force_range)
         schema = truck_schema(names, forces, exogenous=redraw == "step", goal=task is not None)
         super().__init__(
             schema,
@@ -186,7 +192,9 @@ class TruckPushEnv(SceneEnv):
     @property
     def reset_options(self) -> tuple[str, ...]:
         """Names of all options of `reset`."""
-        return (*option_names(self._boxes, self._bystanders), *(friction_options() if self.task else ()))
+        own = (("goal_distance", self.task is not None), ("friction_order", self._banded))
+        names = option_names(self._boxes, self._bystanders)
+        return (*names, *(name for name, there in own if there))
 
     @property
     def stacks(self) -> Stacks:
@@ -206,7 +214,7 @@ class TruckPushEnv(SceneEnv):
 
     def _draw_frictions(self, draws: Draws) -> dict[str, float]:
         """Friction constant of every box, by name."""
-        pushed = draw_frictions(self._boxes, draws) if self.task else {}
+        pushed = draw_frictions(self._boxes, draws) if self._banded else {}
         rest = (name for name in (*self._boxes, *self._bystanders) if name not in pushed)
         return pushed | {name: draws.number(f"{name}_friction", self._frictions) for name in rest}
 
@@ -227,7 +235,7 @@ class TruckPushEnv(SceneEnv):
         return after
 
     def _next_velocity(self, state: Float1D, force: float) -> float:
-        weight = BOX_MASS * GRAVITY
+        weight = BOX_MASS * self._gravity
         friction = sum(
             load * weight * float(state[self._columns[name] + _OWN])
             for name, load in loads(self._stacks).items()
@@ -266,3 +274,18 @@ class TruckPushEnv(SceneEnv):
 
     def _restore(self, vector: Float1D, hidden: Any) -> None:
         self._stacks = stacks_of(self._scene_of(vector)) if hidden is None else hidden
+
+
+def _checked_task(task: str | None, redraw: str) -> str | None:
+    """The task that is meant; `ConfigError` where it is none, or can't go with `redraw`."""
+    if redraw not in ("block", "step"):
+        raise ConfigError(f"redraw={redraw!r}: expected 'block' or 'step'")
+    if task not in _TASKS:
+        raise ConfigError(f"task={task!r}: expected one of {list(_TASKS)}")
+    if task == "auto":
+        return "push" if redraw == "block" else None
+    if task is not None and redraw != "block":
+        raise ConfigError(
+            f"task={task!r} with redraw={redraw!r}: nobody can plan for frictions yet to be drawn; pass task=None"
+        )
+    return task

@@ -35,7 +35,7 @@ class Args:
 
 def make_env() -> gym.Env[Any, Any]:
     """The recorder sees scenes; the agent sees short vectors."""
-    return FlatView(TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push")))
+    return FlatView(TransitionRecorder(gym.make("relgym/TruckPush-v0")))
 
 
 def main(args: Args) -> None:

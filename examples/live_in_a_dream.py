@@ -39,7 +39,7 @@ def main(args: Args) -> None:
     for mode in model.modes("truck", "vx"):
         print(mode.examples, mode.formula())
 
-    real = gym.make("relgym/TruckPush-v0", n_boxes=2)
+    real = gym.make("relgym/TruckPush-v0", n_boxes=2, task=None)
     dream = relgym.envs.LearnedModelEnv(model, like=real)
     rng = np.random.default_rng(args.seed)
     for trial in range(args.trials):

@@ -48,7 +48,7 @@ class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordCons
     Examples
     --------
     >>> import gymnasium as gym, relgym
-    >>> env = FlatView(gym.make("relgym/TruckPush-v0", task="push"))
+    >>> env = FlatView(gym.make("relgym/TruckPush-v0"))
     >>> env.observation_space.shape
     (15,)
     >>> env.flattener.names[:5]
@@ -103,7 +103,7 @@ class VectorFlatView(gym.vector.VectorWrapper[Any, Any, Any, Any, Any], RecordCo
     Examples
     --------
     >>> import gymnasium as gym, relgym
-    >>> envs = VectorFlatView(gym.make_vec("relgym/TruckPush-v0", 3, vectorization_mode="sync", task="push"))
+    >>> envs = VectorFlatView(gym.make_vec("relgym/TruckPush-v0", 3, vectorization_mode="sync"))
     >>> flat, _ = envs.reset(seed=0)
     >>> flat.shape
     (3, 15)

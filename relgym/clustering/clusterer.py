@@ -218,9 +218,9 @@ class ModeClusterer(Population):
                 search.failures += 1
                 break
             search.failures = 0
-        search.waiting = 0
-        if len(pool) and (wider := extended(self._known(table), signature, pool)) is not None:
+        if (wider := extended(self._known(table), signature, pool, fresh=search.waiting)) is not None:
             self._adopt(table, signature, wider)
+        search.waiting = 0
 
     def _patience(self, search: _Search, doubtful: bool) -> int:
         """News to wait for until the next search: the more, the oftener it was in vain.

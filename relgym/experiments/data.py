@@ -272,7 +272,7 @@ def truck_blocks(
     -----
     Cost: about 30 microseconds a transition.
     """
-    env = TruckPushEnv(n_boxes, redraw, friction_range, (0.0, 500.0), bystanders)
+    env = TruckPushEnv(n_boxes, redraw, friction_range, (0.0, 500.0), bystanders, task=None)
     boxes = tuple(f"box{k + 1}" for k in range(n_boxes))
     cases = list(product(range(repeats), range(1, len(layouts(n_boxes)) + 1), permutations(boxes)))
     numbers = np.arange(len(cases))

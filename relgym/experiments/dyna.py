@@ -1,32 +1,19 @@
-"""Issue "Dream": how many real steps agents need with a relational model, a neural one, and none.
-
-``python -m relgym.experiments.dyna --arms relgym sac --seeds 3 --steps 2000`` runs two arms with three seeds each and
-reports them. Runs that are done are kept in files and not run again, so that the whole comparison (``make dyna-full``)
-can be stopped and resumed.
-"""
+"""One agent's course of learning: with a relational model, a neural one or none, checked again and again."""
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
-import sys
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
 
-from relgym.errors import ConfigError
-from relgym.experiments.dyna_arms import ARMS, COURSES, Arm, Course, make_agent, make_dyna, make_env
-from relgym.experiments.seeds import TRAINING_SEEDS
+from relgym.experiments.dyna_arms import Arm, Change, Course, make_agent, make_dyna, make_env
 
-__all__ = ["CHECK_EVERY", "ENOUGH", "EPISODES", "Examination", "Run", "main", "run"]
+__all__ = ["CHECK_EVERY", "ENOUGH", "EPISODES", "STEPS", "Examination", "Run", "run", "solved_at"]
 
 EPISODES: Final = 100
 """Evaluation episodes, always the same."""
@@ -49,8 +36,8 @@ class Run:
 
     Attributes
     ----------
-    course, arm, seed
-        What was run.
+    course, arm, seed, steps
+        What was run, and for how many real steps at most.
     curve
         (real steps, successes of `EPISODES`) at every evaluation.
     solved_at
@@ -59,6 +46,8 @@ class Run:
         Wall time, evaluations included.
     learning_seconds, dreaming_seconds
         Of it, time that the model took to foretell and learn, and to dream.
+    trusted
+        Share of the real steps at which the model was trusted.
     laws
         What was learned, as text; empty where nothing readable was.
     """
@@ -66,12 +55,19 @@ class Run:
     course: str
     arm: str
     seed: int
+    steps: int
     curve: tuple[tuple[int, int], ...]
     solved_at: int | None
     seconds: float
     learning_seconds: float = 0.0
     dreaming_seconds: float = 0.0
+    trusted: float = 0.0
     laws: str = ""
+
+    @property
+    def last(self) -> int:
+        """Successes at the last evaluation; 0 if there was none."""
+        return self.curve[-1][1] if self.curve else 0
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Run:
@@ -128,6 +124,8 @@ def run(
     met: Callable[[Any, Any], None] | None = None,
     agent: dict[str, Any] | None = None,
     dyna: dict[str, Any] | None = None,
+    model: Any = None,
+    change: Change | None = None,
 ) -> Run:
     """Let one agent learn until it succeeds twice in a row, or for so many real steps.
 
@@ -149,22 +147,31 @@ def run(
         Is shown the trained agent and its model (none: it has none) at the end.
     agent, dyna
         Parameters of the agent and of Dyna that differ from the course's.
+    model
+        To dream in, if it isn't to be learned from nothing.
+    change
+        How the world changes while the agent learns; tests are in the world as it is by then.
     """
-    env: gym.Env[Any, Any] = make_env(course)
+    env: gym.Env[Any, Any] = make_env(course, change)
     algorithm = make_agent(arm, env, seed=seed, **(agent or {}))  # says so where the extra is missing
     import torch
     from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
     torch.set_num_threads(1)  # nets this small lose by more
-    own = make_dyna(arm, course, env, seed=seed, **(dyna or {}))
+    own = make_dyna(arm, course, env, seed=seed, model=model, **(dyna or {}))
     tests = testing or Examination(course)
+    later = tests if change is None else Examination(course, **change.arguments)
     curve: list[tuple[int, int]] = []
+    trusted = 0
 
     class Check(BaseCallback):  # type: ignore[misc]
         def _on_step(self) -> bool:
+            nonlocal trusted
+            trusted += int(getattr(self.model.replay_buffer, "trusted", False))
             if self.num_timesteps % CHECK_EVERY:
                 return True
-            curve.append((self.num_timesteps, tests.successes(self.model)))
+            exam = tests if change is None or self.num_timesteps <= change.after else later
+            curve.append((self.num_timesteps, exam.successes(self.model)))
             if heard is not None:
                 heard(*curve[-1])
             return to_the_end or solved_at(curve) is None
@@ -175,7 +182,11 @@ def run(
     if met is not None:
         met(algorithm, getattr(own, "world", None))
     learning, dreaming, laws = _costs(own)
-    return Run(course.name, arm.name, seed, tuple(curve), solved_at(curve), seconds, learning, dreaming, laws)
+    share = trusted / max(1, algorithm.num_timesteps)
+    solved = solved_at(curve)
+    return Run(
+        course.name, arm.name, seed, steps, tuple(curve), solved, seconds, learning, dreaming, share, laws
+    )
 
 
 def solved_at(curve: Sequence[tuple[int, int]]) -> int | None:
@@ -190,63 +201,3 @@ def _costs(own: Any) -> tuple[float, float, str]:
     parts = [own.world, getattr(own.apprentice.judge, "model", None)]
     laws = [part.describe() for part in dict.fromkeys(parts) if hasattr(part, "describe")]
     return own.apprentice.seconds, own.dreaming_seconds, "\n\n".join(laws)
-
-
-# ------------------------------------------------------------------ many runs
-def kept(folder: Path, course: Course, arm: Arm, seed: int, steps: int) -> Path:
-    """Where a run is kept."""
-    return folder / f"{course.name}-{arm.name}-{steps}-seed{seed}.json"
-
-
-def load(path: Path) -> Run:
-    """Read a kept run; `ConfigError` where the file is damaged."""
-    try:
-        return Run.from_json(json.loads(path.read_text(encoding="utf-8")))
-    except (ValueError, TypeError, KeyError) as error:
-        raise ConfigError(
-            f"{path} is no run of this experiment ({error}): delete it to run it again"
-        ) from None
-
-
-def _job(folder: str, course: str, arm: str, seed: int, steps: int) -> str:
-    """One run in a process of its own, written atomically."""
-    path = kept(Path(folder), COURSES[course], ARMS[arm], seed, steps)
-
-    def heard(at: int, good: int) -> None:
-        print(f"{course}, {arm}, seed {seed}: {good} of {EPISODES} after {at:,}", file=sys.stderr, flush=True)
-
-    found = run(COURSES[course], ARMS[arm], seed=seed, steps=steps, heard=heard)
-    partial = path.with_suffix(f".{os.getpid()}.partial")
-    partial.write_text(json.dumps(asdict(found), indent=1), encoding="utf-8")
-    partial.replace(path)
-    return str(path)
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run what isn't run yet, then report everything that was asked for."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--course", choices=sorted(COURSES), default="truck")
-    parser.add_argument("--arms", nargs="+", choices=list(ARMS), default=list(ARMS))
-    parser.add_argument("--seeds", type=int, default=len(TRAINING_SEEDS), help="number of seeds, at most 5")
-    parser.add_argument("--steps", type=int, default=STEPS, help="real steps at most")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--out", type=Path, default=Path("out/dyna"))
-    chosen = parser.parse_args(arguments)
-    from relgym.experiments.dyna_report import draw_runs, summary
-
-    chosen.out.mkdir(parents=True, exist_ok=True)
-    course, seeds = COURSES[chosen.course], TRAINING_SEEDS[: chosen.seeds]
-    wanted = [(arm, seed) for arm in chosen.arms for seed in seeds]
-    places = {(arm, seed): kept(chosen.out, course, ARMS[arm], seed, chosen.steps) for arm, seed in wanted}
-    missing = [key for key, path in places.items() if not path.is_file()]
-    with ProcessPoolExecutor(chosen.jobs) as pool:
-        jobs = [pool.submit(_job, str(chosen.out), course.name, *key, chosen.steps) for key in missing]
-        for count, job in enumerate(as_completed(jobs), start=1):
-            print(f"{count} of {len(missing)} runs: {job.result()}", file=sys.stderr, flush=True)
-    runs = [load(path) for path in places.values()]
-    print(summary(runs, chosen.steps))
-    print(draw_runs(chosen.out / f"{course.name}.png", runs, course.title))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,36 +1,75 @@
-"""Issue "Dream", row 2: a policy trained in the dream alone, of a model learned from a few random real steps.
-
-``python -m relgym.experiments.dyna_asleep --seeds 2``
-"""
+"""Agents that train in their dreams alone, of a model that watched a few random real steps."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import Any, Final
 
+import gymnasium as gym
+from gymnasium.vector import AutoresetMode
+
 import relgym
-from relgym.experiments.bar import Measure, measured, report
-from relgym.experiments.dyna import ENOUGH, Examination
+from relgym.envs.flat import FlatSpec
+from relgym.experiments.dyna import Examination
 from relgym.experiments.dyna_arms import AGENT, COURSES, Course, make_env
-from relgym.experiments.seeds import TRAINING_SEEDS
+from relgym.wrappers.flat import VectorFlatView
 from relgym.wrappers.sb3.apprentice import Apprentice
-from relgym.wrappers.sb3.settings import DynaConfig
+from relgym.wrappers.sb3.config import DynaConfig
 
-__all__ = ["main", "trained_asleep"]
+__all__ = ["among", "asleep", "trained_among", "trained_asleep"]
 
-REAL_STEPS: Final = 1_000
-GRADIENT_STEPS: Final = 30_000
 DREAMS: Final = 32
 """At once; one decision in all of them is followed by `UPDATES` gradient steps."""
 
 UPDATES: Final = 16
 
+_AGENT: Final = {**AGENT, "learning_starts": 20 * DREAMS, "buffer_size": 100_000, "gradient_steps": UPDATES}
 
-def trained_asleep(
-    course: Course, *, seed: int, real: int = REAL_STEPS, updates: int = GRADIENT_STEPS
-) -> Any:
+
+def asleep(*, course: str, seed: int, real: int, updates: int) -> dict[str, Any]:
+    """An agent that trained in its dream alone, in the real world.
+
+    Parameters
+    ----------
+    course, seed
+        Name in `COURSES`, and of everything random; reward and termination are given.
+    real
+        Random real decisions that the model learned from.
+    updates
+        Gradient steps.
+    """
+    started = perf_counter()
+    agent = trained_asleep(COURSES[course], seed=seed, real=real, updates=updates)
+    seconds = perf_counter() - started
+    return {"successes": Examination(COURSES[course]).successes(agent), "seconds": seconds}
+
+
+def among(*, seed: int, real: int, updates: int, bystanders: list[int]) -> dict[str, Any]:
+    """An agent that dreamed of more boxes beside the track than its model ever saw; in the real world.
+
+    Parameters
+    ----------
+    seed, real, updates
+        As for `asleep`.
+    bystanders
+        How many there are in one scene or the other.
+
+    Returns
+    -------
+    Successes of 100 real episodes by number of bystanders, and the seconds of training.
+    """
+    course, started = COURSES["truck"], perf_counter()
+    agent, spec = trained_among(course, bystanders, seed=seed, real=real, updates=updates)
+    seconds = perf_counter() - started
+    found = {
+        str(count): Examination(course, spec=spec, bystanders=count).successes(agent) for count in bystanders
+    }
+    return {"successes": found, "seconds": seconds}
+
+
+def trained_asleep(course: Course, *, seed: int, real: int, updates: int) -> Any:
     """SAC that never acted in the world: only its model watched that, under random actions.
 
     Parameters
@@ -40,48 +79,75 @@ def trained_asleep(
     seed
         Of everything random.
     real
-        Real steps that the model learns from.
+        Real decisions that the model learns from.
     updates
         Gradient steps in the dream.
     """
-    import torch
-    from stable_baselines3 import SAC
+    from relgym.wrappers.sb3.dreaming import DreamVecEnv
 
-    from relgym.wrappers.sb3.dreaming import DreamVecEnv, explore
-
-    torch.set_num_threads(1)
     env = make_env(course)
     config = DynaConfig(horizon=course.horizon, seed=seed)
-    model = relgym.WorldModel(env.get_wrapper_attr("schema"))
-    apprentice = Apprentice(model, env.get_wrapper_attr("task"), config)
-    explore(apprentice, env, real, seed=seed)
+    apprentice = _watched(env, config, real=real, seed=seed)
     dreams = DreamVecEnv(apprentice, env, num_envs=DREAMS, config=config)
-    settings = {**AGENT, "learning_starts": 20 * DREAMS, "buffer_size": 100_000}
-    agent = SAC("MlpPolicy", dreams, seed=seed, gradient_steps=UPDATES, **settings)
+    agent = _agent(dreams, seed)
     agent.learn(DREAMS * (updates // UPDATES))
     return agent
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Train with the number of seeds on the command line, test in the world, print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--course", choices=sorted(COURSES), default="truck")
-    parser.add_argument("--seeds", type=int, default=len(TRAINING_SEEDS))
-    parser.add_argument("--updates", type=int, default=GRADIENT_STEPS)
-    chosen = parser.parse_args(arguments)
-    course, successes, seconds = COURSES[chosen.course], [], []
-    tests = Examination(course)
-    for seed in TRAINING_SEEDS[: chosen.seeds]:
-        started = perf_counter()
-        agent = trained_asleep(course, seed=seed, updates=chosen.updates)
-        seconds.append(perf_counter() - started)
-        successes.append(tests.successes(agent))
-    measures: list[Measure] = [
-        measured("successes of 100 real episodes", ENOUGH, successes, ">="),
-        measured("seconds", 600, seconds),
-    ]
-    print(report(f"trained in the dream alone: {course.title}", measures))
+def trained_among(
+    course: Course, bystanders: Sequence[int], *, seed: int, real: int, updates: int
+) -> tuple[Any, FlatSpec]:
+    """SAC that trained in dreams of more objects than there were while its model learned.
+
+    One bystander was there then: without any, nothing would tell that boxes exist that aren't pushed.
+
+    Parameters
+    ----------
+    course
+        Where the model learns; reward and termination are given.
+    bystanders
+        How many there are in the dreams, by turns. First scenes are those of real resets; no step is real.
+    seed, real, updates
+        As for `trained_asleep`.
+
+    Returns
+    -------
+    The agent, and how it sees: a flat view with room for the most bystanders.
+    """
+    from relgym.wrappers.sb3.vec_env import VectorAsVecEnv
+
+    env = make_env(course, bystanders=1)
+    model = _watched(env, DynaConfig(seed=seed), real=real, seed=seed).model
+    kind = env.get_wrapper_attr("schema").type_of("box1").name
+    spec = replace(env.get_wrapper_attr("flat_spec"), slots={kind: 3 + max(bystanders)})
+    dreams = []
+    for count in bystanders:
+        like = gym.make(course.env_id, disable_env_checker=True, **course.arguments, bystanders=count)
+        many = relgym.envs.LearnedModelVectorEnv(
+            model, DREAMS, like, horizon=course.horizon, autoreset_mode=AutoresetMode.SAME_STEP
+        )
+        dreams.append(VectorAsVecEnv(VectorFlatView(many, spec)))
+        dreams[-1].seed(1_000 * seed + count)
+    agent = _agent(dreams[0], seed)
+    for turn in range(updates // (UPDATES * course.horizon)):
+        agent.set_env(dreams[turn % len(dreams)])
+        agent.learn(DREAMS * course.horizon, reset_num_timesteps=False)
+    return agent, spec
 
 
-if __name__ == "__main__":
-    main()
+def _watched(env: gym.Env[Any, Any], config: DynaConfig, *, real: int, seed: int) -> Apprentice:
+    """A model that has watched random actions."""
+    from relgym.wrappers.sb3.dreaming import explore
+
+    model = relgym.WorldModel(env.get_wrapper_attr("schema"))
+    apprentice = Apprentice(model, env.get_wrapper_attr("task"), config)
+    explore(apprentice, env, real, seed=seed)
+    return apprentice
+
+
+def _agent(dreams: Any, seed: int) -> Any:
+    import torch
+    from stable_baselines3 import SAC
+
+    torch.set_num_threads(1)
+    return SAC("MlpPolicy", dreams, seed=seed, **_AGENT)

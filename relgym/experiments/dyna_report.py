@@ -18,7 +18,7 @@ from relgym.model.text import Cell, table
 if TYPE_CHECKING:
     from relgym.experiments.dyna import Run
 
-__all__ = ["curves", "draw_runs", "interquartile_mean", "interval", "summary"]
+__all__ = ["curves", "draw_runs", "interquartile_mean", "interval", "reached", "summary"]
 
 RESAMPLES: Final = 2_000
 """Bootstrap samples of the seeds."""
@@ -79,25 +79,36 @@ def curves(runs: Sequence[Run]) -> tuple[NDArray[np.int64], NDArray[np.float64]]
     return np.array(steps, dtype=np.int64), values
 
 
-def summary(runs: Sequence[Run], steps: int) -> str:
-    """A table: real steps to success by arm, runs that didn't succeed counting as more than `steps`."""
+def reached(run: Run) -> int:
+    """Real steps to success; one more than it had where it didn't succeed."""
+    return run.steps + 1 if run.solved_at is None else run.solved_at
+
+
+def summary(runs: Sequence[Run]) -> str:
+    """A table: real steps to success by arm; runs that didn't succeed count as more than they had."""
     rows: list[list[Cell]] = []
     for arm, own in _by_arm(runs):
-        reached = sorted(steps + 1 if r.solved_at is None else r.solved_at for r in own)
-        middle = median(reached)
+        ordered = sorted(own, key=reached)
+        low, high = ordered[(len(own) - 1) // 2], ordered[len(own) // 2]  # the same one of an odd number
+        middle = f"{median(map(reached, own)):,.0f}" if high.solved_at is not None else f"> {low.steps:,}"
         rows.append(
             [
                 ARMS[arm].title,
                 f"{sum(r.solved_at is not None for r in own)} of {len(own)}",
-                f"> {steps:,}" if middle > steps else f"{middle:,.0f}",
-                ", ".join("-" if at > steps else f"{at:,}" for at in reached),
-                round(median(r.curve[-1][1] for r in own if r.curve) if own else 0),
-                f"{median(r.seconds for r in own):.0f} s",
-                f"{median(r.learning_seconds for r in own):.0f} s",
+                middle,
+                ", ".join(f"> {r.steps:,}" if r.solved_at is None else f"{r.solved_at:,}" for r in ordered),
+                f"{median(r.last for r in own):.0f}",
+                *(f"{median(values):.0f} s" for values in _times(own)),
             ]
         )
-    heading = ["arm", "solved", "median steps", "each", "last success, %", "time", "of it model"]
+    heading = ["arm", "solved", "median steps", "each", "last, %", "time", "learning", "dreaming"]
     return table(heading, rows)
+
+
+def _times(runs: Sequence[Run]) -> tuple[list[float], ...]:
+    return tuple(
+        [getattr(r, name) for r in runs] for name in ("seconds", "learning_seconds", "dreaming_seconds")
+    )
 
 
 def draw_runs(path: Path, runs: Sequence[Run], title: str, *, seed: int = 0) -> Path:

@@ -22,13 +22,15 @@ from relgym.errors import ConfigError
 
 IDS = ("relgym/BallBoxRamp-v0", "relgym/BallGoal-v0", "relgym/TruckPush-v0")
 STEPS = {"relgym/BallBoxRamp-v0": 200, "relgym/BallGoal-v0": 500, "relgym/TruckPush-v0": 40}
+ENDLESS: dict[str, dict[str, Any]] = {"relgym/TruckPush-v0": {"task": None}}  # no action ends an episode
 MADE: list[tuple[str, dict[str, Any]]] = [
     *((env_id, {}) for env_id in IDS),
     ("relgym/BallBoxRamp-v0", {"objects": ("box", "ramp", "ramp"), "balls": 3, "type_names": "thesis"}),
     ("relgym/BallBoxRamp-v0", {"objects": ()}),
     ("relgym/BallGoal-v0", {"objects": ("box", "box", "ramp"), "type_names": "thesis", "friction": 0.2}),
     ("relgym/TruckPush-v0", {"n_boxes": 5, "redraw": "step", "bystanders": 2}),
-    ("relgym/TruckPush-v0", {"task": "push", "bystanders": 2}),
+    ("relgym/TruckPush-v0", {"task": None}),
+    ("relgym/TruckPush-v0", {"bystanders": 2}),
 ]
 
 ids = pytest.mark.parametrize("env_id", IDS)
@@ -61,7 +63,7 @@ def test_observations_lie_in_their_space(env_id: str, arguments: dict[str, Any])
 
 @ids
 def test_time_limit_and_schema_through_the_wrappers(env_id: str) -> None:
-    env = gym.make(env_id)
+    env = gym.make(env_id, **ENDLESS.get(env_id, {}))
     observation, info = env.reset(seed=0)
     schema = env.get_wrapper_attr("schema")
     assert info["scene"].schema == schema
@@ -92,8 +94,10 @@ def test_observations_belong_to_the_caller(env_id: str) -> None:
 @pytest.mark.parametrize("mode", ["sync", "async"])
 @pytest.mark.parametrize("autoreset", list(AutoresetMode))
 def test_vector_envs(env_id: str, mode: str, autoreset: AutoresetMode) -> None:
-    made = gym.make_vec(env_id, 2, vectorization_mode=mode, vector_kwargs={"autoreset_mode": autoreset})
-    single = scene_env(env_id)
+    arguments = ENDLESS.get(env_id, {})
+    options = {"autoreset_mode": autoreset}
+    made = gym.make_vec(env_id, 2, vectorization_mode=mode, vector_kwargs=options, **arguments)
+    single = scene_env(env_id, **arguments)
     observation, _ = made.reset(seed=3)  # 3 and 4
     alone, _ = single.reset(seed=4)
     actions = made.action_space.sample()
@@ -139,7 +143,7 @@ def test_reset_is_needed_first(make: type[SceneEnv]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("env_id", "arguments"), [*((name, {}) for name in IDS), ("relgym/TruckPush-v0", {"task": "push"})]
+    ("env_id", "arguments"), [*((name, {}) for name in IDS), ("relgym/TruckPush-v0", {"task": None})]
 )
 def test_videos_are_recorded(env_id: str, arguments: dict[str, Any], tmp_path: Path) -> None:
     pytest.importorskip("moviepy", reason="RecordVideo writes through moviepy")

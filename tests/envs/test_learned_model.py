@@ -161,7 +161,7 @@ def test_actions_mean_the_same_as_in_the_real_env(cart: ModelLearner, action: fl
 
 
 def test_a_dream_follows_the_trucks_world(truck: ModelLearner) -> None:
-    real = gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="block")  # else frictions come from outside
+    real = gym.make("relgym/TruckPush-v0", n_boxes=1, task=None)  # with frictions that stay
     dream = LearnedModelEnv(truck.model, like=real)
     real.reset(seed=77)
     dream.reset(options={"scene": real.get_wrapper_attr("scene")})
@@ -270,7 +270,7 @@ def test_a_dream_of_other_objects_is_like_an_env_that_has_them(cart: ModelLearne
         env.reset(seed=episode, options={"layout": 1 + episode % 2})
         for _ in range(20):
             env.step(env.action_space.sample())
-    crowd = gym.make("relgym/TruckPush-v0", n_boxes=2, bystanders=3)
+    crowd = gym.make("relgym/TruckPush-v0", n_boxes=2, bystanders=3, task=None)
     dream = LearnedModelEnv(env.model, like=crowd)
     check_env(dream, skip_render_check=True)
     assert dream.observation_space == crowd.observation_space

@@ -150,7 +150,7 @@ def _begin_many(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def test_resets_of_a_real_env_are_those_of_single_dreams() -> None:
-    truck = gym.make("relgym/TruckPush-v0", n_boxes=1)
+    truck = gym.make("relgym/TruckPush-v0", n_boxes=1, task=None)
     model = relgym.wrappers.ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step"))
     model.action_space.seed(0)
     for episode in range(8):

@@ -183,8 +183,33 @@ def test_the_goal_is_no_body_and_the_action_is_not_seen() -> None:
     ]
 
 
+def test_to_push_is_the_task_unless_nobody_could_plan() -> None:
+    assert gym.make("relgym/TruckPush-v0").get_wrapper_attr("task") == PushTask()
+    assert gym.make("relgym/TruckPush-v0", redraw="step").get_wrapper_attr("task") is None
+    assert TruckPushEnv(task=None).task is None
+
+
+def test_a_given_range_of_frictions_holds_for_all_boxes() -> None:
+    env = TruckPushEnv(friction_range=(0.2, 0.21), bystanders=1)
+    for seed in range(20):
+        env.reset(seed=seed)
+        assert all(0.2 <= o["friction"] <= 0.21 for o in env.scene if o.type.name == "box")
+    with pytest.raises(ConfigError, match="friction_order"):
+        env.reset(options={"friction_order": ORDER})
+
+
+def test_half_the_gravity_is_half_the_friction() -> None:
+    speeds = []
+    for gravity in (10.0, 5.0):
+        env = TruckPushEnv(gravity=gravity)
+        env.reset(seed=0, options={"layout": 1, "order": ORDER, "box1_friction": 0.1})
+        env.step(force(250.0))
+        speeds.append(env.scene["truck"]["vx"])
+    assert speeds == pytest.approx([0.025 * 250.0 - 7.5 * 0.1, 0.025 * 250.0 - 3.75 * 0.1], abs=1e-12)
+
+
 def test_bad_combinations_are_named() -> None:
-    with pytest.raises(ConfigError, match="redraw='step'"):
+    with pytest.raises(ConfigError, match=r"redraw='step'.*task=None"):
         TruckPushEnv(task="push", redraw="step")
     with pytest.raises(ConfigError, match="goal_distance"):
-        TruckPushEnv().reset(options={"goal_distance": 3.0})
+        TruckPushEnv(task=None).reset(options={"goal_distance": 3.0})

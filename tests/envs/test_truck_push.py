@@ -28,7 +28,7 @@ def test_layouts_are_numbered_as_in_figure_3_1() -> None:
 
 @pytest.mark.parametrize("layout", [1, 2, 3, 4])
 def test_layout_is_as_asked_and_touches(layout: int) -> None:
-    env = TruckPushEnv()
+    env = TruckPushEnv(task=None)
     order = ("box2", "box3", "box1")
     for seed in range(20):
         _, info = env.reset(seed=seed, options={"layout": layout, "order": order})
@@ -55,7 +55,7 @@ def assert_touching(env: TruckPushEnv) -> None:
 
 @given(st.integers(1, 6), st.integers(0, 3), st.integers(0, 10**6))
 def test_any_number_of_boxes(n_boxes: int, bystanders: int, seed: int) -> None:
-    env = TruckPushEnv(n_boxes=n_boxes, bystanders=bystanders)
+    env = TruckPushEnv(n_boxes=n_boxes, bystanders=bystanders, task=None)
     _, info = env.reset(seed=seed)
     scene = info["scene"]
     assert stacks_of(scene) == info["stacks"]
@@ -75,7 +75,7 @@ def test_any_number_of_boxes(n_boxes: int, bystanders: int, seed: int) -> None:
     [(1, 7.5 * 0.1), (2, 5.0 * 0.1 + 2.5 * 0.4), (3, 2.5 * 0.1 + 5.0 * 0.2), (4, 2.5 * 0.7)],
 )
 def test_hand_worked_step(layout: int, friction: float) -> None:
-    env = TruckPushEnv()
+    env = TruckPushEnv(task=None)
     options = {"layout": layout, "order": ("box1", "box2", "box3"), "speed": 3.0}
     env.reset(options={**options, "box1_friction": 0.1, "box2_friction": 0.2, "box3_friction": 0.4})
     before = env.scene
@@ -87,7 +87,7 @@ def test_hand_worked_step(layout: int, friction: float) -> None:
 
 
 def test_friction_stops_the_truck_and_never_reverses_it() -> None:
-    env = TruckPushEnv()
+    env = TruckPushEnv(task=None)
     env.reset(seed=0)
     for _ in range(3):
         env.step(FULL)
@@ -102,7 +102,7 @@ def test_friction_stops_the_truck_and_never_reverses_it() -> None:
 
 @pytest.mark.parametrize(("force", "moves"), [(149.0, False), (151.0, True)])
 def test_at_rest_the_force_must_exceed_the_friction(force: float, moves: bool) -> None:
-    env = TruckPushEnv()
+    env = TruckPushEnv(task=None)
     env.reset(
         options={"layout": 1, "order": ("box1", "box2", "box3"), "box1_friction": 0.5}
     )  # 300 * 0.5 = 150
@@ -113,7 +113,7 @@ def test_at_rest_the_force_must_exceed_the_friction(force: float, moves: bool) -
 
 
 def test_bystanders_stay() -> None:
-    env = TruckPushEnv(bystanders=3)
+    env = TruckPushEnv(bystanders=3, task=None)
     _, info = env.reset(seed=0)
     for _ in range(40):
         env.step(FULL)
@@ -125,7 +125,7 @@ def test_bystanders_stay() -> None:
 
 def test_frictions_per_block_or_step() -> None:
     for redraw, same in (("block", True), ("step", False)):
-        env = TruckPushEnv(redraw=redraw)
+        env = TruckPushEnv(redraw=redraw, task=None)
         _, info = env.reset(seed=0)
         env.step(FULL)
         assert (env.scene["box1"]["friction"] == info["scene"]["box1"]["friction"]) == same
@@ -134,7 +134,7 @@ def test_frictions_per_block_or_step() -> None:
 
 @pytest.mark.parametrize("redraw", ["block", "step"])
 def test_a_restored_state_goes_on_exactly(redraw: str) -> None:
-    env, fresh = TruckPushEnv(redraw=redraw), TruckPushEnv(redraw=redraw)
+    env, fresh = TruckPushEnv(redraw=redraw, task=None), TruckPushEnv(redraw=redraw, task=None)
     env.reset(seed=0)
     env.step(FULL)
     fresh.set_state(env.get_state())
@@ -145,7 +145,7 @@ def test_a_restored_state_goes_on_exactly(redraw: str) -> None:
 
 
 def test_a_scene_alone_determines_what_follows() -> None:
-    env, fresh = TruckPushEnv(n_boxes=5, bystanders=2), TruckPushEnv(n_boxes=5, bystanders=2)
+    env, fresh = (TruckPushEnv(n_boxes=5, bystanders=2, task=None) for _ in range(2))
     for seed in range(30):
         env.reset(seed=seed)
         env.step(FULL)
@@ -157,7 +157,7 @@ def test_a_scene_alone_determines_what_follows() -> None:
 
 
 def test_a_scene_torn_apart_is_refused() -> None:
-    env = TruckPushEnv()
+    env = TruckPushEnv(task=None)
     env.reset(seed=0, options={"layout": 4})
     last = env.stacks[-1][0]
     torn = env.scene.replace({(last, "px"): env.scene[last]["px"] + 1.0})
@@ -166,7 +166,7 @@ def test_a_scene_torn_apart_is_refused() -> None:
 
 
 def test_actions_of_other_dtypes_and_slightly_outside() -> None:
-    env = TruckPushEnv()
+    env = TruckPushEnv(task=None)
     for action in (np.array([1.0]), np.array([1.0 + 1e-7], dtype=np.float64), [1.0], FULL):
         env.reset(seed=0)
         env.step(action)
@@ -178,7 +178,7 @@ def test_actions_of_other_dtypes_and_slightly_outside() -> None:
 
 @pytest.mark.parametrize("action", [np.array([1.001]), np.array([np.nan]), np.array([0.0, 0.0]), 0.5])
 def test_actions_outside_are_refused(action: Any) -> None:
-    env = TruckPushEnv()
+    env = TruckPushEnv(task=None)
     env.reset(seed=0)
     before = env.vector
     with pytest.raises(ActionError, match="expected an action of shape"):
@@ -195,6 +195,7 @@ def test_actions_outside_are_refused(action: Any) -> None:
         ({"task": "fly"}, "task='fly'"),
         ({"force_range": (-5.0, 5.0)}, "force_range"),
         ({"friction_range": (0.5, 0.1)}, "friction_range"),
+        ({"gravity": -1.0}, "gravity=-1"),
     ],
 )
 def test_bad_arguments_are_named(arguments: dict[str, Any], message: str) -> None:
@@ -208,11 +209,11 @@ def test_bad_arguments_are_named(arguments: dict[str, Any], message: str) -> Non
 )
 def test_bad_options_are_named(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
-        TruckPushEnv().reset(seed=0, options=options)
+        TruckPushEnv(task=None).reset(seed=0, options=options)
 
 
 def test_the_schema_declares_the_action_in_physical_units() -> None:
-    schema = TruckPushEnv(force_range=(100.0, 300.0)).schema
+    schema = TruckPushEnv(force_range=(100.0, 300.0), task=None).schema
     assert schema.order[-1] == "action"
     assert schema.action_scale == (("force", 100.0, 300.0),)
     assert not schema.type("action").has_body

@@ -255,7 +255,7 @@ def test_least_squares_per_configuration_gives_table_3_1(redraw: str) -> None:
 
 def stacks_in(block: Block, redraw: str) -> list[tuple[str, ...]]:
     """The block's stacks, the highest first."""
-    env = TruckPushEnv(redraw=redraw)
+    env = TruckPushEnv(redraw=redraw, task=None)
     _, info = env.reset(options=dict(block.configuration))
     return sorted(info["stacks"], key=len, reverse=True)
 

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from relgym.errors import ConfigError
-from relgym.experiments.dyna import Examination, Run, kept, load, main, run, solved_at
-from relgym.experiments.dyna_arms import ARMS, COURSES, make_env
+from relgym.experiments.dyna import Examination, Run, run, solved_at
+from relgym.experiments.dyna_arms import ARMS, COURSES, Change, make_env
 from relgym.experiments.dyna_report import curves, draw_runs, interquartile_mean, interval, summary
 
 
 def of(arm: str, seed: int, *successes: int) -> Run:
     curve = tuple((250 * (k + 1), good) for k, good in enumerate(successes))
-    return Run("truck", arm, seed, curve, solved_at(curve), 10.0)
+    return Run("truck", arm, seed, 1000, curve, solved_at(curve), 10.0)
 
 
 def test_success_is_two_in_a_row() -> None:
@@ -55,7 +55,7 @@ def test_the_table_counts_unsolved_runs_as_more() -> None:
         of("relgym", 0, 91, 92),
         of("relgym", 1, 0, 91, 92),
     ]
-    text = summary(runs, 1000)
+    text = summary(runs)
     assert "SAC" in text and "> 1,000" in text and "0 of 3" in text
     assert "2 of 2" in text and "625" in text and "500, 750" in text
 
@@ -65,14 +65,25 @@ def test_curves_are_drawn(tmp_path: Path) -> None:
     assert draw_runs(tmp_path / "curves.png", runs, "truck").stat().st_size > 5_000
 
 
-def test_runs_outlive_the_file_and_damage_is_named(tmp_path: Path) -> None:
-    path = kept(tmp_path, COURSES["truck"], ARMS["sac"], 3, 1000)
+def test_runs_outlive_json() -> None:
     done = of("sac", 3, 1, 2)
-    path.write_text(json.dumps(asdict(done)))
-    assert load(path) == done
-    path.write_text(path.read_text()[:-20])
-    with pytest.raises(ConfigError, match=r"is no run of this experiment .*delete it"):
-        load(path)
+    assert Run.from_json(json.loads(json.dumps(asdict(done)))) == done
+    assert (done.last, of("sac", 3).last) == (2, 0)
+
+
+def test_a_world_changes_with_the_first_episode_after_its_time() -> None:
+    change = Change(after=3, arguments={"gravity": 0.0})
+    env, plain = make_env(COURSES["truck"], change), make_env(COURSES["truck"])
+    options = {"layout": 1, "order": ("box1", "box2", "box3"), "box1_friction": 0.2, "goal_distance": 40.0}
+    push = np.array([1.0], np.float32)
+    for world in (env, plain):
+        world.reset(seed=0, options=options)
+        for _ in range(4):  # no change within an episode
+            world.step(push)
+    assert env.get_wrapper_attr("scene") == plain.get_wrapper_attr("scene")
+    env.reset(options=options)
+    env.step(push)
+    assert env.get_wrapper_attr("scene")["truck"]["vx"] == pytest.approx(0.025 * 250.0)
 
 
 def test_agents_see_short_vectors_and_the_recorder_scenes() -> None:
@@ -111,17 +122,6 @@ def test_every_arm_runs(arm: str) -> None:
     assert [at for at, _ in heard] == [250]
     assert found.solved_at is None
     assert ("truck.vx" in found.laws) == (ARMS[arm].model == "relational")
-
-
-@pytest.mark.sb3
-def test_finished_runs_are_not_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = kept(tmp_path, COURSES["truck"], ARMS["sac"], 0, 250)
-    path.write_text(json.dumps(asdict(of("sac", 0, 42))))
-    before = path.stat().st_mtime_ns
-    main(["--arms", "sac", "--seeds", "1", "--steps", "250", "--out", str(tmp_path)])
-    assert path.stat().st_mtime_ns == before
-    assert "SAC" in capsys.readouterr().out
-    assert (tmp_path / "truck.png").is_file()
 
 
 @pytest.mark.sb3

@@ -211,7 +211,8 @@ def test_vector_envs_are_refused_with_a_remedy() -> None:
 
 
 def test_the_remedy_for_vector_envs_works() -> None:
-    envs = gym.make_vec("relgym/TruckPush-v0", num_envs=2, vectorization_mode="sync", wrappers=[ModelLearner])
+    options = {"vectorization_mode": "sync", "wrappers": [ModelLearner], "task": None}
+    envs = gym.make_vec("relgym/TruckPush-v0", num_envs=2, **options)
     envs.reset(seed=0)
     for _ in range(45):  # past the end of an episode, after 40
         *_, info = envs.step(envs.action_space.sample())

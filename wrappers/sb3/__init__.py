@@ -11,7 +11,7 @@ _HOMES = {
     "DreamCheckup": "relgym.wrappers.sb3.dreaming",
     "DreamVecEnv": "relgym.wrappers.sb3.dreaming",
     "Dyna": "relgym.wrappers.sb3.dyna",
-    "DynaConfig": "relgym.wrappers.sb3.settings",
+    "DynaConfig": "relgym.wrappers.sb3.config",
     "Imagination": "relgym.wrappers.sb3.imagination",
     "LearnedTask": "relgym.wrappers.sb3.judges",
     "MixedDictReplayBuffer": "relgym.wrappers.sb3.replay",

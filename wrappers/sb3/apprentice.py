@@ -11,11 +11,11 @@ import numpy as np
 from relgym.errors import ConfigError
 from relgym.model.scenes import mismatch
 from relgym.scene.objects import TASK, Scene
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.gate import Key, TrustGate, Verdict
 from relgym.wrappers.sb3.judges import Judge
 from relgym.wrappers.sb3.lens import Lens
 from relgym.wrappers.sb3.recorder import Experience
-from relgym.wrappers.sb3.settings import DynaConfig
 from relgym.wrappers.sb3.stock import DreamModel, SceneStock, changing
 
 __all__ = ["Apprentice", "check_model"]
@@ -29,7 +29,7 @@ class Apprentice:
     model
         The model; one that is frozen (``model.frozen``) is judged all the same, but doesn't learn.
     judge
-        Reward and termination, if they are to be foretold as well.
+        Reward and termination; one that learns (`LearnedTask`) learns from every step as it comes.
     config
         Free parameters.
 
@@ -61,6 +61,9 @@ class Apprentice:
         started = perf_counter()
         self.gate.count(self._judged(real))
         self.stock.add(real.start, first=real.first)
+        if hasattr(self.judge, "learn_step"):
+            # At once: a judge sees but what is there once, and what there is to learn is rare at first.
+            self.judge.learn_step(real.transition, real.reward, terminated=real.terminated)
         if self._learns:
             self._learn(real)
         self.seconds += perf_counter() - started
@@ -74,11 +77,10 @@ class Apprentice:
             self._teach(self._waiting.pop())
 
     def _teach(self, real: Experience) -> None:
-        if not hasattr(self.model, "learn_step"):
+        if hasattr(self.model, "learn_step"):  # the task as well
+            self.model.learn_step(real.transition, real.reward, terminated=real.terminated)
+        else:
             self.model.learn_one(real.transition)
-        for part in (self.model, self.judge):  # those that learn the task
-            if hasattr(part, "learn_step"):
-                part.learn_step(real.transition, real.reward, terminated=real.terminated)
 
     def _judged(self, real: Experience) -> Verdict:
         before, after = real.start, real.transition.after

@@ -13,9 +13,9 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from relgym.errors import ConfigError
 from relgym.wrappers.sb3.apprentice import Apprentice, check_model
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.imagination import Imagination
 from relgym.wrappers.sb3.lens import Lens, Observations, picked
-from relgym.wrappers.sb3.settings import DynaConfig
 from relgym.wrappers.sb3.stock import permuted
 
 __all__ = ["DreamCheckup", "DreamVecEnv", "explore"]

@@ -15,11 +15,11 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from relgym.errors import ConfigError
 from relgym.wrappers.sb3.apprentice import Apprentice, check_model
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.imagination import Imagination, Imagined
 from relgym.wrappers.sb3.judges import Judge, LearnedTask, NeuralModel, NeuralTask
 from relgym.wrappers.sb3.lens import Lens, Observations
 from relgym.wrappers.sb3.replay import Mixing
-from relgym.wrappers.sb3.settings import DynaConfig
 from relgym.wrappers.sb3.stock import DreamModel, changing, permuted
 
 __all__ = ["Dyna", "check_algorithm", "judge_of", "lens_of"]
@@ -64,7 +64,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     >>> import gymnasium as gym, relgym
     >>> from relgym.wrappers.sb3 import Dyna, TransitionRecorder, replay_options
     >>> from stable_baselines3 import SAC  # doctest: +SKIP
-    >>> env = TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push"))
+    >>> env = TransitionRecorder(gym.make("relgym/TruckPush-v0"))
     >>> model = relgym.WorldModel(env.get_wrapper_attr("schema"))
     >>> agent = SAC("MultiInputPolicy", env, **replay_options(env.observation_space))  # doctest: +SKIP
     >>> agent.learn(2_000, callback=Dyna(model))  # doctest: +SKIP

@@ -17,11 +17,12 @@ from relgym.experiments.chapter4.canvas import TITLES
 from relgym.experiments.chapter4.catalogue import JOBS
 from relgym.experiments.chapter4.job import Job, Shown
 from relgym.experiments.chapter4.protocol import LEARNERS, Protocol
+from relgym.experiments.chapter4.published import REMARKS
 from relgym.experiments.jobs.run import Progress, results, run
 from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
 
-__all__ = ["Made", "compute", "make", "page"]
+__all__ = ["Made", "compute", "make", "page", "section"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,18 +81,19 @@ def make(job: Job, protocol: Protocol, store: ResultStore, out: Path, command: s
     """
     plan = job.plan(protocol)
     shown = job.show(protocol, {group: results(tasks, store) for group, tasks in plan.items()})
+    text = f"{shown.text}\n\nprinted: {REMARKS[job.name]}" if job.name in REMARKS else shown.text
     figure = f"{job.name}.png" if shown.draw is not None else ""
     made = Made(
         job.name,
         job.title,
         job.source,
-        shown.text,
+        text,
         figure,
         date.today().isoformat(),
         command,
         _seconds(plan, store),
     )
-    write_atomically(out / f"{job.name}.txt", f"{shown.text}\n".encode())
+    write_atomically(out / f"{job.name}.txt", f"{text}\n".encode())
     write_atomically(out / f"{job.name}.csv", _csv(shown).encode())
     if shown.draw is not None:
         write_atomically(out / figure, _drawn(shown))
@@ -147,8 +149,8 @@ def page(out: Path, target: Path) -> list[str]:
     for each in made:
         if each.figure:
             write_atomically(folder / each.figure, (out / each.figure).read_bytes())
-    sections = [_section(each, folder.name) for each in made]
-    write_atomically(target, "\n\n".join([_head(made), *sections, ""]).encode())
+    sections = [section(each, folder.name) for each in made]
+    write_atomically(target, "\n\n".join([_head(made, folder), *sections, ""]).encode())
     return [each.name for each in made]
 
 
@@ -165,16 +167,19 @@ def _made(out: Path) -> Iterator[Made]:
                 ) from error
 
 
-def _head(made: Sequence[Made]) -> str:
+def _head(made: Sequence[Made], folder: Path) -> str:
     learners = "\n".join(f"- **{TITLES[name]}**: {words}" for name, words in LEARNERS.items())
     contents = "\n".join(f"- [{each.name}: {each.title}](#{_anchor(each)})" for each in made)
     missing = [name for name in JOBS if name not in {each.name for each in made}]
     rest = f"\nNot made yet: {', '.join(missing)}.\n" if missing else ""
+    dreams = "What dreaming is worth" if (folder / "dream.md").is_file() else ""
+    more = f"\n[{dreams}]({folder.name}/dream.md) has a page of its own.\n" if dreams else ""
     return (
         "# Results\n\n"
         "Chapter IV of the thesis again, each table and figure beside what was printed. `relgym reproduce` wrote this "
         "page; nothing\non it is typed by hand. *printed* is what the thesis says, § one of its sections; velocities "
-        "are in units per step.\n\n"
+        "are in units per step.\n"
+        f"{more}\n"
         f"Learners:\n\n{learners}\n\n{contents}\n{rest}"
     )
 
@@ -184,7 +189,8 @@ def _anchor(made: Made) -> str:
     return "".join(c for c in words.replace(" ", "-") if c.isalnum() or c in "-_")
 
 
-def _section(made: Made, folder: str) -> str:
+def section(made: Made, folder: str) -> str:
+    """A part of a page of results: its heading, how it was made, its figure in `folder`, its text."""
     figure = f"\n\n![{made.title}]({folder}/{made.figure})" if made.figure else ""
     how = f"`{made.command}`, {made.day}; {made.seconds:.0f} s of computing."
     return f"## {made.name}: {made.title} ({made.source})\n\n{how}{figure}\n\n```text\n{made.text}\n```"

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 
 import relgym
-from relgym.envs.truck_push import BOX_MASS, GRAVITY, TRUCK_MASS
-from relgym.envs.truck_scenes import loads, stacks_of
 from relgym.scene.objects import Transition
 from relgym.wrappers.sb3.apprentice import Apprentice
+from relgym.wrappers.sb3.config import DynaConfig
+from relgym.wrappers.sb3.judges import LearnedTask
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
-from relgym.wrappers.sb3.settings import DynaConfig
+from relgym.wrappers.sb3.stock import changing
 
 
-def make() -> Any:
-    return TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push", disable_env_checker=True))
+def make(**arguments: Any) -> Any:
+    return TransitionRecorder(gym.make("relgym/TruckPush-v0", disable_env_checker=True, **arguments))
 
 
-def steps(n: int, *, seed: int) -> list[Experience]:
-    env, found = make(), []
+def steps(n: int, *, seed: int, **arguments: Any) -> list[Experience]:
+    env, found = make(**arguments), []
     env.action_space.seed(seed)
     env.reset(seed=seed)
     while len(found) < n:
@@ -33,27 +33,12 @@ def steps(n: int, *, seed: int) -> list[Experience]:
     return found
 
 
-def with_half_the_friction(real: Experience) -> Transition:
-    """What would have followed in a world that rubs half as much; all else moves as in the real one."""
-    before, after = real.transition.before, real.transition.after
-    rub = sum(load * before[name]["friction"] for name, load in loads(stacks_of(real.start)).items())
-    push = before["action"]["force"] - 0.5 * BOX_MASS * GRAVITY * rub
-    v = max(0.0, before["truck"]["vx"] + push / (TRUCK_MASS + 3 * BOX_MASS))
-    further = v - after["truck"]["vx"]
-    places = {(o.name, "px"): o["px"] + further for o in after if "px" in o.type.properties}
-    return Transition(
-        before,
-        after.replace({**places, ("truck", "vx"): v, ("goal", "ahead"): after["goal"]["ahead"] - further}),
-    )
-
-
 @pytest.mark.parametrize("halved", [False, True])
 def test_only_a_model_of_this_world_is_trusted(halved: bool, rng: np.random.Generator) -> None:
-    lessons = steps(350, seed=1)
+    lessons = steps(350, seed=1, gravity=5.0 if halved else 10.0)
     model = relgym.WorldModel(lessons[0].start.schema)
     for k in rng.permutation(len(lessons)):
-        real = lessons[k]
-        model.learn_one(with_half_the_friction(real) if halved else real.transition)
+        model.learn_one(lessons[k].transition)
     model.frozen = True  # as if it had been loaded without its history
     seen = model.seen
     apprentice = Apprentice(model, make().get_wrapper_attr("task"), DynaConfig(least=50))
@@ -76,6 +61,19 @@ def test_a_model_that_leaves_out_what_moves_is_not_trusted() -> None:
     assert apprentice.gate.known == 1.0  # nothing changes, it says
     assert apprentice.gate.error > 0.5
     assert not apprentice.gate.open
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+def test_a_judge_learns_at_once(frozen: bool) -> None:
+    lessons = steps(20, seed=1)
+    model = relgym.WorldModel(lessons[0].start.schema)
+    model.frozen = frozen
+    judge = LearnedTask(model.schema, changing(model))
+    apprentice = Apprentice(model, judge, DynaConfig(shuffle=15))
+    for count, real in enumerate(lessons, start=1):
+        apprentice.take_up(real)
+        assert judge.model.seen == count
+    assert model.seen == (0 if frozen else 5)
 
 
 def test_lessons_come_in_random_order() -> None:

@@ -11,8 +11,8 @@ from dyna_worlds import Flat, LineEnv, LineModel, LineTask
 
 from relgym.errors import ConfigError
 from relgym.wrappers.sb3.apprentice import Apprentice
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
-from relgym.wrappers.sb3.settings import DynaConfig
 
 pytestmark = pytest.mark.sb3
 

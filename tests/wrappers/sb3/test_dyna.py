@@ -12,8 +12,8 @@ from dyna_worlds import Flat, LineEnv, LineModel
 from gymnasium import spaces
 
 from relgym.errors import ConfigError
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
-from relgym.wrappers.sb3.settings import DynaConfig
 
 pytestmark = pytest.mark.sb3
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.settings import DynaConfig
+from relgym.wrappers.sb3.config import DynaConfig
 
 
 @pytest.mark.parametrize(

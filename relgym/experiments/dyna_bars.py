@@ -1,0 +1,121 @@
+"""Issue "Dream": what must be shown, row by row, measured against its bar.
+
+``python -m relgym.experiments.dyna_bars 1 --arms relgym sac --seeds 2`` runs two arms of row 1 with two seeds each, and
+reports all that is known of the row. Results are kept in a store: what is there already isn't computed again, so that
+the whole comparison (``make dyna-full``) can be stopped and resumed. ``--page`` writes the page of results.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shlex
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from datetime import date
+from pathlib import Path
+from typing import Final
+
+from relgym.errors import StoreError
+from relgym.experiments.bar import report
+from relgym.experiments.chapter4.reproduce import Made, section
+from relgym.experiments.dyna_arms import ARMS
+from relgym.experiments.dyna_rows import ROWS, Found, Row
+from relgym.experiments.jobs.run import run
+from relgym.experiments.jobs.store import ResultStore, write_atomically
+from relgym.experiments.jobs.task import Task
+from relgym.experiments.seeds import TRAINING_SEEDS
+
+__all__ = ["main", "page", "shown", "wanted"]
+
+_HEAD: Final = """# What dreaming is worth
+
+`python -m relgym.experiments.dyna_bars` wrote this page; nothing on it is typed by hand. Each section is a row of
+bars. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than five, no more were run (*of* in the
+tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250 real steps; *each* lists the real
+steps to it, the smallest first. *time* is wall time, tests included, on a machine with two cores that did other things
+too; *learning* and *dreaming* are parts of it. The [guide](../guides/dyna.md) says how it works."""
+
+
+def wanted(row: Row, *, seeds: int, arms: Sequence[str]) -> list[Task]:
+    """Those of a row's tasks that have one of the first seeds (or none) and one of the arms (or none)."""
+    few = TRAINING_SEEDS[:seeds]
+    return [
+        task
+        for task in row.tasks
+        if task.arguments.get("seed", 0) in few and task.arguments.get("arm", arms[0]) in arms
+    ]
+
+
+def known(row: Row, store: ResultStore) -> tuple[Found, float]:
+    """What the store holds of a row, and how many seconds it took."""
+    results = [(task.arguments, store.get(task)) for task in row.tasks]
+    there = [(arguments, result) for arguments, result in results if result is not None]
+    return [(arguments, r.value) for arguments, r in there], sum(r.seconds for _, r in there)
+
+
+def shown(number: int, store: ResultStore, out: Path, command: str) -> Made:
+    """Report a row; writes ``row-NUMBER.json`` and, if it has one, its picture.
+
+    Raises
+    ------
+    StoreError
+        Nothing of it has been run.
+    """
+    row = ROWS[number]
+    found, seconds = known(row, store)
+    if not found:
+        raise StoreError(f"nothing is known of row {number}: run it with at least one seed and arm")
+    figures = row.show(found)
+    picture = f"dream-{number}.png" if figures.draw is not None else ""
+    if figures.draw is not None:
+        figures.draw(out / picture)
+    text = report(row.title, figures.measures, figures.notes)
+    today = date.today().isoformat()
+    made = Made(f"row-{number}", row.title, 'issue "Dream"', text, picture, today, command, seconds)
+    write_atomically(out / f"row-{number}.json", json.dumps(asdict(made), indent=1).encode())
+    return made
+
+
+def page(out: Path, target: Path) -> None:
+    """Write the page of results from what rows have written, and copy their pictures beside it."""
+    made = list(_made(out))
+    for each in made:
+        if each.figure:
+            write_atomically(target.parent / each.figure, (out / each.figure).read_bytes())
+    parts = [_HEAD, *(section(each, ".") for each in made), ""]
+    write_atomically(target, "\n\n".join(parts).encode())
+
+
+def _made(out: Path) -> Iterator[Made]:
+    for number in ROWS:
+        path = out / f"row-{number}.json"
+        if path.is_file():
+            yield Made(**json.loads(path.read_text(encoding="utf-8")))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run what isn't run yet of the rows named on the command line, then report them."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("rows", type=int, nargs="*", choices=sorted(ROWS), default=sorted(ROWS))
+    parser.add_argument("--arms", nargs="+", choices=list(ARMS), default=list(ARMS))
+    parser.add_argument("--seeds", type=int, default=len(TRAINING_SEEDS), help="so many, at most 5")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--out", type=Path, default=Path("out/dyna"))
+    parser.add_argument("--page", type=Path, help="where to write the page of results")
+    chosen = parser.parse_args(given)
+    store = ResultStore(chosen.out / "cache")
+    tasks = [t for n in chosen.rows for t in wanted(ROWS[n], seeds=chosen.seeds, arms=chosen.arms)]
+    for progress in run(tasks, store, workers=chosen.jobs):
+        print(f"{progress.done} of {progress.total} runs", file=sys.stderr, flush=True)
+    for number in chosen.rows:
+        command = shlex.join(["python", "-m", "relgym.experiments.dyna_bars", str(number)])
+        print(shown(number, store, chosen.out, command).text, flush=True)
+    if chosen.page is not None:
+        page(chosen.out, chosen.page)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,239 @@
+"""Issue "Dream": what must be shown, row by row: the tasks that a row rests on, and its figures against their bars."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any, Final, TypeAlias
+
+from relgym.experiments.bar import Measure, measured
+from relgym.experiments.dyna import ENOUGH, STEPS, Run
+from relgym.experiments.dyna_arms import ARMS, COURSES
+from relgym.experiments.dyna_report import draw_runs, reached, summary
+from relgym.experiments.dyna_speed import WORLDS
+from relgym.experiments.jobs.task import Task
+from relgym.experiments.seeds import TRAINING_SEEDS
+
+__all__ = ["ROWS", "Found", "Row", "Shown"]
+
+Found: TypeAlias = Sequence[tuple[Mapping[str, Any], Any]]
+"""Arguments and results of the tasks that have been run."""
+
+_MODULES: Final = {
+    "learning": "relgym.experiments.dyna_trials",
+    "misled": "relgym.experiments.dyna_trials",
+    "asleep": "relgym.experiments.dyna_asleep",
+    "among": "relgym.experiments.dyna_asleep",
+    "speed": "relgym.experiments.dyna_speed",
+}
+_RATES: Final = 100_000, 3.0  # env-steps per second of dreams, and how many times the engine's
+
+_LIGHT: Final[Mapping[str, Any]] = {"gravity": 5.0}
+"""Half the weight, and so half the friction."""
+
+_TURN: Final = 3_000
+"""Real steps after which the world becomes light, and how many there are before and after."""
+
+_MISLED_STEPS: Final = 6_000
+_BALL_STEPS: Final = 16_000
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A row's figures.
+
+    Attributes
+    ----------
+    measures
+        Against their bars.
+    notes
+        Tables and sentences beneath.
+    draw
+        Writes a picture to a path; none: there is none.
+    """
+
+    measures: Sequence[Measure]
+    notes: Sequence[str] = ()
+    draw: Callable[[Path], Any] | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """Something that must be shown.
+
+    Attributes
+    ----------
+    title
+        In a few words.
+    tasks
+        All that it rests on, with all seeds and arms.
+    show
+        Figures from what has been run of it.
+    """
+
+    title: str
+    tasks: Sequence[Task]
+    show: Callable[[Found], Shown]
+
+
+def _task(function: str, **arguments: Any) -> Task:
+    kind = " ".join(str(arguments[key]) for key in ("course", "arm") if key in arguments)
+    return Task(f"{_MODULES[function]}:{function}", arguments, f"{function} {kind}")
+
+
+def _learning(course: str, arms: Sequence[str], steps: int, **more: Any) -> list[Task]:
+    return [
+        _task("learning", course=course, arm=arm, seed=seed, steps=steps, **more)
+        for arm in arms
+        for seed in TRAINING_SEEDS
+    ]
+
+
+# ------------------------------------------------------------------ rows 1 and 3: real steps to success
+def _truck(found: Found) -> Shown:
+    runs = _runs(found)
+    rivals = (("sac", 20.0), ("sac-permuted", 5.0), ("ensemble", 2.0))
+    measures = [m for arm, bar in rivals for m in _fewer(runs, arm, bar)]
+    own = [run.seconds for run in runs if run.arm == "relgym"]
+    measures += [measured("Dyna, relgym: seconds", 600, own)] if own else []
+    return _compared(runs, measures)
+
+
+def _ball(found: Found) -> Shown:
+    runs = _runs(found)
+    steps = {arm: median(map(reached, own)) for arm in ("sac", "sac20") if (own := _of(runs, arm))}
+    best = min(steps, key=lambda arm: steps[arm], default="sac")
+    return _compared(runs, _fewer(runs, best, 4.0))
+
+
+def _compared(runs: Sequence[Run], measures: Sequence[Measure]) -> Shown:
+    title = COURSES[runs[0].course].title
+    return Shown(measures, [summary(runs)], lambda path: draw_runs(path, runs, title))
+
+
+def _fewer(runs: Sequence[Run], rival: str, times: float) -> list[Measure]:
+    """How many times fewer real steps relgym needs, by the medians; none where an arm is missing."""
+    ours, theirs = _of(runs, "relgym"), _of(runs, rival)
+    if not (ours and theirs):
+        return []
+    ratio = median(map(reached, theirs)) / median(map(reached, ours))
+    least = "" if all(run.solved_at for run in theirs) else " (at least)"
+    return [measured(f"{ARMS[rival].title}: times as many real steps{least}", times, [ratio], ">=")]
+
+
+def _runs(found: Found) -> list[Run]:
+    return [Run.from_json(value) for _, value in found]
+
+
+def _of(runs: Sequence[Run], arm: str) -> list[Run]:
+    return [run for run in runs if run.arm == arm]
+
+
+# ------------------------------------------------------------------ row 2: trained in the dream alone
+def _asleep(found: Found) -> Shown:
+    successes = measured(
+        "successes of 100 real episodes", ENOUGH, [value["successes"] for _, value in found], ">="
+    )
+    return Shown([successes], [_times(found)])
+
+
+# ------------------------------------------------------------------ row 4: models that are wrong
+def _no_harm(found: Found) -> Shown:
+    """A model of another world, then a world that becomes another one, each beside SAC."""
+    learned = [(arguments, Run.from_json(value)) for arguments, value in found if "curve" in value]
+    plain = {run.seed: run for arguments, run in learned if "change" not in arguments}
+    turned = {
+        arm: {run.seed: run for arguments, run in learned if "change" in arguments and run.arm == arm}
+        for arm in ("sac", "relgym")
+    }
+    wrong = {
+        value["run"]["seed"]: (Run.from_json(value["run"]), value["right_there"])
+        for _, value in found
+        if "run" in value
+    }
+    behind = [plain[s].last - wrong[s][0].last for s in wrong if s in plain]
+    later = [turned["sac"][s].last - turned["relgym"][s].last for s in turned["relgym"] if s in turned["sac"]]
+    measures = [
+        measured("wrong model: % right in its own world", 99.0, [100 * w[1] for w in wrong.values()], ">="),
+        measured("wrong model: successes of 100 fewer than SAC", 10, behind),
+        measured("changed world: successes of 100 fewer than SAC", 10, later),
+    ]
+    told = [_course(run, "wrong model") for run, _ in wrong.values()]
+    told += [_course(run, "") for run in plain.values()]
+    told += [_course(run, "changed world") for arm in turned.values() for run in arm.values()]
+    return Shown([m for m in measures if m.values], told)
+
+
+def _course(run: Run, what: str) -> str:
+    curve = " ".join(str(good) for _, good in run.curve)
+    return f"{ARMS[run.arm].title}, {what or 'as ever'}, seed {run.seed}, trusted {run.trusted:.0%}: {curve}"
+
+
+# ------------------------------------------------------------------ rows 5 and 6
+def _among(found: Found) -> Shown:
+    counts = list(found[0][1]["successes"])
+    measures = [
+        measured(f"{n} bystanders: successes of 100", 80, [value["successes"][n] for _, value in found], ">=")
+        for n in counts
+    ]
+    return Shown(measures, [_times(found)])
+
+
+def _speed(found: Found) -> Shown:
+    measures = []
+    for arguments, value in found:
+        world = arguments["world"]
+        measures += [
+            measured(f"{world}: env-steps a second", _RATES[0], [value["dreams"]], ">="),
+            measured(f"{world}: times the engine's", _RATES[1], [value["dreams"] / value["engine"]], ">="),
+        ]
+    return Shown(measures, ["Processor time; 1,024 scenes at once, the engine's in a SyncVectorEnv."])
+
+
+def _times(found: Found) -> str:
+    return f"{median(value['seconds'] for _, value in found):.0f} s of training each (median)."
+
+
+_DREAMS: Final[Mapping[str, Any]] = {"real": 1_000, "updates": 30_000}
+_CHANGE: Final[Mapping[str, Any]] = {"after": _TURN, "arguments": _LIGHT}
+
+ROWS: Final[Mapping[int, Row]] = {
+    1: Row("TruckPush: real steps to success", _learning("truck", tuple(ARMS), STEPS), _truck),
+    2: Row(
+        "TruckPush: trained in the dream alone",
+        [_task("asleep", course="truck", seed=seed, **_DREAMS) for seed in TRAINING_SEEDS],
+        _asleep,
+    ),
+    3: Row(
+        "BallGoal: real decisions to success",
+        _learning("ball", ("relgym", "relgym-given", "sac", "sac20"), _BALL_STEPS),
+        _ball,
+    ),
+    4: Row(
+        "TruckPush: wrong models do no harm",
+        [
+            *_learning("truck", ("sac",), _MISLED_STEPS),
+            *(
+                _task(
+                    "misled", course="truck", arm="relgym", seed=seed, steps=_MISLED_STEPS, arguments=_LIGHT
+                )
+                for seed in TRAINING_SEEDS
+            ),
+            *_learning("truck", ("sac", "relgym"), 2 * _TURN, change=_CHANGE),
+        ],
+        _no_harm,
+    ),
+    5: Row(
+        "TruckPush: dreams among more boxes than the model saw",
+        [_task("among", seed=seed, bystanders=[2, 3, 4, 5, 6, 7], **_DREAMS) for seed in TRAINING_SEEDS],
+        _among,
+    ),
+    6: Row(
+        "Speed of dreams",
+        [_task("speed", world=world) for world in WORLDS],
+        _speed,
+    ),
+}
+"""What must be shown, by its number in the issue."""

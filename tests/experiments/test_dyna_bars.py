@@ -1,0 +1,99 @@
+"""Rows of bars of the Dyna experiments: by hand from made-up results, and the whole command with tiny tasks."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from relgym.errors import StoreError
+from relgym.experiments import dyna_bars
+from relgym.experiments.bar import Measure
+from relgym.experiments.dyna import Run, solved_at
+from relgym.experiments.dyna_rows import ROWS, Shown
+from relgym.experiments.jobs.store import Result, ResultStore
+
+
+def value(arm: str, seed: int, *successes: int, course: str = "truck", steps: int = 60_000) -> dict[str, Any]:
+    curve = tuple((250 * (k + 1), good) for k, good in enumerate(successes))
+    return asdict(Run(course, arm, seed, steps, curve, solved_at(curve), 10.0))
+
+
+def by_name(shown: Shown) -> dict[str, Measure]:
+    return {m.bar.what: m for m in shown.measures}
+
+
+def test_ratios_are_of_medians_and_lower_bounds_where_a_rival_failed() -> None:
+    runs = [value("relgym", s, *([0] * s), 90, 90) for s in range(3)]  # 500, 750, 1,000
+    runs += [value("sac", 0, 1, 2), value("ensemble", 0, 0, 0, 0, 0, 95, 95)]
+    found = by_name(ROWS[1].show([({}, run) for run in runs]))
+    assert found["SAC: times as many real steps (at least)"].worst == pytest.approx(60_001 / 750)
+    assert found["Dyna, MLP ensemble: times as many real steps"].worst == 2.0
+    assert found["Dyna, relgym: seconds"].values == (10.0, 10.0, 10.0)
+    assert len(found) == 3  # none of the arm that wasn't run
+
+
+def test_the_better_rival_counts() -> None:
+    runs = [value("relgym", 0, 90, 90, course="ball"), value("sac", 0, 1, 1, 1, 90, 90, course="ball")]
+    runs.append(value("sac20", 0, 1, 90, 90, course="ball"))
+    (ratio,) = ROWS[3].show([({}, run) for run in runs]).measures
+    assert ratio.worst == 1.5 and not ratio.ok
+
+
+def test_no_harm_is_measured_at_the_same_real_steps() -> None:
+    change = {"change": {}}
+    found = by_name(
+        ROWS[4].show(
+            [
+                ({}, value("sac", 0, 5, 20)),
+                ({}, {"run": value("relgym", 0, 5, 15), "right_there": 0.995}),
+                (change, value("sac", 0, 5, 40)),
+                (change, value("relgym", 0, 95, 10)),
+                (change, value("relgym", 1, 95, 10)),  # nothing to compare it with yet
+            ]
+        )
+    )
+    assert found["wrong model: % right in its own world"].ok
+    assert found["wrong model: successes of 100 fewer than SAC"].values == (5.0,)
+    assert found["changed world: successes of 100 fewer than SAC"].values == (30.0,)
+    assert not found["changed world: successes of 100 fewer than SAC"].ok
+
+
+def test_dreamt_policies_and_speeds() -> None:
+    asleep = ROWS[2].show([({}, {"successes": good, "seconds": 1.0}) for good in (90, 89)])
+    assert [m.ok for m in asleep.measures] == [False]
+    among = ROWS[5].show([({}, {"successes": {"2": 80, "7": 79}, "seconds": 1.0})])
+    assert [m.ok for m in among.measures] == [True, False]
+    speed = ROWS[6].show([({"world": "truck"}, {"dreams": 120_000.0, "engine": 50_000.0})])
+    assert [m.ok for m in speed.measures] == [True, False]
+
+
+def test_finished_runs_are_not_run_again_and_make_the_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task = dyna_bars.wanted(ROWS[1], seeds=1, arms=["sac"])
+    assert [t.arguments["arm"] for t in task] == ["sac"]
+    ResultStore(tmp_path / "cache").put(task[0], Result(value("sac", 0, 42), 3.0))
+    monkeypatch.setattr(type(task[0]), "run", None)  # nothing may be computed
+    page = tmp_path / "docs" / "dream.md"
+    dyna_bars.main(["1", "--arms", "sac", "--seeds", "1", "--out", str(tmp_path), "--page", str(page)])
+    assert "> 60,000" in capsys.readouterr().out
+    text = page.read_text()
+    assert "row-1: TruckPush: real steps to success" in text and "(./dream-1.png)" in text
+    assert (page.parent / "dream-1.png").stat().st_size > 5_000
+
+
+def test_a_row_of_which_nothing_is_known_says_so(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="nothing is known of row 5"):
+        dyna_bars.shown(5, ResultStore(tmp_path), tmp_path, "")
+
+
+def test_every_task_can_be_asked_for() -> None:
+    for row in ROWS.values():
+        every = dyna_bars.wanted(
+            row, seeds=5, arms=["sac", "sac20", "sac-permuted", "ensemble", "relgym", "relgym-given"]
+        )
+        assert every == list(row.tasks)
+        assert dyna_bars.wanted(replace(row, tasks=()), seeds=5, arms=["sac"]) == []
