@@ -60,7 +60,7 @@ def prequential(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> lis
     for name in ENVS[:1] if quick else ENVS:
         ratios: dict[str, list[float]] = {}
         for number, (training, _) in enumerate(seeds):
-            lesson = collect(STUDIES[name], 400 if quick else STEPS, training)
+            lesson = collect(STUDIES[name], 200 if quick else STEPS, training)
             sizes = _sizes(lesson, quick=quick)
             if not number:
                 print(_table(name, lesson, sizes), "\n", flush=True)
