@@ -58,10 +58,10 @@ def test_a_stream_is_what_is_collected() -> None:
 
 
 def test_a_long_life_is_measured_beyond_its_bound(capsys: pytest.CaptureFixture[str]) -> None:
-    found = {m.bar.what: m for m in memory([(TUNING_SEEDS[0], TUNING_TEST_SEED)], steps=300, bound=100)}
+    found = {m.bar.what: m for m in memory([(TUNING_SEEDS[0], TUNING_TEST_SEED)], steps=600, bound=200)}
     assert found["most rows kept, over the bound"].ok
     assert found["x, still right"].ok
-    assert "300 transitions, 100 kept" in capsys.readouterr().out
+    assert "600 transitions, 200 kept" in capsys.readouterr().out
 
 
 def test_the_stream_is_foretold_beside_others(capsys: pytest.CaptureFixture[str]) -> None:
