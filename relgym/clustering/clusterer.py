@@ -139,8 +139,8 @@ class ModeClusterer(Population):
         stated apart, whichever was found first.
         """
         cluster = self.clusters[mode]
-        if cluster.mode.intercept != 0.0 or not cluster.mode.parameters:
-            return
+        if self.approximate or cluster.mode.intercept != 0.0 or not cluster.mode.parameters:
+            return  # to an approximation, whatever is small looks like rest
         idle = members[np.abs(self.y[members]) <= self.scale.tolerance]
         idle = idle[cluster.idle(table, self.rows[idle], self.scale.tolerance)]
         if len(idle) < least_examples(self.y, self.scale, self.config):

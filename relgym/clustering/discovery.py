@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +12,7 @@ from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus, consensus, refine
 from relgym.numeric.stepwise import PIVOT, LinearFit, least_squares, varying_columns
 
-__all__ = [
-    "Scale",
-    "counted",
-    "find_mode",
-    "identified",
-    "is_whole",
-    "least_examples",
-    "likeness",
-    "plans",
-    "verifying_bits",
-]
+__all__ = ["Scale", "find_mode", "identified", "least_examples", "plans", "verifying_bits"]
 
 SEARCH = 400
 """At most this many rows are searched at a time."""
@@ -33,9 +22,6 @@ NEAR, MOST_NEAR = 16.0, 0.5
 
 QUIET, MOST_LIKE = 0.25, 0.5
 """Residuals below so many sigma are rounding; above, those of neighbours may be alike by so much."""
-
-WHOLE = 1e-6
-"""What differs from a whole number by less is one."""
 
 WIDE = 40
 """Searches of more columns than this draw fewer and larger samples."""
@@ -120,7 +106,6 @@ def find_mode(
             strata=strata[rows],
             anchors=np.flatnonzero(rows >= len(y) - fresh),
             limit=48 if columns <= WIDE else 6,
-            accept=partial(is_whole, x) if counted(y) else None,
         )
         if found is None or found.size < min(needed, 6):
             continue
@@ -128,30 +113,6 @@ def find_mode(
         if found is not None and found.size >= needed and is_law(x, y, found, stages[0], scale):
             return found
     return None
-
-
-def counted(y: NDArray[np.float64]) -> bool:
-    """Whether all values are whole numbers, and not the same."""
-    return bool((y == np.round(y)).all()) and bool(np.ptp(y) > 0.0)
-
-
-def is_whole(x: NDArray[np.float64], fit: LinearFit) -> bool:
-    """Whether a function goes from whole numbers to whole numbers wherever it is evaluated.
-
-    Where a column moves by multiples of a step, the function must then move by whole numbers. Few small whole numbers
-    satisfy many functions with fractions as weights, and none of those is a law.
-    """
-    steps = [_step(x[:, c]) for c in fit.columns]
-    moves = [w * step for w, step in zip(fit.weights, steps, strict=True) if step > 0.0]
-    return all(abs(move - round(move)) <= WHOLE for move in moves)
-
-
-def _step(column: NDArray[np.float64]) -> float:
-    """The largest number that all differences of a column are multiples of, if that is whole or half; else 0."""
-    halves = 2.0 * column
-    if not bool((halves == np.round(halves)).all()) or float(np.abs(halves).max(initial=0.0)) > 1e9:
-        return 0.0
-    return 0.5 * float(np.gcd.reduce(np.diff(np.unique(halves)).astype(np.int64)))
 
 
 def is_law(x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, own: int, scale: Scale) -> bool:
@@ -239,8 +200,6 @@ def identified(
     at nonsense). Weights on columns that take few distinct values, when there are too few of those to tell a
     law from a look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations.
     """
-    if counted(y) and not is_whole(x, fit):
-        return None
     for _ in range(len(fit.columns) + 1):
         found = refine(
             x,

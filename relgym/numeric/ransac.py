@@ -13,7 +13,6 @@ large samples can't, and a draw that doesn't reproduce its own rows costs no cou
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,7 +79,6 @@ def consensus(
     strata: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
     limit: int = 48,
-    accept: Callable[[LinearFit], bool] | None = None,
 ) -> Consensus | None:
     """The function with the largest consensus among random samples; None if no sample verified itself.
 
@@ -100,8 +98,6 @@ def consensus(
         See `draw_samples`.
     limit
         Most samples that are tried on all rows.
-    accept
-        What a function must be like to count, whatever its consensus; default: anything.
 
     Notes
     -----
@@ -118,9 +114,7 @@ def consensus(
         fit = least_squares(x[sample], y[sample], tuple(int(columns[c]) for c in picked))
         found = Consensus(fit, np.abs(y - fit.predict(x)) <= LOOSE * tolerance)
         if best is None or (found.size, -found.fit.terms) > (best.size, -best.fit.terms):
-            found = refine(x, y, found, sigma=sigma, tolerance=tolerance)
-            if accept is None or accept(found.fit):
-                best = found
+            best = refine(x, y, found, sigma=sigma, tolerance=tolerance)
     return best
 
 

@@ -5,15 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.clustering.discovery import (
-    Scale,
-    counted,
-    find_mode,
-    identified,
-    is_whole,
-    least_examples,
-    plans,
-)
+from relgym.clustering.discovery import Scale, find_mode, identified, least_examples, plans
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, least_squares
@@ -110,23 +102,3 @@ def test_a_mode_among_the_noise_is_found_by_its_newest_example(rng: np.random.Ge
     assert found.size == 15
     assert found.fit.weights == pytest.approx((-0.8227241, -0.425), abs=1e-12)
     assert found.fit.intercept == pytest.approx(-0.000245, abs=1e-12)
-
-
-def test_whole_numbers_have_whole_weights() -> None:
-    x = np.array([[0.0, 0.0, 0.1], [1.0, 4.0, 0.2], [2.0, 6.0, 0.7], [5.0, 2.0, 0.4]])
-    assert is_whole(x, LinearFit((0,), (-1.0,), 3.0, 0.0))
-    assert is_whole(x, LinearFit((1,), (0.5,), 3.0, 0.0))  # moves by twos
-    assert not is_whole(x, LinearFit((0,), (0.5,), 3.0, 0.0))
-    assert not is_whole(x, LinearFit((0, 1), (-1.0, 0.3), 0.0, 0.0))
-    assert is_whole(x, LinearFit((2,), (0.37,), 0.0, 0.0))  # of real numbers nothing is known
-    assert is_whole(0.5 * x, LinearFit((0,), (2.0,), 0.0, 0.0))
-    assert counted(np.array([1.0, -3.0])) and not counted(np.array([1.0, 0.5])) and not counted(np.ones(3))
-
-
-def test_fractions_of_whole_numbers_identify_nothing(rng: np.random.Generator) -> None:
-    x = rng.integers(-6, 7, (120, 1)).astype(float)
-    half = LinearFit((0,), (0.5,), 0.0, 0.0)
-    y = np.where(x[:, 0] % 2 == 0, 0.5 * x[:, 0], 20.0)
-    assert identified(x, y, half, scale=SCALE, support=3) is None
-    found = identified(x + 0.25, y, LinearFit((0,), (0.5,), -0.125, 0.0), scale=SCALE, support=3)
-    assert found is not None  # where nothing is known of steps, it would do
