@@ -11,7 +11,7 @@ from typing import Any, Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-__all__ = ["BUDGET", "Baseline", "Columns", "Setting", "grid", "seed_of"]
+__all__ = ["BUDGET", "Baseline", "Columns", "Recipe", "Setting", "grid", "seed_of"]
 
 BUDGET: Final = 4
 """Settings tried for every baseline that has any."""
@@ -41,6 +41,10 @@ class Columns:
     objects: int = 1
 
 
+Recipe: TypeAlias = Callable[[Setting, Columns, np.random.Generator], _T]
+"""Gives a new learner from a setting, what the columns mean and a source of randomness."""
+
+
 @dataclass(frozen=True)
 class Baseline(Generic[_T]):
     """One alternative.
@@ -52,7 +56,7 @@ class Baseline(Generic[_T]):
     title
         For people.
     make
-        Gives a new learner from a setting, what the columns mean and a source of randomness.
+        Makes it.
     settings
         What tuning may choose from, the library's or the literature's default first; `BUDGET` of them, or a single
         one where there is nothing to choose.
@@ -65,7 +69,7 @@ class Baseline(Generic[_T]):
 
     name: str
     title: str
-    make: Callable[[Setting, Columns, np.random.Generator], _T]
+    make: Recipe[_T]
     settings: tuple[Setting, ...] = ({},)
     change: bool = False
     package: str = "sklearn"

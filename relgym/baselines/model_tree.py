@@ -23,16 +23,16 @@ class LinearModelTree:
         Most tests between root and leaf; 0: a single linear function.
     ridge
         Penalty of the weights, relative to the leaf's mean square.
-    seed
+    random_state
         Settles equally good splits.
     """
 
-    def __init__(self, leaf: int = 30, depth: int = 8, ridge: float = 1e-8, *, seed: int = 0) -> None:
+    def __init__(self, leaf: int = 30, depth: int = 8, ridge: float = 1e-8, *, random_state: int = 0) -> None:
         if leaf < 2 or depth < 0 or ridge < 0.0:
             raise ConfigError(
                 f"expected leaf >= 2, depth >= 0 and ridge >= 0, got {leaf}, {depth} and {ridge}"
             )
-        self.leaf, self.depth, self.ridge, self.seed = leaf, depth, ridge, seed
+        self.leaf, self.depth, self.ridge, self.random_state = leaf, depth, ridge, random_state
         self._tree: Any = None
         self._weights: dict[int, Float2D] = {}
 
@@ -43,7 +43,7 @@ class LinearModelTree:
         self._tree = DecisionTreeRegressor(
             max_depth=self.depth or None,
             min_samples_leaf=self.leaf if self.depth else len(x),
-            random_state=self.seed,
+            random_state=self.random_state,
         ).fit(x, y)
         leaves = self._tree.apply(x)
         self._weights = {

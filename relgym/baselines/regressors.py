@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -13,71 +14,32 @@ from relgym.baselines.kinds import Baseline, Columns, Setting, grid, seed_of
 from relgym.baselines.lwr import LocallyWeightedRegression
 from relgym.baselines.model_tree import LinearModelTree
 from relgym.baselines.motion import ConstantVelocity, Persistence
+from relgym.baselines.recipes import batch, lazily, stream
 from relgym.baselines.rls import RecursiveLeastSquares
 from relgym.baselines.streaming import StreamingRegressor
 
 __all__ = ["REGRESSORS"]
 
 
-def _gaussian_process(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
-    def make() -> Any:
-        from sklearn.gaussian_process import GaussianProcessRegressor
-        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
+def _gaussian_process(kernel: str, length: float) -> Any:
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern, WhiteKernel
 
-        shape = RBF(setting["length"]) if setting["kernel"] == "rbf" else Matern(setting["length"], nu=1.5)
-        kernel = ConstantKernel(1.0) * shape + WhiteKernel(1e-6, (1e-12, 1e0))
-        # Kept as set: the optimiser ends on its bounds here, and says so for every query.
-        return GaussianProcessRegressor(kernel, optimizer=None, normalize_y=True)
-
-    return FittedRegressor(make, rng=rng, limit=setting["limit"])
+    shape = RBF(length) if kernel == "rbf" else Matern(length, nu=1.5)
+    whole = ConstantKernel(1.0) * shape + WhiteKernel(1e-6, (1e-12, 1e0))
+    # Kept as set: the optimiser ends on its bounds here, and says so for every query.
+    return GaussianProcessRegressor(whole, optimizer=None, normalize_y=True)
 
 
-def _nearest(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
-    def make() -> Any:
-        from sklearn.neighbors import KNeighborsRegressor
+def _boosting(**setting: Any) -> Any:
+    from sklearn.ensemble import HistGradientBoostingRegressor
+    from sklearn.multioutput import MultiOutputRegressor
 
-        return KNeighborsRegressor(setting["neighbours"], weights=setting["weights"])
-
-    return FittedRegressor(make, rng=rng)
+    return MultiOutputRegressor(HistGradientBoostingRegressor(**setting))
 
 
-def _forest(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
-    seed = seed_of(rng)
-
-    def make() -> Any:
-        from sklearn.ensemble import RandomForestRegressor
-
-        return RandomForestRegressor(50, random_state=seed, **setting)
-
-    return FittedRegressor(make, rng=rng, scale=False)
-
-
-def _boosting(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
-    seed = seed_of(rng)
-
-    def make() -> Any:
-        from sklearn.ensemble import HistGradientBoostingRegressor
-        from sklearn.multioutput import MultiOutputRegressor
-
-        return MultiOutputRegressor(HistGradientBoostingRegressor(random_state=seed, **setting))
-
-    return FittedRegressor(make, rng=rng, scale=False)
-
-
-def _model_tree(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
-    seed = seed_of(rng)
-    return FittedRegressor(lambda: LinearModelTree(**setting, seed=seed), rng=rng)
-
-
-def _perceptron(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
-    seed = seed_of(rng)
-
-    def make() -> Any:
-        from sklearn.neural_network import MLPRegressor
-
-        return MLPRegressor(max_iter=30, tol=0.0, n_iter_no_change=30, random_state=seed, **setting)
-
-    return FittedRegressor(make, rng=rng)
+def _lwr(setting: Setting, _: Columns, __: np.random.Generator) -> Regressor:
+    return LocallyWeightedRegression(**setting)
 
 
 def _ensemble(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
@@ -92,24 +54,9 @@ def _interactions(setting: Setting, columns: Columns, rng: np.random.Generator) 
     return InteractionNetwork(columns.own, columns.objects, seed=seed_of(rng), **setting)
 
 
-def _rules(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
-    def make() -> Any:
-        from river import rules
-
-        return rules.AMRules(**setting)
-
-    return StreamingRegressor(make)
-
-
-def _hoeffding(setting: Setting, _: Columns, rng: np.random.Generator) -> Regressor:
-    def make() -> Any:
-        from river import tree
-
-        return tree.HoeffdingTreeRegressor(**setting)
-
-    return StreamingRegressor(make)
-
-
+_fitted = partial(batch, FittedRegressor)
+_forest = lazily("sklearn.ensemble:RandomForestRegressor")
+_perceptron = lazily("sklearn.neural_network:MLPRegressor")
 REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
     b.name: b
     for b in (
@@ -120,13 +67,13 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
         Baseline[Regressor](
             "lwr-50",
             "LWR, k = 50",
-            lambda s, _, __: LocallyWeightedRegression(**s),
+            _lwr,
             grid("ridge", 1e-8, 1e-12, 1e-4, 1e-2, neighbours=50),
         ),
         Baseline[Regressor](
             "lwr-25",
             "LWR, k = 25",
-            lambda s, _, __: LocallyWeightedRegression(**s),
+            _lwr,
             grid("ridge", 1e-8, 1e-12, 1e-4, 1e-2, neighbours=25),
         ),
         Baseline[Regressor](
@@ -138,7 +85,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
         Baseline[Regressor](
             "gp",
             "Gaussian process",
-            _gaussian_process,
+            _fitted(_gaussian_process),
             (
                 {"kernel": "rbf", "length": 3.0, "limit": 1000},
                 {"kernel": "rbf", "length": 10.0, "limit": 1000},
@@ -150,19 +97,19 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
         Baseline[Regressor](
             "knn",
             "k nearest neighbours",
-            _nearest,
+            _fitted(lazily("sklearn.neighbors:KNeighborsRegressor")),
             (
-                {"neighbours": 10, "weights": "distance"},
-                {"neighbours": 1, "weights": "uniform"},
-                {"neighbours": 3, "weights": "distance"},
-                {"neighbours": 10, "weights": "uniform"},
+                {"n_neighbors": 10, "weights": "distance"},
+                {"n_neighbors": 1, "weights": "uniform"},
+                {"n_neighbors": 3, "weights": "distance"},
+                {"n_neighbors": 10, "weights": "uniform"},
             ),
             change=True,
         ),
         Baseline[Regressor](
             "forest",
             "random forest",
-            _forest,
+            _fitted(_forest, seeded=True, scale=False, n_estimators=50),
             (
                 {"max_features": 1.0, "min_samples_leaf": 1},
                 {"max_features": 0.33, "min_samples_leaf": 1},
@@ -174,7 +121,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
         Baseline[Regressor](
             "boosting",
             "gradient boosting",
-            _boosting,
+            _fitted(_boosting, seeded=True, scale=False),
             (
                 {"learning_rate": 0.1, "max_iter": 100},
                 {"learning_rate": 0.3, "max_iter": 100},
@@ -186,7 +133,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
         Baseline[Regressor](
             "model-tree",
             "linear model tree",
-            _model_tree,
+            _fitted(LinearModelTree, seeded=True),
             (
                 {"leaf": 30, "depth": 8},
                 {"leaf": 10, "depth": 8},
@@ -198,7 +145,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
         Baseline[Regressor](
             "mlp",
             "multi-layer perceptron",
-            _perceptron,
+            _fitted(_perceptron, seeded=True, max_iter=30, tol=0.0, n_iter_no_change=30),
             (
                 {"hidden_layer_sizes": (64, 64), "learning_rate_init": 1e-3},
                 {"hidden_layer_sizes": (64, 64), "learning_rate_init": 3e-3},
@@ -236,7 +183,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
         Baseline[Regressor](
             "amrules",
             "AMRules (river)",
-            _rules,
+            stream(StreamingRegressor, lazily("river.rules:AMRules")),
             grid("n_min", 200, 50, 100, 500),
             change=True,
             package="river",
@@ -244,7 +191,7 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
         Baseline[Regressor](
             "hoeffding",
             "Hoeffding tree (river)",
-            _hoeffding,
+            stream(StreamingRegressor, lazily("river.tree:HoeffdingTreeRegressor")),
             grid("grace_period", 200, 50, 100, 500),
             change=True,
             package="river",

@@ -45,7 +45,7 @@ TUNED: Final[Mapping[tuple[str, str, str], int]] = {
     ("classify", "knn-1", "contact"): 1,
     ("classify", "forest", "thesis"): 1,
     ("classify", "forest", "contact"): 0,
-    ("classify", "boosting", "thesis"): 0,
+    ("classify", "boosting", "thesis"): 2,
     ("classify", "boosting", "contact"): 2,
     ("classify", "hoeffding", "thesis"): 3,
     ("classify", "hoeffding", "contact"): 0,

@@ -180,7 +180,7 @@ def _with_trees(found: BinaryClassifier, lesson: Lesson, config: ClassificationC
         here = open_[hit]
         wrong = here[~positive[here]]
         tree = None
-        if _rate(lesson, wrong, here, ~positive) > config.clause_tree_threshold:
+        if _rate(lesson, wrong, here, ~positive, config) > config.clause_tree_threshold:
             tree = _tree(found, clause, lesson, here, positive, config)
         if tree is not None:
             features = tree_features(view, found.scope, found.context, clause, lesson.rows[here])
@@ -188,21 +188,22 @@ def _with_trees(found: BinaryClassifier, lesson: Lesson, config: ClassificationC
         trees.append(tree)
         open_ = np.setdiff1d(open_, here)
     last = None
-    if _rate(lesson, open_[positive[open_]], open_, positive) > config.fall_through_tree_threshold:
+    if _rate(lesson, open_[positive[open_]], open_, positive, config) > config.fall_through_tree_threshold:
         last = _tree(found, None, lesson, open_, positive, config)
     return BinaryClassifier(
         found.i, found.j, found.scope, found.context, found.definition, tuple(trees), last, work=found.work
     )
 
 
-def _rate(lesson: Lesson, wrong: _Rows, here: _Rows, suffering: Bools) -> float:
+def _rate(lesson: Lesson, wrong: _Rows, here: _Rows, suffering: Bools, config: ClassificationConfig) -> float:
     """Share of errors among the examples decided here, or in the class that suffers them if larger.
 
     The second makes rare modes count: 20 among 16,000 are no share to speak of, but may be all there are.
     """
     w = lesson.weights
     errors = float(w[wrong].sum())
-    return max(errors / max(float(w[here].sum()), 1e-300), errors / max(float(w[suffering].sum()), 1e-300))
+    by_stage, by_class = (errors / max(float(w[part].sum()), 1e-300) for part in (here, suffering))
+    return by_stage if config.tree_errors == "stage" else max(by_stage, by_class)
 
 
 def _tree(

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.approximation import LEFT, LEFT_LINEAR, approximate
 from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.extension import extended
+from relgym.clustering.last_resort import last_resort
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
@@ -30,9 +30,6 @@ ESTIMATE_AT = (64, 512, 4096)
 
 APPROXIMATE_AT = (256, 1024, 4096, 16384)
 """Numbers of examples after which an approximation is sought, if most of them are unexplained."""
-
-MOST_ROWS, MANY_FEATURES = 1500, 200
-"""At most so many rows determine an approximation; it may have twice as many terms if there are so many columns."""
 
 LEAST_MEMBERS = 4
 """Examples that a mode of another model must explain here to be taken over."""
@@ -210,7 +207,8 @@ class ModeClusterer(Population):
         signature = int(table.signature_ids[self.rows[example]])
         search = self._searches.setdefault(signature, _Search())
         search.waiting += 1
-        if search.waiting <= self._patience(search, bool(table.signatures[signature].features)):
+        slots = table.signatures[signature]
+        if search.waiting <= self._patience(search, bool(slots.features or slots.chained)):
             return
         for _ in range(MOST_DISCOVERIES):
             pool = self._pool(table, signature)
@@ -220,15 +218,18 @@ class ModeClusterer(Population):
                 search.failures += 1
                 break
             search.failures = 0
-        search.waiting = 0
-        if len(pool) and (wider := extended(self._known(table), signature, pool)) is not None:
+        if (wider := extended(self._known(table), signature, pool, fresh=search.waiting)) is not None:
             self._adopt(table, signature, wider)
+        search.waiting = 0
 
-    def _patience(self, search: _Search, wide: bool) -> int:
-        """News to wait for until the next search: the more, the oftener it was in vain and the dearer it is."""
+    def _patience(self, search: _Search, doubtful: bool) -> int:
+        """News to wait for until the next search: the more, the oftener it was in vain.
+
+        It is longer where searches are dear, for features, or may be in vain, since nobody said that there are laws.
+        """
         if self.approximate:  # what an approximation leaves is mostly its own tail
             return search.failures * search.failures
-        return search.failures if wide else search.failures // 6
+        return search.failures if doubtful else search.failures // 6
 
     def _hopeless(self) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""
@@ -242,25 +243,13 @@ class ModeClusterer(Population):
         return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
 
     def _approximate(self, table: ExampleTable) -> None:
-        recent = np.arange(max(0, len(self._log) - MOST_ROWS), len(self._log))
-        signature = int(table.signature_ids[self.rows[-1]])
-        recent = recent[table.signature_ids[self.rows[recent]] == signature]
-        slots = table.signatures[signature]
-        order, stages = slots.preference(self.target)
-        order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
-        terms = self.config.max_terms * (2 if len(order) > MANY_FEATURES else 1)
-        x, y = slots.matrix(table.x[self.rows[recent]], order), self.y[recent]
-        left = LEFT if slots.features else LEFT_LINEAR
-        stds = self.scale.inlier_stds
-        present = slots.present(table.x[self.rows[recent]], self.target)
-        found = approximate(x, y, present, floor=self.floor, terms=terms, stds=stds, left=left)
-        explained = 2 * self.noise_examples <= self._log.seen
-        if found is None or (explained and found.sigma > 0.5 * self.scale.sigma):
+        found = last_resort(self, table, floor=self.floor, again=self.approximate)
+        if found is None:
             return
         self._spread, self.approximate = found.sigma, True
         self.scale = replace(self.scale, sigma=max(self.floor, found.sigma))
         self._start_over()
-        self._adopt(table, signature, reordered(found.fit, order))
+        self._adopt(table, found.signature, found.fit)
 
     def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
         """Noise examples of one signature that aren't some mode's tail, oldest first."""

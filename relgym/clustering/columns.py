@@ -85,16 +85,25 @@ class SlotSignature:
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:
-        """Non-linear features, columns behind those that a row holds."""
+        """Non-linear features, columns behind those that a row holds; `ConfigError` if there would be too many."""
+        offered, names, own = self._factors
+        return tuple(feature.moved(offered) for feature in self.nonlinear.features(names, own))
+
+    @property
+    def library_size(self) -> int:
+        """Number of non-linear features that there are, or a little more; cheap, however many."""
+        return self.nonlinear.size(*self._factors[1:])
+
+    @property
+    def _factors(self) -> tuple[list[int], list[str], list[bool]]:
+        """Columns that features are made of, their names, and whether they are the target's own."""
         task = self.types[0].name == TASK
         offered = [
             k
             for k in range(self.core)
             if (self.types[self.columns[k].slot].name != TASK) and (self.columns[k].slot or not task)
         ]
-        own = [self.columns[k].slot == 0 or task for k in offered]
-        found = self.nonlinear.features([self.named(k) for k in offered], own)
-        return tuple(feature.moved(offered) for feature in found)
+        return offered, [self.named(k) for k in offered], [self.columns[k].slot == 0 or task for k in offered]
 
     def named(self, index: int) -> str:
         """A column's name, that of another object's property with its type in front."""

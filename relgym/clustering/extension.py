@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from relgym.clustering.discovery import SEARCH, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.mode import Mode
+from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended"]
@@ -27,12 +28,15 @@ EXACT: Final = 24.0
 CONSTANT: Final = 1e-9
 """A column that varies by less, relative to what it does in the unexplained examples, is constant."""
 
+NEWEST: Final = 32
+"""At most so many new examples are tried."""
+
 APART: Final = 1e-3
 """Examples whose values differ by less, relative to what they differ from the constant, verify nothing."""
 
 
-def extended(known: Known, signature: int, pool: NDArray[np.intp]) -> LinearFit | None:
-    """A known mode's function with one more term, which explains the newest example and another unexplained one.
+def extended(known: Known, signature: int, pool: NDArray[np.intp], *, fresh: int) -> LinearFit | None:
+    """A known mode's function with one more term, which explains a new example and another unexplained one.
 
     Parameters
     ----------
@@ -42,6 +46,8 @@ def extended(known: Known, signature: int, pool: NDArray[np.intp]) -> LinearFit 
         Of the examples.
     pool
         Numbers of unexplained examples of this signature, oldest first.
+    fresh
+        How many of the last ones are new; others were tried with one another before.
 
     Returns
     -------
@@ -50,7 +56,7 @@ def extended(known: Known, signature: int, pool: NDArray[np.intp]) -> LinearFit 
     Notes
     -----
     Only for modes of the target's own properties, and where each example verifies a function by `EXACT` bits.
-    Cost O(modes * columns * (examples of the mode + pool)), both at most `SEARCH`.
+    Cost O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCH`, fresh at most `NEWEST`.
     """
     if len(pool) < 2 or verifying_bits(known.y, known.scale) < EXACT:
         return None
@@ -60,49 +66,44 @@ def extended(known: Known, signature: int, pool: NDArray[np.intp]) -> LinearFit 
         if not any(role.terms for role in mode.open_roles):
             members = known.members(i)
             members = members[known.table.signature_ids[known.rows[members]] == signature]
-            found = _extended(known, signature, mode, members[-SEARCH:], pool)
+            found = _extended(known, signature, mode, members[-SEARCH:], pool, min(fresh, NEWEST))
             if found is not None:
                 return found
     return None
 
 
 def _extended(
-    known: Known, signature: int, mode: Mode, members: NDArray[np.intp], pool: NDArray[np.intp]
+    known: Known, signature: int, mode: Mode, members: NDArray[np.intp], pool: NDArray[np.intp], fresh: int
 ) -> LinearFit | None:
-    slots = known.table.signatures[signature]
+    slots, tolerance = known.table.signatures[signature], known.scale.tolerance
+    weights = {slots.column(0, name): weight for name, weight in mode.roles[0].terms}
     order, stages = slots.preference(known.target)
-    used = [slots.column(0, name) for name, _ in mode.roles[0].terms]
-    if len(members) < len(used) + 2 or not stages:
+    if len(members) < len(weights) + 2 or not stages:
         return None
     both = np.concatenate([members, pool])
-    y = known.y[both]
-    x = slots.matrix(known.table.x[known.rows[both]], order[: stages[0]])
-    weights = {slots.column(0, name): weight for name, weight in mode.roles[0].terms}
-    left = (
-        y - mode.intercept - sum(weights[c] * slots.values(known.table.x[known.rows[both]], c) for c in used)
-    )
+    table, y = known.table.x[known.rows[both]], known.y[both]
+    left = y - mode.intercept - sum(weight * slots.values(table, c) for c, weight in weights.items())
+    x = slots.matrix(table, order[: stages[0]])
+    had = [at for at in range(x.shape[1]) if int(order[at]) in weights]
     for at in range(x.shape[1]):
-        if int(order[at]) in weights:
+        if at in had:
             continue
-        agree = _agreeing(x[:, at], left, len(members), known.scale.tolerance)
+        tried = (_agreeing(x[:, at], left, len(members), len(both) - 1 - k, tolerance) for k in range(fresh))
+        agree = next((rows for rows in tried if rows is not None), None)
         if agree is None:
             continue
-        columns = [k for k in range(x.shape[1]) if int(order[k]) in weights] + [at]
         rows = np.concatenate([np.arange(len(members)), agree])
-        fit = least_squares(x[rows], y[rows], tuple(sorted(columns)))
+        fit = least_squares(x[rows], y[rows], tuple(sorted([*had, at])))
         fit = eliminate_backward(x[rows], y[rows], fit, sigma=known.scale.sigma)
-        if (
-            len(fit.columns) == len(columns)
-            and np.abs(y[rows] - fit.predict(x[rows])).max() <= known.scale.tolerance
-        ):
-            return LinearFit(tuple(int(order[c]) for c in fit.columns), fit.weights, fit.intercept, fit.rss)
+        if at in fit.columns and np.abs(y[rows] - fit.predict(x[rows])).max() <= tolerance:
+            return reordered(fit, order)
     return None
 
 
 def _agreeing(
-    column: NDArray[np.float64], left: NDArray[np.float64], members: int, tolerance: float
+    column: NDArray[np.float64], left: NDArray[np.float64], members: int, lead: int, tolerance: float
 ) -> NDArray[np.intp] | None:
-    """Rows that one weight of a column explains, the last one among them; none unless another one verifies it.
+    """Rows that one weight of a column explains, `lead` among them; none unless another one verifies it.
 
     Parameters
     ----------
@@ -111,12 +112,12 @@ def _agreeing(
     """
     usual = float(np.median(column[:members]))
     off = column - usual
-    last = float(off[-1])
-    if last == 0.0 or np.abs(off[:members]).max() > CONSTANT * abs(last):
+    start = float(off[lead])
+    if lead < members or start == 0.0 or np.abs(off[:members]).max() > CONSTANT * abs(start):
         return None
-    weight = float(left[-1]) / last
+    weight = float(left[lead]) / start
     fits = np.abs(left - weight * off) <= tolerance
     fits[:members] = False
-    fits &= np.abs(off) > APART * abs(last)
-    verify = fits & (np.abs(off - last) > APART * abs(last))
+    fits &= np.abs(off) > APART * abs(start)
+    verify = fits & (np.abs(off - start) > APART * abs(start))
     return np.flatnonzero(fits) if verify.any() else None

@@ -9,6 +9,7 @@ everything that is learned of linear modes holds for them too.
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -19,10 +20,13 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 
-__all__ = ["NO_FEATURES", "Atom", "Feature", "Library", "library_of", "register_function"]
+__all__ = ["MOST_FEATURES", "NO_FEATURES", "Atom", "Feature", "Library", "library_of", "register_function"]
 
 FREQUENCIES = (1, 2, 3)
 """Sines and cosines are offered at these multiples; only the first one enters products."""
+
+MOST_FEATURES = 6_000
+"""A library of more features is refused: every search would take minutes and gigabytes."""
 
 _DEGREES = {"squares": 2, "products": 2, "degree3": 3, "degree4": 4}
 _ENTRY = re.compile(r"(?:(?P<type>\w+):)?(?P<kind>\w+)(?:\((?P<names>[\w, ]+)\))?")
@@ -133,20 +137,45 @@ class Library:
             The columns' names, in order; next values end with a prime.
         own
             Whether a column is a property of the target (or of another object that moves), not of an action.
+
+        Raises
+        ------
+        ConfigError
+            There would be more than `MOST_FEATURES`.
         """
         if not self.kinds:
             return ()
+        if (size := self.size(names, own)) > MOST_FEATURES:
+            raise ConfigError(
+                f"features={self.kinds} of {len(names)} numbers would be {size:,} columns, expected at most "
+                f"{MOST_FEATURES:,}; ask for a lower degree, name the angles ('trig(th)'), or split the object in parts"
+            )
+        atoms, found = self._simplest(names, own)
+        for degree in range(2, self._degree + 1):
+            # Next values enter products of two only: a library of higher degree would explode.
+            factors = atoms if degree == 2 else [a for a in atoms if not names[a.column].endswith("'")]
+            for product in itertools.combinations_with_replacement(factors, degree):
+                if self._offered(product):
+                    found.append(Feature(_product_text(product, names), product))
+        return tuple(found)
+
+    def size(self, names: Sequence[str], own: Sequence[bool]) -> int:
+        """Number of features of some columns, or a little more; arguments as of `features`."""
+        if not self.kinds:
+            return 0
+        atoms, found = self._simplest(names, own)
+        plain = sum(not names[a.column].endswith("'") for a in atoms)
+        counts = [len(atoms) if degree == 2 else plain for degree in range(2, self._degree + 1)]
+        return len(found) + sum(math.comb(n + d - 1, d) for d, n in enumerate(counts, start=2))
+
+    def _simplest(self, names: Sequence[str], own: Sequence[bool]) -> tuple[list[Atom], list[Feature]]:
+        """The factors of products, and the features that are none."""
         turning = [k for k, name in enumerate(names) if own[k] and self._turns(name)]
         waves = [Atom(k, f, w) for k in turning for w in FREQUENCIES for f in ("sin", "cos")]
         named = [Atom(k, f) for f in self.kinds if f in _functions for k in range(len(names))]
         found = [Feature(atom.text(names[atom.column]), (atom,)) for atom in (*waves, *named)]
         raw = [Atom(k) for k in range(len(names))]
-        atoms = [*raw, *(a for a in waves if a.frequency == 1), *named]
-        for degree in range(2, self._degree + 1):
-            for product in itertools.combinations_with_replacement(atoms, degree):
-                if self._offered(product, names):
-                    found.append(Feature(_product_text(product, names), product))
-        return tuple(found)
+        return [*raw, *(a for a in waves if a.frequency == 1), *named], found
 
     @property
     def _degree(self) -> int:
@@ -157,11 +186,9 @@ class Library:
             not self.angles or name.rstrip("'").rpartition(".")[2] in self.angles
         )
 
-    def _offered(self, product: Sequence[Atom], names: Sequence[str]) -> bool:
-        if "squares" in self.kinds and self._degree == 2 and "products" not in self.kinds:
-            return len(set(product)) == 1
-        # Next values enter products of two only: a library of higher degree would explode.
-        return len(product) == 2 or not any(names[a.column].endswith("'") for a in product)
+    def _offered(self, product: Sequence[Atom]) -> bool:
+        only_squares = "squares" in self.kinds and self._degree == 2 and "products" not in self.kinds
+        return not only_squares or len(set(product)) == 1
 
 
 NO_FEATURES = Library()

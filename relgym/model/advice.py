@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.approximation import LEFT, approximate
+from relgym.clustering.approximation import LEFT, approximate, terms_of
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.features import library_of
+from relgym.clustering.features import MOST_FEATURES, library_of
 from relgym.clustering.mode import NOISE, sum_text
 from relgym.model.parts import Parts
 from relgym.model.property_model import PropertyModel
@@ -24,8 +24,11 @@ LIBRARIES = (("trig",), ("products",), ("trig", "products"))
 LAST_RESORT = ("trig", "degree4")
 """What is tried when nothing else leaves less than `GOOD`."""
 
-GOOD, BETTER, EQUAL = 0.01, 0.3, 3.0
-"""A share of the change so small is explained; so much less than before is better; within this factor is as good."""
+GOOD, BETTER = 0.01, 0.5
+"""A share of the change so small is explained; so much less than before is better."""
+
+EQUAL, CLOSE = 3.0, 1.5
+"""What leaves more than the best by at most this factor is as good: of what explains, and of what comes close."""
 
 LEAST, ROWS, UNEXPLAINED = 100, 1000, 0.1
 """Fewer examples than this say nothing; the newest so many are looked at; so large a share of noise needs advice."""
@@ -122,7 +125,7 @@ def _choose(trials: Iterable[_Trial], left: float) -> _Trial | None:
     """The smallest library that is as good as the best one, if that is better than what there is."""
     trials = list(trials)
     least = min((t.left for t in trials), default=1.0)
-    good = [t for t in trials if t.left <= max(EQUAL * least, _EXACT)]
+    good = [t for t in trials if t.left <= max((EQUAL if least <= GOOD else CLOSE) * least, _EXACT)]
     return min(good, key=lambda t: t.size) if least <= BETTER * left else None
 
 
@@ -136,13 +139,21 @@ def _try(
     slots: SlotSignature = replace(
         known, nonlinear=library_of(kinds, known.types[0].name, known.types[0].angles)
     )
+    if slots.library_size > MOST_FEATURES:
+        return None
     order, stages = slots.preference(model.target)
     order = order[: stages[min(1, len(stages) - 1)]]
     x, y = slots.matrix(table.x[clusterer.rows[rows]], order), clusterer.y[rows]
-    most = model.config.clustering.max_terms
     present = slots.present(table.x[clusterer.rows[rows]], model.target)
     found = approximate(
-        x, y, present, floor=clusterer.floor, terms=most, stds=clusterer.scale.inlier_stds, left=LEFT
+        x,
+        y,
+        present,
+        floor=clusterer.floor,
+        terms=terms_of(len(order), model.config.clustering),
+        stds=clusterer.scale.inlier_stds,
+        left=LEFT,
+        noisy=stages[0],
     )
     if found is None:
         return None

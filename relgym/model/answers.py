@@ -22,6 +22,7 @@ from relgym.model.limits import Limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
 from relgym.model.spread import Spreads, action_columns
+from relgym.model.stops import Stops
 
 __all__ = ["Answers"]
 
@@ -49,6 +50,8 @@ class Answers(ModeFunctions):
         How far examples scatter about their modes.
     limits
         Which modes are limits: they take no part in the vote but cut off what its winner predicts.
+    stops
+        Which modes are walls at work: they take no part in the vote either.
     """
 
     def __init__(
@@ -64,7 +67,12 @@ class Answers(ModeFunctions):
         self.conditions = conditions
         self.spreads = Spreads()
         self.limits = Limits()
+        self.stops = Stops()
         self._unexplained = False
+
+    def bounds(self, mode: int) -> bool:
+        """Whether a mode takes no part in the vote, but stands in where the others would lead too far."""
+        return mode in self.limits or mode in self.stops
 
     @property
     def unexplained(self) -> bool:
@@ -137,7 +145,7 @@ class Answers(ModeFunctions):
             roles = tuple(layout.names[order[s]] for s in played)
             margin = ranking.margin if place == 0 else 0.0
             found = Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
-            found = self.limits.cut_off(found)
+            found = self._stopped(self.limits.cut_off(found), situation.signature, row)
             action = tuple(x[k] for k in action_columns(situation.signature).tolist())
             return replace(found, spread=self.spreads.of(found.mode, action))
         return replace(nothing, outcome=Outcome.NO_ROLES)
@@ -188,7 +196,18 @@ class Answers(ModeFunctions):
             if not waiting.any():
                 break
         self.limits.cut_off_all(verdict.values, verdict.modes)
+        self.stops.apply(situation.signature, x, verdict.values, verdict.modes)
         return verdict
+
+    def _stopped(self, found: Prediction, signature: SlotSignature, row: NDArray[np.float64]) -> Prediction:
+        """The prediction, or the constant of a stop that it runs into."""
+        if not self.stops.every:
+            return found
+        values, modes = np.array([found.value]), np.array([found.mode])
+        self.stops.apply(signature, row, values, modes)
+        if modes[0] == found.mode:
+            return found
+        return replace(found, value=float(values[0]), mode=int(modes[0]), roles=found.roles[:1])
 
     def _apply(
         self,

@@ -76,7 +76,7 @@ class Explanation:
         What laws of motion predicted it, a line each, where they and no mode did: the free law, then every
         contact.
     limit
-        Whether the mode is a limit, beyond which another mode would have led.
+        When the mode holds if it takes no part in the vote, a limit or a stop, where others would lead too far.
     """
 
     prediction: Prediction
@@ -85,7 +85,7 @@ class Explanation:
     digits: int
     reasons: tuple[Reason, ...]
     laws: tuple[str, ...] = ()
-    limit: bool = False
+    limit: str = ""
 
     def __str__(self) -> str:
         p, d = self.prediction, self.digits
@@ -101,7 +101,7 @@ class Explanation:
         lines.append(f"  mode      {self.mode.id}: {self.mode.formula(d)}  ({examples})")
         lines.append(f"  roles     {self._roles(self.mode)}")
         if self.limit:
-            return "\n".join([*lines, "  because   another mode would lead beyond it, and it is a limit"])
+            return "\n".join([*lines, f"  because   {self.limit}"])
         lines += self._because() if self.reasons else ["  because   no other mode is known"]
         return "\n".join(lines)
 
@@ -154,12 +154,18 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
                 found.append(Explanation(one, now, None, digits, (), lines))
                 continue
             mode = next(m for m in part.modes if m.id == one.mode) if one.ok else None
-            if one.mode in part.limits:
-                found.append(Explanation(one, now, mode, digits, (), limit=True))
+            if part.bounds(one.mode):
+                found.append(Explanation(one, now, mode, digits, (), limit=_limit(part, one.mode)))
                 continue
             reasons = () if mode is None else _reasons(model, part, scene, index, prediction.scene, mode.id)
             found.append(Explanation(one, now, mode, digits, reasons))
     return tuple(found)
+
+
+def _limit(part: PropertyModel, mode: int) -> str:
+    if mode in part.stops:
+        return f"it holds {part.stops.text(mode, part.target.property)}"
+    return "another mode would lead beyond it, and it is a limit"
 
 
 def _reasons(

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.mode import NOISE
+from relgym.clustering.mode import NOISE, Mode
 from relgym.model.prediction import Prediction
 
-__all__ = ["Limits", "find_limits"]
+__all__ = ["EXPLAINED", "LATEST", "Limits", "constants", "find_limits", "furthest"]
 
 EXPLAINED: Final = 0.95
 """Share of a constant's examples that some other mode must take beyond it."""
@@ -97,13 +97,12 @@ def find_limits(clusterer: ModeClusterer, table: ExampleTable) -> Limits:
     -----
     Cost: at most `LATEST` examples of each constant under all modes and role assignments.
     """
-    modes = [cluster.mode for cluster in clusterer.clusters.values()]
-    constants = sorted((m.intercept, m.id) for m in modes if not any(r.terms for r in m.roles))
-    if not constants or len(constants) == len(modes):
+    known = [(m.intercept, m.id) for m in constants(clusterer)]
+    if not known:
         return Limits()
     slack = clusterer.scale.tolerance
     found = Limits()
-    for side, (value, mode) in ((-1.0, constants[0]), (1.0, constants[-1])):
+    for side, (value, mode) in ((-1.0, known[0]), (1.0, known[-1])):
         beyond = (side * (clusterer.y - value)).max() > slack
         if not beyond and _led_beyond(clusterer, table, mode, value, side):
             low = side < 0.0
@@ -114,21 +113,36 @@ def find_limits(clusterer: ModeClusterer, table: ExampleTable) -> Limits:
 def _led_beyond(clusterer: ModeClusterer, table: ExampleTable, mode: int, value: float, side: float) -> bool:
     """Whether the other modes would have led beyond a constant nearly everywhere that it held."""
     held = np.flatnonzero(clusterer.labels == mode)[-LATEST:]
-    furthest = np.full(len(held), -np.inf)
+    reach = furthest(clusterer, table, held, side, without=mode)
+    return bool((reach >= side * value - clusterer.scale.tolerance).mean() >= EXPLAINED)
+
+
+def constants(clusterer: ModeClusterer) -> list[Mode]:
+    """Modes without terms, unless there are no others, by value."""
+    modes = [cluster.mode for cluster in clusterer.clusters.values()]
+    found = [m for m in modes if not any(r.terms for r in m.roles)]
+    return sorted(found, key=lambda m: (m.intercept, m.id)) if len(found) < len(modes) else []
+
+
+def furthest(
+    clusterer: ModeClusterer, table: ExampleTable, examples: NDArray[np.intp], side: float, *, without: int
+) -> NDArray[np.float64]:
+    """How far to one side any mode but one would lead under any role assignment, times `side`, shape ``(n,)``."""
+    found = np.full(len(examples), -np.inf)
     for number, cluster in sorted(clusterer.clusters.items()):
-        if number != mode:
-            furthest = np.maximum(furthest, _furthest(cluster, table, clusterer.rows[held], side))
-    return bool((furthest >= side * value - clusterer.scale.tolerance).mean() >= EXPLAINED)
+        if number != without:
+            found = np.maximum(found, _furthest(cluster, table, clusterer.rows[examples], side))
+    return found
 
 
 def _furthest(
     cluster: Cluster, table: ExampleTable, rows: NDArray[np.integer], side: float
 ) -> NDArray[np.float64]:
     """The mode's value furthest to one side under any role assignment, times `side`; shape ``(n,)``."""
-    furthest = np.full(len(rows), -np.inf)
+    found = np.full(len(rows), -np.inf)
     signatures = table.signature_ids[rows]
     for signature in np.unique(signatures):
         if (binding := cluster.binding(table, int(signature))) is not None:
             part = np.flatnonzero(signatures == signature)
-            furthest[part] = (side * binding.values(table.x[rows[part]])).max(axis=1, initial=-np.inf)
-    return furthest
+            found[part] = (side * binding.values(table.x[rows[part]])).max(axis=1, initial=-np.inf)
+    return found

@@ -22,6 +22,7 @@ from relgym.model.functions import Verdict, bodies_of
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Situation
 from relgym.model.spread import Spreads, measure
+from relgym.model.stops import Stops, find_stops
 from relgym.scene.objects import SceneSchema, Target
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
@@ -55,6 +56,8 @@ class PropertyModel(Answers):
         How far examples scatter about their modes.
     limits
         Which modes are limits: they take no part in the vote but cut off what its winner predicts.
+    stops
+        Which modes are walls at work: they take no part in the vote either.
     """
 
     def __init__(
@@ -108,15 +111,16 @@ class PropertyModel(Answers):
         self._unexplained = self._judge()
         if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
             self.spreads = measure(self.clusterer, table)
-        if report.changed or self.limits.overstepped(y, self.clusterer.scale.tolerance):
+        x = table.x[row : row + 1]
+        refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
+        if report.changed or refuted or self.stops.contradicted(report.mode, situation.signature, x[0]):
             self._follow(table)
         number = len(self.clusterer.y) - 1
-        x = table.x[row : row + 1]
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
         seen = replace(example, row=number, own=own)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(self._values_one(situation.signature, x[0].tolist(), self.classifier.modes))
-        assigned = UNKNOWN if report.mode == NOISE or report.mode in self.limits else report.mode
+        assigned = UNKNOWN if report.mode == NOISE or self.bounds(report.mode) else report.mode
         played = self._played(table, np.array([number]), report.mode)[0].tolist()
         self.classifier.observe(seen, assigned, fits, values, roles=played)
         if played:
@@ -176,6 +180,7 @@ class PropertyModel(Answers):
         """Take note that ``prop' = prop + step * target'``: clauses may test where that leads to."""
         others = tuple(pair for pair in self.classifier.vocabulary.follows if pair[0] != prop)
         self._widen(table, (*others, (prop, step)))
+        self._follow(table)
 
     def _widen(self, table: ExampleTable, follows: tuple[tuple[str, float], ...]) -> None:
         exemplars = self.classifier.exemplars
@@ -192,15 +197,21 @@ class PropertyModel(Answers):
         """The set of modes changed: what the classifiers remember is labelled anew."""
         self._bindings.clear()
         self.limits = find_limits(self.clusterer, table)
+        self.stops = self._find_stops(table)
         numbers = self.classifier.exemplars.rows.astype(np.intp)
         known, fits = self.clusterer.fits(table, numbers)
-        ids = tuple(i for i in known if i not in self.limits)
-        fits = fits[:, [i not in self.limits for i in known]]
+        ids = tuple(i for i in known if not self.bounds(i))
+        fits = fits[:, [not self.bounds(i) for i in known]]
         values = self._values_many(table, self.clusterer.rows[numbers], ids)
         labels = self.clusterer.labels[numbers].astype(np.int64)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self._recast(table, self.classifier.exemplars)
+
+    def _find_stops(self, table: ExampleTable) -> Stops:
+        given = [prop for name, prop in self.conditions.pairs if name == self.target.type]
+        taken = (self.limits.low, self.limits.high)
+        return find_stops(self.clusterer, table, self.classifier.vocabulary.follows, given, taken)
 
     # ------------------------------------------------------------------ saving
     def to_json(self, *, history: bool) -> dict[str, Any]:
@@ -212,6 +223,7 @@ class PropertyModel(Answers):
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
             "limits": self.limits.to_json(),
+            "stops": self.stops.to_json(),
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -226,4 +238,5 @@ class PropertyModel(Answers):
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))
+        self.stops = Stops.from_json(data.get("stops", {}))
         self._bindings.clear()

@@ -121,6 +121,8 @@ def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> T
 
 
 def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
+    if mode.id in part.stops:
+        return f"{mode.formula(digits)} {part.stops.text(mode.id, part.target.property)}"
     if mode.id not in part.limits:
         return mode.formula(digits)
     side = "least" if mode.id == part.limits.low else "most"

@@ -88,6 +88,25 @@ def test_tree_helps_where_relations_cannot(items: list[Labelled]) -> None:
     assert found.describe()[-1][3] or found.describe()[0][3]
 
 
+@pytest.mark.parametrize(("errors", "trees"), [("class", 1), ("stage", 0)])
+def test_a_rare_modes_errors_call_for_a_tree_unless_only_the_stage_counts(errors: str, trees: int) -> None:
+    # 10 bounces among 490 slides in one relational state: 2 % of the stage, all of the bounces (§4.3.4).
+    vocabulary = Vocabulary(relations=("intersect",), unary=("ball", "floor"), own=("vy",))
+    config = ClassificationConfig.original(tree_errors=errors)
+    table = np.array([[[False, True], [True, False]]])
+    speeds = np.where(np.arange(500) < 10, -0.1, 0.0)
+    examples = [
+        Example(table, np.eye(2, dtype=bool), np.ones(2, bool), np.empty((2, 0)), np.array([v]))
+        for v in speeds
+    ]
+    view = View.of_batch(ExampleBatch.stack(examples), (0, 1), np.zeros((500, 2)))
+    lesson = Lesson(view, np.arange(500), speeds == 0.0, np.ones(500))
+    found = learn_pair(0, 1, lesson, Scope.of(vocabulary, config, (0, 1)), config)
+    assert sum(tree is not None for tree in (*found.clause_trees, found.fall_through_tree)) == trees
+    wrong = found.says_i_batch(view, lesson.rows) != lesson.is_i
+    assert wrong.sum() == (0 if trees else 10)
+
+
 def test_tree_of_a_clause_sees_the_bound_object() -> None:
     rng = np.random.default_rng(1)
     vocabulary = Vocabulary(relations=("intersect",), unary=("ball", "box"), pair=("friction",))

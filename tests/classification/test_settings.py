@@ -37,6 +37,7 @@ def test_presets_differ_from_the_default_as_described() -> None:
     assert (thesis.votes, thesis.literal_choice, thesis.beam) == ("hard", "negatives", 1)
     assert (thesis.clause_tree_threshold, thesis.fall_through_tree_threshold) == (0.05, 0.2)
     assert (original.literal_choice, original.min_precision, original.mdl) == ("gain", 0.9, False)
+    assert (thesis.tree_errors, original.tree_errors) == ("class", "stage")
     assert not (thesis.contact_facts or thesis.numeric_literals or thesis.mode_function_features)
     assert ClassificationConfig.thesis(context="all").context == "all"
     assert ClassificationConfig.original(beam=2).beam == 2

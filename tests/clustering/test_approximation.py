@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.clustering.approximation import approximate
+from relgym.clustering.approximation import approximate, terms_of
 from relgym.clustering.discovery import Scale, is_law, likeness
+from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import least_squares
 
@@ -63,3 +64,37 @@ def test_neighbours_residuals_are_alike_on_a_curve_only(rng: np.random.Generator
     assert likeness(x, np.sin(4.0 * x[:, 0])) > 0.8
     assert abs(likeness(x, rng.normal(size=300))) < 0.3
     assert likeness(np.ones((5, 1)), np.arange(5.0)) == 0.0
+
+
+def engine(n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A velocity that an engine, on in one step of four, changes by as much as it likes."""
+    x = np.column_stack([rng.normal(size=n), rng.random(n) < 0.25])
+    y = 0.9 * x[:, 0] + x[:, 1] * (0.5 + rng.uniform(-0.25, 0.25, n)) + 1e-4 * rng.normal(size=n)
+    return x, y
+
+
+def test_what_is_left_may_be_more_if_it_is_noise(rng: np.random.Generator) -> None:
+    x, y = engine(800, rng)
+    assert approximate(x, y, x[:, 0], floor=1e-9, terms=3, stds=4.0, left=0.1) is None
+    found = approximate(x, y, x[:, 0], floor=1e-9, terms=3, stds=4.0, left=0.1, noisy=2)
+    assert found is not None
+    assert found.fit.weights == pytest.approx((0.9, 0.5), abs=0.03)
+    assert found.inliers.mean() > 0.98  # what the engine does is noise, no behaviour of its own
+
+
+def test_a_curve_is_no_noise(rng: np.random.Generator) -> None:
+    x = rng.uniform(-1.0, 1.0, (800, 2))
+    y = x[:, 0] + 0.2 * x[:, 1] + 0.1 * np.sin(6.0 * x[:, 1])
+    assert approximate(x, y, x[:, 0], floor=1e-9, terms=2, stds=4.0, left=0.1, noisy=2) is None
+
+
+def test_a_choice_among_few_values_is_no_noise(rng: np.random.Generator) -> None:
+    x = rng.normal(size=(800, 1))
+    y = np.round(x[:, 0] * 3.0) + rng.integers(-1, 2, 800)
+    assert approximate(x, y, np.zeros(800), floor=1e-9, terms=1, stds=4.0, left=0.1, noisy=1) is None
+
+
+def test_the_wider_the_library_the_more_terms() -> None:
+    config = ClusteringConfig()
+    assert terms_of(20, config) == config.max_terms
+    assert terms_of(500, config) == 2 * config.max_terms

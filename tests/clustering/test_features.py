@@ -112,3 +112,17 @@ def test_a_mode_stands_aside_where_its_feature_lacks_an_object() -> None:
     own = Role("cart", (("v action.a", 1.0),))
     mode = Mode(1, Target("cart", "v"), (own,), 0.0)
     assert bind(mode, SlotSignature((CART,), nonlinear=Library(("products",)))) is None
+
+
+def test_the_size_of_a_library_is_known_before_it_is_built() -> None:
+    for kinds in (("trig",), ("products",), ("squares",), ("trig", "degree3"), ("degree4",)):
+        names, own = ["x", "v", "v'", "action.a"], [True, True, True, False]
+        library = Library(kinds)
+        assert len(library.features(names, own)) <= library.size(names, own) <= 200
+    assert Library().size(["x"], [True]) == 0
+
+
+def test_a_library_too_large_is_refused_with_a_remedy() -> None:
+    names = [f"x{k}" for k in range(28)]
+    with pytest.raises(ConfigError, match=r"at most 6,000; ask for a lower degree"):
+        Library(("trig", "degree4")).features(names, [True] * 28)

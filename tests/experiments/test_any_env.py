@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from relgym.config import ModelConfig
-from relgym.experiments.any_env import STUDIES, collect, learned, main, nrmse_d, recommended, regular
+from relgym.experiments.any_env import main, weight
+from relgym.experiments.any_env_data import STUDIES, collect, learned, nrmse_d, recommended, regular
+from relgym.experiments.any_env_flight import flying
+from relgym.experiments.any_env_memory import memory
+from relgym.experiments.any_env_stream import LastChange
 from relgym.experiments.seeds import TUNING_SEEDS, TUNING_TEST_SEED
 
 
@@ -22,6 +26,9 @@ def test_the_mountain_car_is_learned_from_its_own_advice() -> None:
         "v' = v - 0.0025 cos(3 x) + 0.001 action.a - 0.001"
     ]
     assert [m.formula(4) for m in model.modes("self", "x")] == ["x' = x + v'"]
+    for prop, term, value in study.weights:
+        assert weight(model, prop, term) == pytest.approx(value, rel=1e-3)
+    assert weight(model, "x", "v") == 0.0
 
 
 def test_limits_are_judged_apart() -> None:
@@ -37,3 +44,35 @@ def test_the_command_prints_a_row(capsys: pytest.CaptureFixture[str]) -> None:
     text = capsys.readouterr().out
     assert "w' = w + 0.75 sin(th) + 0.15 action.a" in text
     assert "th, regular" in text
+
+
+def test_a_stream_is_what_is_collected() -> None:
+    study = STUDIES["lander"]
+    lesson, again = collect(study, 120, TUNING_SEEDS[0]), collect(study, 120, TUNING_SEEDS[0])
+    np.testing.assert_array_equal(lesson.before, again.before)
+    assert 0 < lesson.terminated.sum() < 5
+    np.testing.assert_allclose(lesson.before[:, lesson.own] + lesson.change, lesson.after)
+    assert lesson.before[:, lesson.action].shape == (120, 5)
+    assert 0.8 < flying(lesson).mean() < 1.0
+    assert not flying(lesson)[lesson.terminated].any()
+
+
+def test_a_long_life_is_measured_beyond_its_bound(capsys: pytest.CaptureFixture[str]) -> None:
+    found = {m.bar.what: m for m in memory([(TUNING_SEEDS[0], TUNING_TEST_SEED)], steps=1_200, bound=300)}
+    assert found["most rows kept, over the bound"].ok
+    assert found["x, still right"].ok
+    assert "1,200 transitions, 300 kept" in capsys.readouterr().out
+
+
+def test_the_stream_is_foretold_beside_others(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["stream", "--quick", "--tuning"])
+    text = capsys.readouterr().out
+    assert "constant velocity" in text and "rls" in text
+    assert "mountain.x, over the best online baseline" in text
+
+
+def test_constant_velocity_by_hand() -> None:
+    guess = LastChange()
+    guess.learn_one(np.zeros(3), np.array([1.0, -2.0]))
+    assert guess.predict_one(np.zeros(3)).tolist() == [1.0, -2.0]
+    assert guess.predict_batch(np.zeros((2, 3))).tolist() == [[1.0, -2.0], [1.0, -2.0]]

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from relgym.experiments.plots import require_matplotlib
 
-__all__ = ["COLOURS", "FLOOR", "PRINTED", "TITLES", "above", "canvas", "error_axis", "save", "text_figure"]
+__all__ = [
+    "COLOURS",
+    "ERROR",
+    "FLOOR",
+    "PRINTED",
+    "TITLES",
+    "above",
+    "canvas",
+    "error_axis",
+    "first_case",
+    "mean_change",
+    "save",
+    "text_figure",
+]
 
 FLOOR: Final = 1e-18
 """Errors of 0 are drawn here."""
@@ -31,6 +45,9 @@ COLOURS: Final[Mapping[str, str]] = {
     "world": "#6aa879",
     "default": "#c44e52",
 }
+
+ERROR: Final = "absolute error, units per step"
+"""What axes of errors are called."""
 
 _DOTS: Final = 80
 
@@ -58,7 +75,18 @@ def text_figure(path: Path, text: str) -> None:
 
 def save(figure: Any, path: Path) -> None:
     """Write a figure as PNG, the same bytes every time."""
-    figure.savefig(path, dpi=_DOTS, metadata={"Software": None})
+    figure.savefig(path, dpi=_DOTS, metadata={"Software": None}, bbox_inches="tight", pad_inches=0.1)
+
+
+def first_case(name: str) -> str:
+    """The first of the cases that make up a mode's name.
+
+    Examples
+    --------
+    >>> first_case("floor (forward, mu 0.2), ceiling (forward, mu 0.2)")
+    'floor (forward, mu 0.2)'
+    """
+    return re.split(r", (?![^(]*\))", name)[0]
 
 
 def above(value: float) -> float:
@@ -66,11 +94,16 @@ def above(value: float) -> float:
     return max(value, FLOOR)
 
 
+def mean_change(panel: Any, change: float) -> None:
+    """A dashed line at the mean magnitude of change: no model at all errs by so much."""
+    panel.axhline(above(change), color="black", lw=0.8, ls="--", label="mean change")
+
+
 def error_axis(panel: Any, *, label: bool = True) -> None:
-    """A logarithmic axis of absolute errors, from the floor to 10."""
+    """A logarithmic axis of absolute errors, from the floor, which stays visible, to 10."""
     panel.set_yscale("log")
-    panel.set_ylim(FLOOR / 2, 10.0)
+    panel.set_ylim(FLOOR / 8, 10.0)
     panel.set_yticks([10.0**k for k in range(-18, 1, 3)])
     panel.grid(alpha=0.3)
     if label:
-        panel.set_ylabel("absolute error, units per step")
+        panel.set_ylabel(ERROR)

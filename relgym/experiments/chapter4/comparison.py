@@ -16,6 +16,7 @@ from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.lesson import fresh_blocks, taught_blocks
 from relgym.experiments.chapter4.scores import target_score
 from relgym.experiments.chapter4.testing import TARGETS, true_modes
+from relgym.experiments.chapter4.weight import weight_of
 from relgym.experiments.data import BALL_EXPERIMENTS
 from relgym.experiments.evaluate import TOLERANCE, explicable, mode_labels
 
@@ -50,7 +51,7 @@ def regress(
 
     Returns
     -------
-    Plain data: scores by checkpoint and target; seconds spent on learning and on all tests.
+    Plain data: scores by checkpoint and target; seconds spent on learning and on all tests, bytes that it keeps.
     """
     known = REGRESSORS[baseline]
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
@@ -77,6 +78,7 @@ def regress(
         "setting": dict(known.settings[setting]),
         "learning": learning,
         "asking": asking,
+        "bytes": weight_of(model),
     }
 
 
@@ -134,7 +136,8 @@ def classify(
 
     Returns
     -------
-    Plain data: examples and errors by checkpoint and target; seconds spent on learning and on all tests.
+    Plain data: examples and errors by checkpoint and target; seconds spent on learning and on all tests, bytes that it
+    keeps.
     """
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
     fresh = fresh_blocks(experiment, tests)
@@ -154,7 +157,13 @@ def classify(
             start = perf_counter()
             scores.append({"blocks": count, "targets": {t: _errors(models[t], *asked[t]) for t in TARGETS}})
             asking += perf_counter() - start
-    return {"scores": scores, "setting": dict(settings), "learning": learning, "asking": asking}
+    return {
+        "scores": scores,
+        "setting": dict(settings),
+        "learning": learning,
+        "asking": asking,
+        "bytes": weight_of(models),
+    }
 
 
 def _tell(model: Classifier, x: NDArray[np.float64], labels: NDArray[np.int64]) -> None:

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, Final, TypeAlias
 
-from relgym.experiments.chapter4.canvas import COLOURS, TITLES, above, canvas, error_axis, save
+from relgym.experiments.chapter4.canvas import (
+    COLOURS,
+    ERROR,
+    TITLES,
+    above,
+    canvas,
+    error_axis,
+    mean_change,
+    save,
+)
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.scores import pooled_scores, quantile
@@ -59,7 +70,10 @@ def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown
             _dash(panel, next(iter(learners.values())))
             error_axis(panel, label=panel is panels[0][0])
             panel.set(title=f"{_axis(target)} velocity", xlabel="training blocks")
-        panels[0][0].legend(fontsize=7, ncols=2, loc="center right")
+        handles, labels = panels[0][0].get_legend_handles_labels()
+        figure.legend(
+            handles, labels, loc="outside lower center", ncols=3 + 2 * (len(targets) > 1), fontsize=7
+        )
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)
@@ -74,7 +88,7 @@ def _figures(score: _Score) -> list[Cell]:
 def _dash(panel: Any, scores: Mapping[int, _Score]) -> None:
     """The average magnitude of change."""
     last = list(scores.values())[-1]
-    panel.axhline(above(last["change"] / last["examples"]), color="black", lw=0.8, ls="--")
+    mean_change(panel, last["change"] / last["examples"])
 
 
 # ------------------------------------------------------------------ figures 4.4, 4.5, 4.13, 4.14, 4.27-4.29
@@ -92,24 +106,29 @@ def by_mode_shown(_: Protocol, values: Values, target: str) -> Shown:
                 lines.append([name, TITLES[learner], blocks, score["examples"], *boxes, wrong])
 
     def draw(path: Path) -> None:
-        columns = min(3, len(names))
+        columns = 4 if len(names) in (4, 7, 8) else min(3, len(names))
         rows = -(-len(names) // columns)
-        figure, panels = canvas(4.6 * columns, 3.1 * rows, rows, columns, sharey=True)
+        figure, panels = canvas(13.8, 3.1 * rows, rows, columns, sharey=True)
         for panel, name in zip(panels.flat, names, strict=False):
             _boxes(panel, {learner: modes.get(name, {}) for learner, modes in found.items()})
-            panel.set_title(_short(name), fontsize=9)
+            panel.set_title(_short(name, names), fontsize=8)
         for panel in list(panels.flat)[len(names) :]:
             panel.set_axis_off()
         figure.supxlabel("training blocks", fontsize=9)
+        figure.supylabel(ERROR, fontsize=9)
         handles, labels = panels.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4, fontsize=8)
+        figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=8)
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)
 
 
-def _short(name: str, most: int = 58) -> str:
-    return name if len(name) <= most else name[: most - 1] + "…"
+def _short(name: str, names: Sequence[str]) -> str:
+    """A mode's name in at most two lines; without the friction where all have the same."""
+    if len(set(re.findall(r"mu [0-9.]+", " ".join(names)))) == 1:
+        name = re.sub(r", mu [0-9.]+", "", name)
+    lines = wrap(name, 46, max_lines=2, placeholder=" …")
+    return "\n".join(lines)
 
 
 def _by_mode(runs: Sequence[Any], target: str) -> dict[str, dict[int, _Score]]:
@@ -143,7 +162,7 @@ def _boxes(panel: Any, learners: Mapping[str, Mapping[int, _Score]], part: str =
             )
             panel.fill_between([], [], color=COLOURS[learner], alpha=0.55, label=TITLES[learner])
     for score in [s for scores in learners.values() for s in scores.values()][:1]:
-        panel.axhline(above(score["change"] / max(score["examples"], 1)), color="black", lw=0.8, ls="--")
+        mean_change(panel, score["change"] / max(score["examples"], 1))
     error_axis(panel, label=False)
     panel.set_xticks(range(len(numbers)), [str(n) for n in numbers])
 

@@ -7,12 +7,12 @@ from pathlib import Path
 from statistics import mean
 from typing import Any, Final
 
-from relgym.baselines.catalogue import CLASSIFIERS
-from relgym.experiments.chapter4.canvas import COLOURS, TITLES, above, canvas, error_axis, save
+from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS
+from relgym.experiments.chapter4.canvas import COLOURS, TITLES, above, canvas, error_axis, mean_change, save
 from relgym.experiments.chapter4.figures_accuracy import scores_by_blocks
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
-from relgym.experiments.chapter4.published import CLASSIFIER_ERRORS, LWR
+from relgym.experiments.chapter4.published import CLASSIFIER_ERRORS
 from relgym.experiments.chapter4.scores import quantile
 from relgym.model.text import Cell, table
 
@@ -22,14 +22,14 @@ _STYLES: Final = ((0.95, "-"), (0.75, "--"), (0.5, ":"))
 
 
 # ------------------------------------------------------------------ figures 4.19 and 4.20
-def lwr_shown(_: Protocol, values: Values, number: str) -> Shown:
+def lwr_shown(_: Protocol, values: Values) -> Shown:
     """Quantiles of LWR's errors in the x velocity of experiment 2, and our 95th percentile."""
     target = "ball.vx"
     found = {group: scores_by_blocks(runs, target) for group, runs in values.items()}
     heading = ["learner", "blocks", "p50", "p75", "p95"]
     lines: list[list[Cell]] = [
         [
-            TITLES.get(group, group),
+            _title(group),
             blocks,
             *(f"{quantile(score['errors'], q):.1e}" for q in (0.5, 0.75, 0.95)),
         ]
@@ -37,27 +37,36 @@ def lwr_shown(_: Protocol, values: Values, number: str) -> Shown:
         for blocks, score in scores.items()
     ]
 
-    text = f"{table(heading, lines)}\n\nprinted: {LWR[number]}"
-    return Shown(text, [heading, *lines], lambda path: _draw_lwr(path, found))
+    return Shown(table(heading, lines), [heading, *lines], lambda path: _draw_lwr(path, found))
 
 
 def _draw_lwr(path: Path, found: Mapping[str, Mapping[int, Any]]) -> None:
-    figure, panels = canvas(8.0, 4.6)
+    figure, panels = canvas(10.0, 4.4)
     panel, shades = panels[0][0], iter(("#8e6eb0", "#cda443"))
     for group, scores in found.items():
         ours = group in COLOURS
         colour = COLOURS[group] if ours else next(shades)
         for q, style in _STYLES[:1] if ours else _STYLES:
             line = [above(quantile(s["errors"], q)) for s in scores.values()]
-            label = f"{TITLES.get(group, group)}, {100 * q:g} %"
-            width = 3.0 if ours else 1.2
+            label = f"{_title(group)}, {100 * q:g} %"
+            width = {"thesis": 6.0, "default": 2.0}.get(group, 1.2)  # where they agree, both can be seen
             panel.plot(list(scores), line, style, marker="o", ms=3, lw=width, color=colour, label=label)
     last = list(next(iter(found.values())).values())[-1]
-    panel.axhline(last["change"] / last["examples"], color="black", lw=0.8, ls="--")
+    mean_change(panel, last["change"] / last["examples"])
     error_axis(panel)
     panel.set_xlabel("training blocks")
-    panel.legend(fontsize=7, ncols=2)
+    figure.legend(*panel.get_legend_handles_labels(), loc="outside right center", fontsize=8)
     save(figure, path)
+
+
+def _title(group: str) -> str:
+    """Of one of our learners, or of a baseline with what it was shown."""
+    name, _, seen = group.partition("/")
+    return (
+        TITLES[name]
+        if name in TITLES
+        else REGRESSORS[name].title + (", uncentred" * seen.endswith("uncentred"))
+    )
 
 
 # ------------------------------------------------------------------ figure 4.21

@@ -129,7 +129,7 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
         lines.append(["learned", f"{mode['mode']}, {mode['examples']} examples", said, mode["function"]])
 
     def draw(path: Path) -> None:
-        figure, panels = canvas(13.0, 4.0, 1, 2, width_ratios=(2, 3))
+        figure, panels = canvas(11.0, 4.0, 1, 2, width_ratios=(1, 1))
         *_, block = ball_blocks(
             1, seed=TRAINING_SEEDS[0], blocks=8, order=None
         )  # the ball begins above an object
@@ -183,6 +183,7 @@ def _draw_collisions(path: Path, arrows: Sequence[tuple[Any, ...]]) -> None:
 
     figure, panels = canvas(3.0 * len(arrows), 3.2, 1, len(arrows))
     for panel, (name, before, after, friction, normal) in zip(panels[0], arrows, strict=True):
+        level = normal[0] == 0.0
         panel.add_patch(Circle((0.0, 0.0), 0.25, color="#e67e22"))
         wall = -0.25 * np.array(normal)
         along = np.array([-normal[1], normal[0]])
@@ -194,8 +195,10 @@ def _draw_collisions(path: Path, arrows: Sequence[tuple[Any, ...]]) -> None:
         ):
             tip = tail + np.array(vector)
             panel.annotate("", tip, tail, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.8})
-            side = -0.5 * np.array(normal) if label == "friction" else np.full(2, 0.08)
-            panel.text(*(0.5 * (tail + tip) + side), label, color=colour, fontsize=9, ha="center")
+            beside = np.array([-vector[1], vector[0]]) / float(np.hypot(*vector))
+            side = -0.3 * np.array(normal) if label == "friction" else 0.15 * beside
+            ha = "center" if label != "friction" or level else ("left" if normal[0] < 0 else "right")
+            panel.text(*(0.5 * (tail + tip) + side), label, color=colour, fontsize=9, ha=ha, va="center")
         panel.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), xticks=[], yticks=[], aspect="equal")
         panel.set_title(f"case {name}", fontsize=10)
     save(figure, path)

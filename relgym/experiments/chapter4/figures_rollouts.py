@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relgym.experiments.chapter4.canvas import FLOOR, TITLES, canvas, save
 from relgym.experiments.chapter4.job import Shown, Values
@@ -39,7 +40,9 @@ def rollout_errors_shown(_: Protocol, values: Values, axis: int) -> Shown:
             for trial, errors in zip(runs[0]["trials"], _errors(runs[0]["trials"], axis), strict=True):
                 colour = "#c44e52" if trial["corner"] else "#4878a8"
                 panel.semilogy(np.clip(errors, FLOOR, 1e2), color=colour, lw=0.6, alpha=0.7)
-            panel.set(title=TITLES[learner], xlabel="time step", ylim=(FLOOR, 1e2))
+            failed = sum(trial["failed"] for trial in runs[0]["trials"])
+            title = f"{TITLES[learner]}: {failed} of {len(runs[0]['trials'])} fail"
+            panel.set(title=title, xlabel="time step", ylim=(FLOOR, 1e2))
             panel.grid(alpha=0.3)
         panels[0][0].set_ylabel(f"error of the ball's {name} position (red: a corner is hit)", fontsize=8)
         save(figure, path)
@@ -62,7 +65,7 @@ def failure_shown(_: Protocol, values: Values, causes: Sequence[str], severe: bo
     causes
         Of what it failed.
     severe
-        The trial with the greatest (true) or the least (false) final error; none: the first one.
+        The trial with the greatest (true) or the least (false) final error; none: the one that fails first.
     """
     found = _example(values, causes, severe)
     if found is None:
@@ -87,8 +90,10 @@ def _example(values: Values, causes: Sequence[str], severe: bool | None) -> tupl
         trials = runs[0]["trials"]
         numbers = [k for k, t in enumerate(trials) if t["cause"] in causes and not t["stopped"]]
         if numbers:
+            if severe is None:
+                return learner, min(numbers, key=lambda k: int(trials[k]["begins"]))
             by_error = sorted(numbers, key=lambda k: _distance(trials[k]))
-            return learner, numbers[0] if severe is None else by_error[-1 if severe else 0]
+            return learner, by_error[-1 if severe else 0]
     return None
 
 
@@ -107,16 +112,27 @@ def _draw_failure(path: Path, trial: Mapping[str, Any], number: int, text: str) 
     for panel, step in zip(panels[0], steps, strict=True):
         scene = Scene(block.schema, block.layout, block.vectors[step].copy())
         view = scene_view(scene)
-        picture = render_scene(scene, size=(400, max(1, round(400 * view.height / view.width))), view=view)
+        picture = render_scene(scene, size=(800, max(1, round(800 * view.height / view.width))), view=view)
         right, top = view.left + view.width, view.bottom + view.height
         panel.imshow(picture, extent=(view.left, right, view.bottom, top), alpha=0.55)
-        for points, colour in ((trial["imagined"], "#8c8c8c"), (trial["real"], "black")):
-            panel.plot(*np.array(points)[max(0, step - 20) : step + 1].T, color=colour, lw=0.8)
-            _circle(panel, points[step], radius, colour)
-        panel.set(xlim=(view.left, right), ylim=(view.bottom, top), xticks=[], yticks=[])
+        recent = [np.array(trial[which])[max(0, step - 20) : step + 1] for which in ("imagined", "real")]
+        for points, colour in zip(recent, ("#8c8c8c", "black"), strict=True):
+            panel.plot(*points.T, color=colour, lw=0.8)
+            _circle(panel, points[-1], radius, colour)
+        panel.set(xticks=[], yticks=[], **_near(recent, radius))
         panel.set_title(f"step {step}", fontsize=9)
     figure.suptitle(text, fontsize=9)
     save(figure, path)
+
+
+def _near(recent: Sequence[NDArray[np.float64]], radius: float) -> dict[str, tuple[float, float]]:
+    """Limits of a square that shows the balls and where they came from, in units."""
+    points = np.concatenate(recent)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = 0.5 * (low + high)
+    half = max(0.5 * float((high - low).max()) + 2.0 * radius, 5.0 * radius)
+    (x, y) = ((float(m - half), float(m + half)) for m in middle)
+    return {"xlim": x, "ylim": y}
 
 
 def _circle(panel: Any, at: Sequence[float], radius: float, colour: str) -> None:

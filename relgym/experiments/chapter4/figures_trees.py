@@ -62,11 +62,14 @@ def _without(rows: Mapping[int, int], first: int, second: int) -> str:
 
 
 def _draw(path: Path, trees: Mapping[str, Mapping[str, Any]], note: str) -> None:
-    figure, panels = canvas(6.5 * max(len(trees), 1), 4.5, 1, max(len(trees), 1))
+    sizes = [_size(DecisionTree.from_dict(about["tree"])) for about in trees.values()] or [(2.0, 0.0)]
+    width, depth = (max(each) for each in zip(*sizes, strict=True))
+    figure, panels = canvas((1.0 + 1.2 * width) * len(sizes), 0.8 + 0.9 * depth, 1, len(sizes))
     for panel in panels[0]:
         panel.set_axis_off()
     if not trees:
-        panels[0][0].text(0.5, 0.5, f"{note}\nNo learner needed a tree.", ha="center", va="center")
+        words = f"{note}\nNo learner tells them apart by a tree."
+        panels[0][0].text(0.5, 0.5, words, ha="center", va="center")
     for panel, (learner, about) in zip(panels[0], trees.items(), strict=False):
         tree = DecisionTree.from_dict(about["tree"])
         names = {True: f"mode {about['yes']}", False: f"mode {about['no']}"}
@@ -77,6 +80,12 @@ def _draw(path: Path, trees: Mapping[str, Mapping[str, Any]], note: str) -> None
         width = max(x for x, _ in places.values())
         panel.set(xlim=(-0.6, width + 0.6), ylim=(min(y for _, y in places.values()) - 0.5, 0.5))
     save(figure, path)
+
+
+def _size(tree: DecisionTree) -> tuple[float, float]:
+    """Leaves side by side, and tests from root to leaf."""
+    places = _places(tree).values()
+    return max(x for x, _ in places) + 1.0, -min(y for _, y in places)
 
 
 def _places(tree: DecisionTree) -> dict[int, tuple[float, float]]:
@@ -104,7 +113,10 @@ def _node(
     names: Mapping[bool, str],
 ) -> None:
     if tree.column[node] < 0:
-        text = f"{names[tree.says_yes(node)]}\n{tree.positive[node]:g} : {tree.negative[node]:g}"
+        right, wrong = tree.negative[node], tree.positive[node]
+        if tree.says_yes(node):
+            right, wrong = wrong, right
+        text = f"{names[tree.says_yes(node)]}\n{right:,.0f} of {right + wrong:,.0f}"
         style = {"boxstyle": "round", "facecolor": "#dde8f3"}
     else:
         text = f"{tree.columns[tree.column[node]]} <= {tree.threshold[node]:.3g}"

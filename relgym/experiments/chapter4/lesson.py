@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from time import perf_counter
 from typing import Any, Final
 
@@ -13,6 +14,7 @@ from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.testing import TARGETS, confusions, scores_of
+from relgym.experiments.chapter4.weight import weight_of
 from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_blocks
 from relgym.model.report import report
 from relgym.model.text import plain
@@ -26,21 +28,30 @@ _BLOCKS_PER_SEED: Final = 40
 
 
 def config_of(learner: str) -> ModelConfig:
-    """Configuration of a learner by name (`relgym.experiments.chapter4.protocol.LEARNERS`).
+    """Configuration of a learner by name (`relgym.experiments.chapter4.protocol`: `LEARNERS`, `ABLATIONS`).
 
     ``"one-polarity"`` is the thesis' learner without §3.4.5: the first mode of a pair is always the positive class.
     """
-    thesis = ModelConfig.thesis()
+    thesis, original = ModelConfig.thesis(), ModelConfig.original()
     known = {
-        "original": ModelConfig.original(),
+        "original": original,
+        "original, trees for rare modes": _with_rules(original, tree_errors="class"),
+        "original, simplest of equals": replace(
+            original, clustering=replace(original.clustering, stickiness="simple")
+        ),
+        "original, contact facts": _with_rules(original, contact_facts=True),
         "thesis": thesis,
-        "one-polarity": replace(thesis, classification=replace(thesis.classification, both_polarities=False)),
+        "one-polarity": _with_rules(thesis, both_polarities=False),
         "world": ModelConfig(frames="world"),
         "default": ModelConfig(),
     }
     if learner not in known:
         raise ConfigError(f"learner {learner!r}: expected one of {sorted(known)}")
     return known[learner]
+
+
+def _with_rules(config: ModelConfig, **changes: Any) -> ModelConfig:
+    return replace(config, classification=replace(config.classification, **changes))
 
 
 def lesson(
@@ -73,7 +84,7 @@ def lesson(
     Returns
     -------
     Plain data: scores by checkpoint and target, the learned model's report, confusions of its modes, its trees, seconds
-    spent on learning.
+    spent on learning, bytes that it keeps.
     """
     laws = BALL_EXPERIMENTS[experiment].modes()
     blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1], stages))
@@ -98,6 +109,7 @@ def lesson(
         "confusions": confusions(model, fresh, laws),
         "training": _mode_examples(blocks),
         "seconds": seconds,
+        "bytes": weight_of(model),
         "corner_blocks": float(np.mean([b.truth.corner.any() for b in fresh])),
     }
 
@@ -132,7 +144,7 @@ def fresh_blocks(experiment: int, tests: Mapping[str, Any]) -> list[Block]:
     return [
         block
         for seed in seeds
-        for block in list(ball_blocks(experiment, seed=seed, blocks=cycle, test=True))[:each]
+        for block in islice(ball_blocks(experiment, seed=seed, blocks=cycle, test=True), each)
     ]
 
 

@@ -9,10 +9,13 @@ from typing import Any, Final
 from relgym.errors import ConfigError
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS
 
-__all__ = ["LEARNERS", "Batch", "Protocol"]
+__all__ = ["ABLATIONS", "LEARNERS", "WHOLE_TEST", "Batch", "Protocol"]
 
 ORDERS: Final = 10
 """Block orders of the thesis; with its five seeds they make 50 batches (§4.2)."""
+
+WHOLE_TEST: Final = 120
+"""Blocks of the thesis' test set: 24,000 examples (§4.3.3)."""
 
 LEARNERS: Final[Mapping[str, str]] = {
     "original": "the thesis' program: ModelConfig.original()",
@@ -21,6 +24,14 @@ LEARNERS: Final[Mapping[str, str]] = {
     "default": "relgym as it comes, with contact laws: ModelConfig()",
 }
 """Learners that are reported side by side."""
+
+ABLATIONS: Final[Mapping[str, str]] = {
+    "original": "as it is",
+    "original, trees for rare modes": 'a tree also where most of a rare mode is wrong: tree_errors="class"',
+    "original, simplest of equals": 'examples that several modes explain go to the simplest: stickiness="simple"',
+    "original, contact facts": "clauses may say which contact is approached: contact_facts=True",
+}
+"""The thesis' program, and what becomes of it with one cause of its errors taken away."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +71,7 @@ class Protocol:
     """
 
     batches: int = 50
-    test_blocks: int = 120
+    test_blocks: int = WHOLE_TEST
     checkpoints: Mapping[int, tuple[int, ...]] | None = None
     noise_batches: int = 15
     variances: tuple[float, ...] = (1e-20, 1e-15, 1e-10, 1e-8, 1e-5)

@@ -17,6 +17,7 @@ from relgym.experiments.chapter4.canvas import TITLES
 from relgym.experiments.chapter4.catalogue import JOBS
 from relgym.experiments.chapter4.job import Job, Shown
 from relgym.experiments.chapter4.protocol import LEARNERS, Protocol
+from relgym.experiments.chapter4.published import REMARKS
 from relgym.experiments.jobs.run import Progress, results, run
 from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
@@ -80,18 +81,19 @@ def make(job: Job, protocol: Protocol, store: ResultStore, out: Path, command: s
     """
     plan = job.plan(protocol)
     shown = job.show(protocol, {group: results(tasks, store) for group, tasks in plan.items()})
+    text = f"{shown.text}\n\nprinted: {REMARKS[job.name]}" if job.name in REMARKS else shown.text
     figure = f"{job.name}.png" if shown.draw is not None else ""
     made = Made(
         job.name,
         job.title,
         job.source,
-        shown.text,
+        text,
         figure,
         date.today().isoformat(),
         command,
         _seconds(plan, store),
     )
-    write_atomically(out / f"{job.name}.txt", f"{shown.text}\n".encode())
+    write_atomically(out / f"{job.name}.txt", f"{text}\n".encode())
     write_atomically(out / f"{job.name}.csv", _csv(shown).encode())
     if shown.draw is not None:
         write_atomically(out / figure, _drawn(shown))

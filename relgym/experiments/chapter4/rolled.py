@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from typing import Any, Final
 
 import numpy as np
@@ -81,9 +82,8 @@ def trial_blocks(experiment: int, tests: Sequence[int], trials: int) -> list[Blo
     found: list[Block] = []
     for seed in tests:
         count = min(_CONFIGURATIONS, trials - len(found))
-        found += list(ball_blocks(experiment, seed=seed, blocks=_CONFIGURATIONS, order=None, test=True))[
-            :count
-        ]
+        rooms = ball_blocks(experiment, seed=seed, blocks=_CONFIGURATIONS, order=None, test=True)
+        found += islice(rooms, count)
     return found
 
 

@@ -98,6 +98,7 @@ def mode_score(
             "unlearned": int((wrong & ~known).sum()),
             "misclassified": int((wrong & known).sum()),
             "strict": int((silent | (residual > best + TOLERANCE)).sum()),
+            "literal": int((silent | (residual > best)).sum()),
             "best": histogram(best),
         }
     return score

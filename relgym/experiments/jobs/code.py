@@ -44,7 +44,7 @@ def code_version(module: str) -> str:
     digest = hashlib.sha256()
     libraries: set[str] = set()
     for name in modules_behind(module):
-        digest.update(f"{name}\n{ast.dump(_bare(name))}\0".encode())
+        digest.update(f"{name} {_content(name)}\n".encode())
         libraries |= {found.split(".")[0] for found in _imports(name)} & _LIBRARIES.keys()
     for library in sorted(libraries):
         digest.update(f"{library} {_version(_LIBRARIES[library])}\n".encode())
@@ -77,6 +77,12 @@ def modules_behind(module: str) -> tuple[str, ...]:
 def _imports(module: str) -> frozenset[str]:
     """Dotted names that a module imports, and those of what it takes from them: modules, or names in them."""
     return frozenset(_found(ast.parse(_source(module) or b"")))
+
+
+@cache
+def _content(module: str) -> str:
+    """Digest of a module's code; cached, for most modules are behind several others."""
+    return hashlib.sha256(ast.dump(_bare(module)).encode()).hexdigest()
 
 
 def _bare(module: str) -> ast.Module:

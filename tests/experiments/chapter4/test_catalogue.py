@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from relgym.errors import ConfigError, StoreError
 from relgym.experiments.chapter4.catalogue import JOBS, chosen
 from relgym.experiments.chapter4.command import Request, remaining, reproduce
 from relgym.experiments.chapter4.protocol import Protocol
+from relgym.experiments.chapter4.published import REMARKS
 from relgym.experiments.chapter4.reproduce import Made, compute, make, page
 from relgym.experiments.jobs.code import code_version, modules_behind
 from relgym.experiments.jobs.run import Progress
@@ -87,6 +90,32 @@ def test_a_job_from_end_to_end(tmp_path: Path) -> None:
     assert row.split()[-2:] == ["480", "240"]  # the thesis' examples, and half of them
     assert made.seconds > 0
     assert [p.reused for p in compute([small], protocol, store, workers=1)] == [1]
+    store.path(task).write_text(store.path(task).read_text()[:100])
+    with pytest.raises(StoreError, match=r"is damaged: .*; delete it, and it is computed again"):
+        list(compute([small], protocol, store, workers=1))
+
+
+def test_the_command_stops_where_the_disk_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    command = ["reproduce", "table-4.1", "--fast", "--out", str(tmp_path)]
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", full)
+        failed = CliRunner().invoke(app, command)
+    assert failed.exit_code == 2 and "no space left to keep a result" in " ".join(failed.output.split())
+    assert not list(tmp_path.iterdir())
+    assert CliRunner().invoke(app, command).exit_code == 0
+    assert (tmp_path / "table-4.1.txt").is_file()
+
+
+def test_what_the_thesis_says_of_a_figure_stands_below_it(tmp_path: Path) -> None:
+    assert set(REMARKS) < set(JOBS)
+    remark = {"table-4.1": "forty of them"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("relgym.experiments.chapter4.reproduce.REMARKS", remark)
+        list(reproduce(Request(("table-4.1",), tmp_path, fast=True)))
+    assert (tmp_path / "table-4.1.txt").read_text().endswith("\nprinted: forty of them\n")
 
 
 def test_no_page_without_results(tmp_path: Path) -> None:

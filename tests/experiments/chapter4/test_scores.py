@@ -45,6 +45,7 @@ def test_what_went_wrong_by_hand() -> None:
     score = mode_score("floor", residual, silent, best, np.full(5, -2.0))
     assert (score["examples"], score["wrong"], score["silent"]) == (5, 3, 1)
     assert (score["unlearned"], score["misclassified"], score["strict"]) == (1, 2, 3)
+    assert score["literal"] == 4  # the tie counts, too
     assert score["change"] == 10.0 and score["sum"] == pytest.approx(1.5)
     twice = pooled_scores([score, score])
     assert twice["wrong"] == 6 and twice["name"] == "floor" and quantile(twice["errors"], 1.0) > 0.4

@@ -32,7 +32,7 @@ TASKS = [
 def _values(folder: Path, **options: Any) -> list[Any]:
     store = ResultStore(folder)
     list(run(TASKS, store, **options))
-    return [{**value, "seconds": None} for value in results(TASKS, store)]
+    return [{**value, "seconds": None, "bytes": None} for value in results(TASKS, store)]
 
 
 @pytest.mark.cluster

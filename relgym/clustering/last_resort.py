@@ -1,0 +1,77 @@
+"""An approximation for a target of which exact laws explain too little, and whether it is worth having."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.approximation import LEFT, LEFT_LINEAR, NEARLY_ALL, approximate, terms_of
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.population import Population
+from relgym.clustering.unification import reordered
+from relgym.numeric.stepwise import LinearFit
+
+__all__ = ["LastResort", "last_resort"]
+
+MOST_ROWS = 1500
+"""At most so many rows, the newest, determine an approximation."""
+
+BETTER = 0.95
+"""An approximation gives way to one whose errors are smaller by this factor."""
+
+
+@dataclass(frozen=True, slots=True)
+class LastResort:
+    """An approximation: the signature of its columns, the function on them, and what it leaves of its examples."""
+
+    signature: int
+    fit: LinearFit
+    sigma: float
+
+
+def last_resort(
+    population: Population, table: ExampleTable, *, floor: float, again: bool
+) -> LastResort | None:
+    """The best sparse function of a target's newest examples, if it is better than what there is.
+
+    Parameters
+    ----------
+    population, table
+        The target's examples and their rows.
+    floor
+        Rounding noise, in units of the target.
+    again
+        Whether the present modes are approximations too.
+    """
+    recent = np.arange(max(0, len(population.y) - MOST_ROWS), len(population.y))
+    signature = int(table.signature_ids[population.rows[-1]])
+    recent = recent[table.signature_ids[population.rows[recent]] == signature]
+    slots, rows, y = table.signatures[signature], population.rows[recent], population.y[recent]
+    order, stages = slots.preference(population.target)
+    order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
+    x = slots.matrix(table.x[rows], order)
+    found = approximate(
+        x,
+        y,
+        slots.present(table.x[rows], population.target),
+        floor=floor,
+        terms=terms_of(len(order), population.config),
+        stds=population.scale.inlier_stds,
+        left=LEFT if slots.features else LEFT_LINEAR,
+        noisy=stages[0] if slots.features else 0,
+    )
+    if found is None:
+        return None
+    if again and slots.features:  # few examples choose among many features badly
+        modes = [c.errors(table, rows, y, population.scale)[0] for c in population.clusters.values()]
+        if modes and _reach(np.abs(y - found.fit.predict(x))) > BETTER * _reach(np.min(modes, axis=0)):
+            return None
+    elif 2 * population.noise_examples <= population.seen and found.sigma > 0.5 * population.scale.sigma:
+        return None
+    return LastResort(signature, reordered(found.fit, order), found.sigma)
+
+
+def _reach(errors: NDArray[np.float64]) -> float:
+    return float(np.quantile(errors, NEARLY_ALL))

@@ -1,0 +1,50 @@
+"""When an approximation is worth having, and when it gives way to a better one."""
+
+from __future__ import annotations
+
+import numpy as np
+from points import learned, schema_of, transitions
+
+from relgym.clustering.last_resort import last_resort
+from relgym.model.world_model import WorldModel
+
+SHIP = schema_of(("v", "th"), ("fire",))
+
+
+def fly(n: int, seed: int, **config: object) -> WorldModel:
+    rng = np.random.default_rng(seed)
+
+    def ship(state: np.ndarray, action: np.ndarray) -> list[float]:
+        thrust = action[0] * (0.5 + rng.uniform(-0.2, 0.2))
+        return [state[0] + thrust * np.sin(state[1]) + 2e-3 * rng.normal(), state[1]]
+
+    starts = np.column_stack([rng.normal(size=n), rng.uniform(-3.0, 3.0, n)])
+    actions = (rng.random((n, 1)) < 0.5).astype(float)
+    return learned(SHIP, transitions(SHIP, ship, starts, actions), **config)
+
+
+def test_an_engine_that_fires_as_it_likes_is_described_by_what_it_does_on_average() -> None:
+    model = fly(400, 0, features=("trig", "products"))
+    part = model.property_model("self", "v")
+    assert part.clusterer.approximate
+    largest = max(part.modes, key=lambda m: m.examples)
+    weights = dict(largest.roles[0].terms)
+    assert abs(weights["v"] - 1.0) < 0.02
+    assert abs(weights["action.fire sin(th)"] - 0.5) < 0.05
+    assert largest.examples > 380
+
+
+def test_it_is_only_sought_among_features_that_were_asked_for() -> None:
+    assert not fly(300, 0).property_model("self", "v").clusterer.approximate
+
+
+def test_an_approximation_gives_way_to_a_better_one_only() -> None:
+    model = fly(400, 0, features=("trig", "products"))
+    clusterer = model.property_model("self", "v").clusterer
+    table = model._parts.tables["self"]
+    again = last_resort(clusterer, table, floor=clusterer.floor, again=True)
+    assert again is None  # hardly better than what there is
+    clusterer.clusters = dict(list(clusterer.clusters.items())[:0])
+    found = last_resort(clusterer, table, floor=clusterer.floor, again=True)
+    assert found is not None
+    assert 0.04 < found.sigma < 0.09
