@@ -58,30 +58,14 @@ class Part:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
-        return {
-            "name": self.name,
-            "columns": [[prop, source] for prop, source in self.sources.items()],
-            "type": self.type,
-            "shape": None if self.shape is None else shape_to_json(self.shape),
-            "pose": dict(self.pose),
-            "velocity": list(self.velocity),
-            "constants": [[p, v] for p, v in self.constants.items()],
-            "angles": list(self.angles),
-        }
+        columns = [[prop, source] for prop, source in self.sources.items()]
+        return {"name": self.name, "columns": columns, **_traits_to_json(self)}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Part:
         """Read what `to_json` wrote."""
-        return cls(
-            data["name"],
-            {str(prop): str(source) for prop, source in data["columns"]},
-            data["type"],
-            None if data["shape"] is None else shape_from_json(data["shape"]),
-            dict(data["pose"]),
-            tuple(data["velocity"]),
-            {str(p): float(v) for p, v in data["constants"]},
-            tuple(data["angles"]),
-        )
+        columns = {str(prop): str(source) for prop, source in data["columns"]}
+        return cls(data["name"], columns, **_traits_from_json(data))
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,30 +99,12 @@ class Rows:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
-        return {
-            "name": self.name,
-            "count": self.count,
-            "type": self.type,
-            "shape": None if self.shape is None else shape_to_json(self.shape),
-            "pose": dict(self.pose),
-            "velocity": list(self.velocity),
-            "constants": [[p, v] for p, v in self.constants.items()],
-            "angles": list(self.angles),
-        }
+        return {"name": self.name, "count": self.count, **_traits_to_json(self)}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Rows:
         """Read what `to_json` wrote."""
-        return cls(
-            data["name"],
-            int(data["count"]),
-            data["type"],
-            None if data["shape"] is None else shape_from_json(data["shape"]),
-            dict(data["pose"]),
-            tuple(data["velocity"]),
-            {str(p): float(v) for p, v in data["constants"]},
-            tuple(data["angles"]),
-        )
+        return cls(data["name"], int(data["count"]), **_traits_from_json(data))
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,3 +195,27 @@ def merged(kinds: Sequence[ObjectType]) -> tuple[ObjectType, ...]:
                 "{property: column}"
             )
     return tuple(found.values())
+
+
+def _traits_to_json(of: Part | Rows) -> dict[str, Any]:
+    """What both kinds of object say of their type, as plain data."""
+    return {
+        "type": of.type,
+        "shape": None if of.shape is None else shape_to_json(of.shape),
+        "pose": dict(of.pose),
+        "velocity": list(of.velocity),
+        "constants": [[p, v] for p, v in of.constants.items()],
+        "angles": list(of.angles),
+    }
+
+
+def _traits_from_json(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Inverse of `_traits_to_json`: arguments."""
+    return {
+        "type": data["type"],
+        "shape": None if data["shape"] is None else shape_from_json(data["shape"]),
+        "pose": dict(data["pose"]),
+        "velocity": tuple(data["velocity"]),
+        "constants": {str(p): float(v) for p, v in data["constants"]},
+        "angles": tuple(data["angles"]),
+    }

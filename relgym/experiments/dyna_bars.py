@@ -71,7 +71,8 @@ def shown(number: int, store: ResultStore, out: Path, command: str) -> Made:
     picture = f"dream-{number}.png" if figures.draw is not None else ""
     if figures.draw is not None:
         figures.draw(out / picture)
-    text = report(row.title, figures.measures, figures.notes)
+    extent = f"{len(found)} of the row's {len(row.tasks)} runs have been made."
+    text = report(row.title, figures.measures, [*figures.notes, extent])
     today = date.today().isoformat()
     made = Made(f"row-{number}", row.title, 'issue "Dream"', text, picture, today, command, seconds)
     write_atomically(out / f"row-{number}.json", json.dumps(asdict(made), indent=1).encode())
@@ -84,7 +85,9 @@ def page(out: Path, target: Path) -> None:
     for each in made:
         if each.figure:
             write_atomically(target.parent / each.figure, (out / each.figure).read_bytes())
-    parts = [_HEAD, *(section(each, ".") for each in made), ""]
+    missing = [f"row {n}, {row.title}" for n, row in ROWS.items() if f"row-{n}" not in {m.name for m in made}]
+    rest = [f"Not made yet: {'; '.join(missing)}."] if missing else []
+    parts = [_HEAD, *rest, *(section(each, ".") for each in made), ""]
     write_atomically(target, "\n\n".join(parts).encode())
 
 

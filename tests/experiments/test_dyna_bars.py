@@ -82,6 +82,8 @@ def test_finished_runs_are_not_run_again_and_make_the_page(
     assert "> 60,000" in capsys.readouterr().out
     text = page.read_text()
     assert "row-1: TruckPush: real steps to success" in text and "(./dream-1.png)" in text
+    assert "1 of the row's 30 runs have been made." in text
+    assert "Not made yet: row 2, TruckPush: trained in the dream alone; row 3" in text
     assert (page.parent / "dream-1.png").stat().st_size > 5_000
 
 

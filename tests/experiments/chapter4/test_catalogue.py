@@ -68,7 +68,10 @@ def test_a_figure_and_a_table_are_written_and_put_on_the_page(tmp_path: Path) ->
     assert "`relgym reproduce figure-4.8 --fast`" in text and "40 configurations" in text
     assert "![Bounces on a level surface](results/figure-4.8.png)" in text
     assert (tmp_path / "docs" / "results" / "figure-4.8.png").is_file()
-    assert "Not made yet: figure-1.3" in text
+    assert "Not made yet: figure-1.3" in text and "dream.md" not in text
+    (tmp_path / "docs" / "results" / "dream.md").write_text("# What dreaming is worth\n")
+    page(tmp_path, tmp_path / "docs" / "results.md")
+    assert "(results/dream.md)" in (tmp_path / "docs" / "results.md").read_text()
 
 
 def test_figures_come_out_the_same_again(tmp_path: Path) -> None:

@@ -11,30 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from relgym.experiments.chapter4.catalogue import chosen
-from relgym.experiments.chapter4.protocol import Protocol
-from relgym.experiments.chapter4.reproduce import compute, make
-from relgym.experiments.jobs.store import ResultStore
+from reproducing import reproduced
 
 FEW = ("table-4.1", "table-4.4", "table-4.7")
 MANY = (*FEW, "figure-4.3", "figure-4.6", "figure-4.22", "figure-4.27", "figure-4.28", "figure-4.29")
-
-SMALL = Protocol(
-    batches=1,
-    test_blocks=3,
-    checkpoints={1: (1,), 2: (1,), 3: (1,)},
-    transfer_batches=2,
-    trials=2,
-)
-
-
-def _reproduce(names: tuple[str, ...], folder: str) -> None:
-    out = Path(folder)
-    jobs, store = chosen(names), ResultStore(out / "cache")
-    list(compute(jobs, SMALL, store, workers=1))
-    for job in jobs:
-        make(job, SMALL, store, out, f"relgym reproduce {job.name}")
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +26,7 @@ def start() -> Callable[..., Any]:
     )
 
     def process(names: tuple[str, ...], folder: Path) -> Any:
-        started = context.Process(target=_reproduce, args=(names, str(folder)))
+        started = context.Process(target=reproduced, args=(names, str(folder)))
         started.start()
         return started
 
@@ -90,7 +70,7 @@ def _killed(start: Callable[..., Any], names: tuple[str, ...], folder: Path, kil
 
 
 def _check(start: Callable[..., Any], names: tuple[str, ...], folder: Path, kills: int) -> None:
-    _reproduce(names, str(folder / "whole"))
+    reproduced(names, str(folder / "whole"))
     _killed(start, names, folder / "killed", kills)
     whole, killed = _numbers(folder / "whole"), _numbers(folder / "killed")
     assert whole.keys() == killed.keys() and {f"{name}.txt" for name in names} <= whole.keys()
