@@ -119,8 +119,8 @@ def _cost(values: Values) -> str:
         title = TITLES[name] if name in TITLES else REGRESSORS[name].title
         learning = mean(run.get("learning", run.get("seconds", 0.0)) for run in runs)
         asking = [f"{mean(run['asking'] for run in runs):.2g}"] if "asking" in runs[0] else ["-"]
-        kept = mean(run.get("bytes", 0) for run in runs) / 1e6
-        lines.append([title, seen or "-", f"{learning:.2g}", *asking, f"{kept:.2g}"])
+        kept = f"{mean(run['bytes'] for run in runs) / 1e6:.2g}" if "bytes" in runs[0] else "-"
+        lines.append([title, seen or "-", f"{learning:.2g}", *asking, kept])
     heading = ["learner", "features", "learning, s", "asking, s", "kept, MB"]
     return f"{table(heading, lines)}\n\nLibraries that fit in one go learn when they are asked first."
 
