@@ -90,7 +90,7 @@ class SlotSignature:
         return tuple(feature.moved(offered) for feature in self.nonlinear.features(names, own))
 
     @property
-    def library_size(self) -> int:
+    def feature_count(self) -> int:
         """Number of non-linear features that there are, or a little more; cheap, however many."""
         return self.nonlinear.size(*self._factors[1:])
 

@@ -158,7 +158,7 @@ def _try(
     slots: SlotSignature = replace(
         known, nonlinear=library_of(kinds, known.types[0].name, known.types[0].angles)
     )
-    if slots.library_size > MOST_FEATURES:
+    if slots.feature_count > MOST_FEATURES:
         return None
     order, stages = slots.preference(model.target)
     order = order[: stages[min(1, len(stages) - 1)]]
