@@ -30,9 +30,9 @@ class ClassificationConfig:
     context
         Which objects clauses of mode classifiers speak of. ``"approached"``: the target and what it approaches
         fastest (a contact fact). ``"touching"``: the target and all that touch it, or else the nearest one.
-        ``"all"``: every object. ``"auto"`` (default): these are tried for every pair, the shortest description
-        wins, and the narrower context on ties: what decides a collision is the likelier cause of two that training
-        can't tell apart.
+        ``"all"``: every object. ``"auto"`` (default): these are tried for every pair, the narrowest first, until a
+        short definition makes no error; else the one with fewest errors is taken, of equals that of fewest bits, then
+        the narrower context: of two causes that training can't tell apart, what decides a collision is the likelier.
     contact_facts
         Whether relations and features that the vocabulary marks as contact facts are offered (approach
         velocity, normal, slip). Default true; the thesis had none, hence its confusion of bouncing and

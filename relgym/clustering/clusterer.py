@@ -218,6 +218,8 @@ class ModeClusterer(Population):
                 search.failures += 1
                 break
             search.failures = 0
+        else:
+            pool = self._pool(table, signature)  # the last search left fewer
         if (wider := extended(self._known(table), signature, pool, fresh=search.waiting)) is not None:
             self._adopt(table, signature, wider)
         search.waiting = 0

@@ -12,7 +12,7 @@ from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus, consensus, refine
 from relgym.numeric.stepwise import PIVOT, LinearFit, least_squares, varying_columns
 
-__all__ = ["Scale", "find_mode", "identified", "least_examples", "plans", "verifying_bits"]
+__all__ = ["EXACT", "SEARCH", "Scale", "find_mode", "identified", "least_examples", "plans", "verifying_bits"]
 
 SEARCH = 400
 """At most this many rows are searched at a time."""
@@ -22,6 +22,9 @@ NEAR, MOST_NEAR = 16.0, 0.5
 
 QUIET, MOST_LIKE = 0.25, 0.5
 """Residuals below so many sigma are rounding; above, those of neighbours may be alike by so much."""
+
+EXACT = 24.0
+"""Where each example verifies a function by so many bits, few of them do."""
 
 WIDE = 40
 """Searches of more columns than this draw fewer and larger samples."""
@@ -53,7 +56,7 @@ def least_examples(y: NDArray[np.float64], scale: Scale, config: ClusteringConfi
     """T: examples that found a mode, from the number of bits by which each verifies the function."""
     if config.min_examples != "auto":
         return int(config.min_examples)
-    share = min(max((24.0 - verifying_bits(y, scale)) / 12.0, 0.0), 1.0)
+    share = min(max((EXACT - verifying_bits(y, scale)) / 12.0, 0.0), 1.0)
     return round(10 + 30 * share)
 
 

@@ -14,16 +14,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import SEARCH, verifying_bits
+from relgym.clustering.discovery import EXACT, SEARCH, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.mode import Mode
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended"]
-
-EXACT: Final = 24.0
-"""Bits by which each example must verify a function, for one to be enough."""
 
 CONSTANT: Final = 1e-9
 """A column that varies by less, relative to what it does in the unexplained examples, is constant."""

@@ -107,12 +107,12 @@ def best_cuts(bins: Bins, score: Score, counts: Counts) -> tuple[Int, Int]:
     -------
     Functions that have a threshold at all, and the bin behind which it lies.
     """
-    gaps = bins.merits
-    if not gaps.size:
+    merits = bins.merits
+    if not merits.size:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    scores = np.where(np.isnan(gaps), -np.inf, score(counts))
+    scores = np.where(np.isnan(merits), -np.inf, score(counts))
     best = scores.max(axis=1, keepdims=True)
-    cut = np.argmax(np.where((scores >= best) & (scores > -np.inf), gaps, -np.inf), axis=1)
+    cut = np.argmax(np.where((scores >= best) & (scores > -np.inf), merits, -np.inf), axis=1)
     rows = np.flatnonzero(best[:, 0] > -np.inf)
     return rows, cut[rows]
 

@@ -19,10 +19,8 @@ __all__ = ["Bins", "bin_values", "merit", "rounding", "signs_differ", "simplest_
 _MAX_BINS: Final = 128
 """Finest histogram; where classes alternate more often, cuts are taken at every m-th boundary."""
 
-
 _ROUNDING: Final = 1e-10
 """Values that differ by less, relative to the greatest of them, are the same number, computed in two ways."""
-
 
 _CLEAR: Final = 0.01
 """Zero counts as inside a gap if it keeps this share of the gap's width from either end."""
@@ -48,13 +46,8 @@ class Bins:
     high: Float
 
     @property
-    def gaps(self) -> Float:
-        """Shape (F, B - 1): distance from one bin to the next, NaN behind a function's last bin."""
-        return self.low[:, 1:] - self.high[:, :-1]
-
-    @property
     def merits(self) -> Float:
-        """Shape (F, B - 1): `merit` of the gaps, NaN behind a function's last bin."""
+        """Shape (F, B - 1): `merit` of the gap from one bin to the next, NaN behind a function's last bin."""
         return merit(self.high[:, :-1], self.low[:, 1:])
 
 

@@ -15,7 +15,7 @@ def test_neighbours_of_one_class_share_a_bin() -> None:
     assert bins.index.tolist() == [[0, 0, 2, 1, 1, 3]]
     assert bins.low.tolist() == [[0.0, 2.0, 4.0, 5.0]]
     assert bins.high.tolist() == [[1.0, 3.0, 4.0, 5.0]]
-    assert bins.gaps.tolist() == [[1.0, 1.0, 1.0]]
+    assert bins.merits.tolist() == [[1.0, 1.0, 1.0]]
 
 
 def test_values_of_both_classes_have_a_bin_of_their_own() -> None:
