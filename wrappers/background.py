@@ -54,6 +54,7 @@ class Background:
         length = checked_count("background", queue, 1, 10**7)
         context = multiprocessing.get_context("spawn")
         self._queue: Any = context.Queue(length)
+        self._queue.cancel_join_thread()  # who exits must not wait for a process that may be dead
         self._answers, remote = context.Pipe(duplex=False)
         self._process = context.Process(
             target=_learn,
@@ -110,7 +111,6 @@ class Background:
         if self._process.is_alive():
             self._process.terminate()
         self._process.join()
-        self._queue.cancel_join_thread()
         self._queue.close()
         self._answers.close()
 

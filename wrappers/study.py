@@ -117,7 +117,10 @@ class Study:
 
     def close(self) -> None:
         """Fetch what was learned and end the background process, if there is one; learning goes on here."""
-        if self._background is not None:
-            self.catch_up()
-            self._background.close()
-            self._background = None
+        background = self._background
+        if background is not None:
+            try:
+                self.catch_up()
+            finally:  # whatever became of the process, it is over
+                background.close()
+                self._background = None

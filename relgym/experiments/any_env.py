@@ -30,6 +30,7 @@ from relgym.experiments.any_env_data import (
     recommended,
     regular,
 )
+from relgym.experiments.any_env_fleet import fleet
 from relgym.experiments.any_env_flight import flight
 from relgym.experiments.any_env_memory import memory
 from relgym.experiments.any_env_stream import prequential
@@ -142,13 +143,17 @@ def weight(model: WorldModel, prop: str, term: str) -> float:
     return terms.get(term, 0.0)
 
 
-ROWS: Final = (*SETTINGS, "lander", "stream", "memory")
+ROWS: Final = (*SETTINGS, "lander", "stream", "fleet", "memory")
 """All rows."""
 
 
 def row(name: str, seeds: Pairs, *, quick: bool, steps: int | None = None) -> str:
     """Measure one row; its table of bars. `steps` is the length of a long life, if not a million."""
-    others: dict[str, Callable[..., list[Measure]]] = {"lander": flight, "stream": prequential}
+    others: dict[str, Callable[..., list[Measure]]] = {
+        "lander": flight,
+        "stream": prequential,
+        "fleet": fleet,
+    }
     if name in others:
         return report(name, others[name](seeds, quick=quick))
     if name == "memory":

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 
 from relgym.config import ModelConfig
 from relgym.experiments.any_env import main, weight
-from relgym.experiments.any_env_data import STUDIES, collect, learned, nrmse_d, recommended, regular
+from relgym.experiments.any_env_data import STUDIES, collect, learned, made, nrmse_d, recommended, regular
+from relgym.experiments.any_env_fleet import Diary, taught
 from relgym.experiments.any_env_flight import flying
 from relgym.experiments.any_env_memory import memory
 from relgym.experiments.any_env_stream import LastChange
@@ -76,3 +80,23 @@ def test_constant_velocity_by_hand() -> None:
     guess.learn_one(np.zeros(3), np.array([1.0, -2.0]))
     assert guess.predict_one(np.zeros(3)).tolist() == [1.0, -2.0]
     assert guess.predict_batch(np.zeros((2, 3))).tolist() == [[1.0, -2.0], [1.0, -2.0]]
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_a_fleet_teaches_what_its_envs_did(mode: AutoresetMode, capsys: pytest.CaptureFixture[str]) -> None:
+    figures = taught("cart", mode, TUNING_SEEDS[0], 30)
+    assert all(value >= bar if least else value <= bar for (_, bar, least), value in figures.items())
+    text = capsys.readouterr().out
+    assert "x' = x + 0.02 xdot" in text
+    assert "fooled by leaps: 0 " not in text  # learned as if they were transitions, resets would be noise
+
+
+def test_a_diary_holds_steps_only() -> None:
+    entries: list[Any] = []
+    env = Diary(made(STUDIES["cart"]), entries)
+    first, _ = env.reset(seed=0)
+    second, *_ = env.step(0)
+    env.reset(seed=1)
+    assert len(entries) == 1
+    np.testing.assert_array_equal(entries[0][0], first)
+    np.testing.assert_array_equal(entries[0][2], second)

@@ -66,3 +66,13 @@ def test_a_process_that_died_is_reported() -> None:
         background.fetch()
     with pytest.raises(ConfigError, match="background=0: expected a whole number"):
         ModelLearner(Slider(), background=0)
+
+
+def test_closing_over_a_dead_process_says_so_and_ends_it() -> None:
+    env = ModelLearner(Slider(), background=10)
+    background: Any = env._observer.study._background
+    background._process.terminate()
+    background._process.join()
+    with pytest.raises(RelgymError, match="the learning process has ended"):
+        env.close()
+    env.close()  # nothing is left to end
