@@ -153,10 +153,12 @@ def likeness(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
     x, left
         Rows ``(n, d)`` and residuals ``(n,)``; at most `SEARCH` of them, evenly spread, are looked at.
     """
-    columns = varying_columns(x)
-    if not len(columns) or len(left) < 2:
+    if len(left) < 2:
         return 0.0
     pick = np.unique(np.linspace(0, len(left) - 1, SEARCH).astype(np.intp))
+    columns = varying_columns(x[pick])
+    if not len(columns):
+        return 0.0
     scaled = x[pick][:, columns]
     scaled = scaled / scaled.std(axis=0)
     distance = np.square(scaled[:, None] - scaled[None]).sum(axis=2)

@@ -36,8 +36,8 @@ FEATURES: Final = {"cart": ("trig", "products"), "mountain": ("trig",)}
 """Envs of the fleets, and what the default's own advice switches on there."""
 
 ROLLOUT, QUEUE, POLICY_STEPS, REPEATS = 2_048, 16_384, 49_152, 3
-"""The watched agent: steps between updates (PPO's default); length of the queue to the learning process, which holds one
-rollout of all envs; steps of each training; trainings of each kind."""
+"""The watched agent: steps between updates (PPO's default); length of the queue to the learning process, which holds
+one rollout of all envs; steps of each training; trainings of each kind."""
 
 Entry = tuple[Any, Any, Any]
 """Observation, action, next observation."""
@@ -69,7 +69,7 @@ class Diary(gym.Wrapper[Any, Any, Any, Any]):
         observation, *rest = self.env.step(action)
         self._entries.append((self._last, action, observation))
         self._last = observation
-        return (observation, *rest)  # type: ignore[return-value]
+        return (observation, *rest)
 
 
 def fleet(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Measure]:
@@ -128,7 +128,7 @@ def _sailed(
         kept.append(transition)
         return learn(transition)
 
-    learner.model.learn_one = learn_one  # type: ignore[method-assign]
+    learner.model.learn_one = learn_one
     act = _policy(study, learner, seed)
     view = learner.view
     assert isinstance(view, NumbersView), "chosen above"

@@ -18,7 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares, varying_columns
+from relgym.numeric.stepwise import (
+    COARSE,
+    MANY,
+    LinearFit,
+    eliminate_backward,
+    least_squares,
+    varying_columns,
+)
 
 __all__ = ["Consensus", "consensus", "draw_samples", "refine"]
 
@@ -139,40 +146,74 @@ def _forward_batch(
     a: NDArray[np.float64], y: NDArray[np.float64], *, terms: int, sigma: float
 ) -> NDArray[np.intp]:
     """Columns chosen for each sample, ``(draws, terms)``: -1 where none, -2 in front if not verified."""
-    draws, size, _ = a.shape
     a = a - a.mean(axis=1, keepdims=True)
-    sizes = np.square(a).sum(axis=1)
     residual = y - y.mean(axis=1, keepdims=True)
-    enough = size * (LOOSE * sigma) ** 2
+    enough = a.shape[1] * (LOOSE * sigma) ** 2
+    choose = _choose_among_many if a.shape[2] > MANY else _choose
+    chosen, left = choose(a, residual, terms, sigma, enough)
+    chosen[left > enough, 0] = -2
+    return chosen
+
+
+def _choose(
+    a: NDArray[np.float64], residual: NDArray[np.float64], terms: int, sigma: float, enough: float
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Columns for each sample, ``(draws, terms)``, and what they leave; what is chosen is swept out of all others."""
+    draws, size, _ = a.shape
+    sizes = np.square(a).sum(axis=1)
     chosen = np.full((draws, max(terms, 1)), -1, dtype=np.intp)
     for t in range(min(terms, a.shape[2])):
         left = np.square(residual).sum(axis=1)
         open_ = left > enough
         if not open_.any():
             break
-        best, usable = _best_columns(a, sizes, residual, left, size * sigma**2)
-        take = open_ & usable
+        pivots = np.square(a).sum(axis=1)
+        usable = (pivots > 1e-16 * sizes) & (sizes > 0.0)
+        gains = np.square((a * residual[:, :, None]).sum(axis=1)) / np.where(usable, pivots, np.inf)
+        best, found = _best_columns(gains, usable, left, size * sigma**2)
+        take = open_ & found
         chosen[take, t] = best[take]
         q = np.where(take[:, None], a[np.arange(draws), :, best], 0.0)
         length = np.sqrt(np.square(q).sum(axis=1))
         q /= np.where(length > 0.0, length, 1.0)[:, None]
         residual = residual - (q * residual).sum(axis=1)[:, None] * q
         a -= q[:, :, None] * (q[:, :, None] * a).sum(axis=1)[:, None, :]
-    chosen[np.square(residual).sum(axis=1) > enough, 0] = -2
-    return chosen
+    return chosen, np.square(residual).sum(axis=1)
+
+
+def _choose_among_many(
+    a: NDArray[np.float64], residual: NDArray[np.float64], terms: int, sigma: float, enough: float
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """The same at a fraction of the cost, a little less exact: see `relgym.numeric.stepwise`."""
+    draws, size, _ = a.shape
+    sizes = np.einsum("dij,dij->dj", a, a)
+    pivots, basis = sizes.copy(), list[NDArray[np.float64]]()
+    chosen = np.full((draws, max(terms, 1)), -1, dtype=np.intp)
+    for t in range(terms):
+        left = np.square(residual).sum(axis=1)
+        open_ = left > enough
+        if not open_.any():
+            break
+        usable = (pivots > COARSE**2 * sizes) & (sizes > 0.0)
+        gains = np.square(np.einsum("di,dij->dj", residual, a)) / np.where(usable, pivots, np.inf)
+        best, found = _best_columns(gains, usable, left, size * sigma**2)
+        take = open_ & found
+        chosen[take, t] = best[take]
+        q = np.where(take[:, None], a[np.arange(draws), :, best], 0.0)
+        for other in (*basis, *basis):
+            q -= (other * q).sum(axis=1)[:, None] * other
+        length = np.sqrt(np.square(q).sum(axis=1))
+        basis.append(q / np.where(length > 0.0, length, 1.0)[:, None])
+        residual = residual - (basis[-1] * residual).sum(axis=1)[:, None] * basis[-1]
+        pivots -= np.square(np.einsum("di,dij->dj", basis[-1], a))
+        pivots[take, best[take]] = 0.0
+    return chosen, np.square(residual).sum(axis=1)
 
 
 def _best_columns(
-    a: NDArray[np.float64],
-    sizes: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    left: NDArray[np.float64],
-    floor: float,
+    gains: NDArray[np.float64], usable: NDArray[np.bool_], left: NDArray[np.float64], floor: float
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    pivots = np.square(a).sum(axis=1)
-    usable = pivots > 1e-16 * sizes
-    usable &= sizes > 0.0
-    gains = np.square((a * residual[:, :, None]).sum(axis=1)) / np.where(usable, pivots, np.inf)
+    """The earliest of each sample's best columns, and whether there is any."""
     best = gains.max(axis=1)
     slack = np.maximum(4.0 * floor, 1e-12 * left)
     return np.argmax(usable & (gains >= (best - slack)[:, None]), axis=1), best > 0.0

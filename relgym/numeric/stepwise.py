@@ -22,6 +22,10 @@ __all__ = ["LinearFit", "eliminate_backward", "forward_stepwise", "least_squares
 PIVOT = 1e-9
 """A column whose part orthogonal to the chosen ones is relatively smaller is collinear with them."""
 
+MANY, COARSE = 64, 1e-6
+"""More candidates than this, non-linear features, are chosen from in a cheaper way that tells collinear columns by so
+much."""
+
 
 @dataclass(frozen=True, slots=True)
 class LinearFit:
@@ -158,36 +162,62 @@ def forward_stepwise(
     limit = max(0, n - 2 if max_terms is None else min(max_terms, n - 2))
     candidates = varying_columns(x) if n else np.empty(0, dtype=np.intp)
     a = x[:, candidates] - x[:, candidates].mean(axis=0) if len(candidates) else np.empty((n, 0))
-    sizes = np.square(a).sum(axis=0)
-    residual = y - y.mean()
-    chosen: list[int] = []
+    choose = _choose_among_many if len(candidates) > MANY else _choose
+    chosen = choose(a, y - y.mean(), sigma, limit) if n else []
+    fit = least_squares(x, y, tuple(int(candidates[c]) for c in chosen))
+    return eliminate_backward(x, y, fit, sigma=sigma) if eliminate else fit
+
+
+def _choose(a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int) -> list[int]:
+    """Centred columns in the order in which they lower Cp most; what is chosen is swept out of all others."""
+    sizes, chosen = np.square(a).sum(axis=0), list[int]()
     while len(chosen) < limit:
-        best = _best_column(a, sizes, residual, sigma)
+        pivots = np.square(a).sum(axis=0)
+        usable = pivots > PIVOT**2 * sizes
+        gains = np.zeros(len(sizes))
+        gains[usable] = np.square((a[:, usable] * residual[:, None]).sum(axis=0)) / pivots[usable]
+        best = _first_of_the_best(gains, len(residual), sigma)
         if best is None:
             break
-        chosen.append(int(candidates[best]))
+        chosen.append(best)
         q = a[:, best] / np.sqrt(np.square(a[:, best]).sum())
         residual = residual - (q * residual).sum() * q
         a -= q[:, None] * (q[:, None] * a).sum(axis=0)
         a[:, best] = 0.0
-    fit = least_squares(x, y, tuple(chosen))
-    return eliminate_backward(x, y, fit, sigma=sigma) if eliminate else fit
+    return chosen
 
 
-def _best_column(
-    a: NDArray[np.float64], sizes: NDArray[np.float64], residual: NDArray[np.float64], sigma: float
-) -> int | None:
+def _choose_among_many(
+    a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int
+) -> list[int]:
+    """The same at a fraction of the cost: the columns stay as they are, and only what is left of their squares is
+    kept up to date. That is less exact for columns that are nearly collinear with the chosen ones, hence `COARSE`."""
+    sizes = np.einsum("ij,ij->j", a, a)
+    pivots, basis, chosen = sizes.copy(), list[NDArray[np.float64]](), list[int]()
+    while len(chosen) < limit:
+        usable = pivots > COARSE**2 * sizes
+        gains = np.zeros(len(sizes))
+        gains[usable] = np.square(np.einsum("i,ij->j", residual, a)[usable]) / pivots[usable]
+        best = _first_of_the_best(gains, len(residual), sigma)
+        if best is None:
+            break
+        chosen.append(best)
+        q = a[:, best].copy()
+        for other in (*basis, *basis):  # twice is enough for orthogonality to rounding
+            q -= (other * q).sum() * other
+        basis.append(q / np.sqrt(np.square(q).sum()))
+        residual = residual - (basis[-1] * residual).sum() * basis[-1]
+        pivots -= np.square(np.einsum("i,ij->j", basis[-1], a))
+        pivots[best] = 0.0
+    return chosen
+
+
+def _first_of_the_best(gains: NDArray[np.float64], rows: int, sigma: float) -> int | None:
     """The candidate that lowers Cp most, the earliest among equals; None if none lowers it."""
-    pivots = np.square(a).sum(axis=0)
-    usable = pivots > PIVOT**2 * sizes
-    if not usable.any():
-        return None
-    gains = np.zeros(len(sizes))
-    gains[usable] = np.square((a[:, usable] * residual[:, None]).sum(axis=0)) / pivots[usable]
-    best = float(gains.max())
+    best = float(gains.max(initial=0.0))
     if best / sigma**2 <= 2.0:  # Cp would not fall
         return None
-    least = best - max(4.0 * len(residual) * sigma**2, 1e-12 * best)
+    least = best - max(4.0 * rows * sigma**2, 1e-12 * best)
     return int(np.argmax(gains >= max(least, 2.0 * sigma**2)))
 
 
