@@ -18,6 +18,7 @@ from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
+from relgym.clustering.turn import Turn
 from relgym.clustering.unification import reordered
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
@@ -64,6 +65,8 @@ class ModeClusterer(Population):
         Whether the noise assumed is what an approximation leaves, for want of an exact law.
     floor
         Rounding noise, the least that is possible, in units of the target.
+    due
+        Whether an approximation is to be sought at the next opportunity.
 
     Notes
     -----
@@ -76,6 +79,7 @@ class ModeClusterer(Population):
         super().__init__(target, config)
         self.floor = 1e-12
         self.approximate = False
+        self.due = False
         self._rng = np.random.default_rng(seed)
         self._searches: dict[int, _Search] = {}
         self._largest = 0.0  # number among the columns and the target's values
@@ -83,18 +87,19 @@ class ModeClusterer(Population):
         self._spread = 0.0  # noise found in the data, rounding apart
 
     # ------------------------------------------------------------------ one example (Figure 3.2)
-    def learn_one(self, table: ExampleTable, row: int, y: float) -> ClusterReport:
+    def learn_one(self, table: ExampleTable, row: int, y: float, turn: Turn | None = None) -> ClusterReport:
         """Take up one example: assign it, and where it is news, look for modes.
 
         Parameters
         ----------
-        table
-            The rows of the target's type.
-        row
-            Number of the example's row in it.
+        table, row
+            The rows of the target's type, and the number of the example's.
         y
             The property's next value.
+        turn
+            Leave for a search among non-linear features, which is dear; default: given.
         """
+        turn = Turn() if turn is None else turn
         before = set(self.clusters)
         example = self._append(table, row, y)
         errors = self._errors_of(table, example)
@@ -104,9 +109,10 @@ class ModeClusterer(Population):
             self.labels[example] = mode
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
-            self._discover(table, example)
-        if self._hopeless():
-            self._approximate(table)
+            self._discover(table, example, turn)
+        self.due |= self._hopeless()
+        if self.due and (not self._dear(table) or turn.take()):
+            self.approximate_now(table)
         after = set(self.clusters)
         if after != set(errors):
             ids, fits = self.fits(table, np.array([example]))
@@ -193,7 +199,7 @@ class ModeClusterer(Population):
     def retarget(self, target: Target) -> None:
         """Be given other next values: the examples stay, modes are searched again."""
         self.target = target
-        self._spread, self.approximate = 0.0, False
+        self._spread, self.approximate, self.due = 0.0, False, False
         self.scale = replace(self.scale, sigma=self.floor)
         self._start_over()
 
@@ -203,14 +209,17 @@ class ModeClusterer(Population):
         """Examples that found a mode: each verifies it by as many bits as tell it from all values seen."""
         return least_examples(self.y, self.scale, self.config)
 
-    def _discover(self, table: ExampleTable, example: int) -> None:
+    def _discover(self, table: ExampleTable, example: int, turn: Turn) -> None:
         signature = int(table.signature_ids[self.rows[example]])
         search = self._searches.setdefault(signature, _Search())
         search.waiting += 1
         slots = table.signatures[signature]
-        if search.waiting <= self._patience(search, bool(slots.features or slots.chained)):
+        dear, more = bool(slots.features), False
+        if search.waiting <= self._patience(search, dear or bool(slots.chained)) or (
+            dear and not turn.take()
+        ):
             return
-        for _ in range(MOST_DISCOVERIES):
+        for _ in range(1 if dear else MOST_DISCOVERIES):
             pool = self._pool(table, signature)
             if len(pool) < self._needed:
                 break  # not a failure: nothing was searched
@@ -220,9 +229,10 @@ class ModeClusterer(Population):
             search.failures = 0
         else:
             pool = self._pool(table, signature)  # the last search left fewer
+            more = dear  # there may be further modes, but one search is enough for one step
         if (wider := extended(self._known(table), signature, pool, fresh=search.waiting)) is not None:
             self._adopt(table, signature, wider)
-        search.waiting = 0
+        search.waiting = search.waiting if more else 0
 
     def _patience(self, search: _Search, doubtful: bool) -> int:
         """News to wait for until the next search: the more, the oftener it was in vain.
@@ -235,16 +245,19 @@ class ModeClusterer(Population):
 
     def _hopeless(self) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""
-        if (
-            not self.config.approximate
-            or self.config.noise_std != "auto"
-            or self._log.seen not in APPROXIMATE_AT
-        ):
+        allowed = self.config.approximate and self.config.noise_std == "auto"
+        if not allowed or self._log.seen not in APPROXIMATE_AT:
             return False
         # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
         return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
 
-    def _approximate(self, table: ExampleTable) -> None:
+    def _dear(self, table: ExampleTable) -> bool:
+        """Whether searches of the newest example's columns are dear."""
+        return bool(table.signatures[int(table.signature_ids[self.rows[-1]])].features)
+
+    def approximate_now(self, table: ExampleTable) -> None:
+        """Look for an approximation, the law of last resort."""
+        self.due = False
         found = last_resort(self, table, floor=self.floor, again=self.approximate)
         if found is None:
             return
@@ -359,6 +372,7 @@ class ModeClusterer(Population):
             "spread": self._spread,
             "rounding": self.floor,
             "approximate": self.approximate,
+            **({"due": True} if self.due else {}),
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
@@ -375,7 +389,7 @@ class ModeClusterer(Population):
         self.scale = replace(self.scale, sigma=float(data["sigma"]))
         self._next_id = int(data["next_id"])
         self._largest, self._reach = float(data["largest"]), float(data["reach"])
-        self.approximate = bool(data["approximate"])
+        self.approximate, self.due = bool(data["approximate"]), bool(data.get("due", False))
         self._spread, self.floor = float(data["spread"]), float(data["rounding"])
         self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}

@@ -28,6 +28,7 @@ def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
             {"target": target_to_json(t), "model": parts.models[t].to_json(history=history)}
             for t in parts.targets
         ],
+        **({"looks": [list(look) for look in parts.looks]} if history and parts.looks else {}),
         "tables": [parts.tables[name].to_json() for name in sorted(parts.tables)] if history else [],
         "laws": None if parts.laws is None else parts.laws.to_json(history=history),
     }
@@ -56,6 +57,7 @@ def parts_from_json(body: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
         parts.tables[type_name].restore(body["tables"][k], _of(arrays, f"table{k}."), parts.signature_of)
     for k, target in enumerate(targets):
         parts.models[target].restore(body["targets"][k]["model"], _of(arrays, f"target{k}."))
+    parts.looks = [(str(name), str(prop), bool(inert)) for name, prop, inert in body.get("looks", [])]
     if parts.laws is not None and body["laws"] is not None:
         parts.laws.restore(body["laws"], _of(arrays, "laws."))
     return parts

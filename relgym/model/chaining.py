@@ -25,7 +25,7 @@ from relgym.scene.objects import TASK, Target
 if TYPE_CHECKING:
     from relgym.model.parts import Parts
 
-__all__ = ["CHECK_AT", "in_order", "revise"]
+__all__ = ["CHECK_AT", "Look", "due", "in_order", "revise"]
 
 CHECK_AT = (48, 192, 768, 3072)
 """Numbers of examples of a type after which the order of its targets is looked at again."""
@@ -44,6 +44,9 @@ PLANS = ((2, 5, 256), (4, 10, 128))
 
 _Pair = tuple[str, str]
 
+Look = tuple[str, str, bool]
+"""Type and property to look at, and whether only laws count that build on the property's own present value."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Found:
@@ -54,19 +57,25 @@ class _Found:
     lead: tuple[str, float] | None
 
 
-def revise(parts: Parts, type_name: str) -> None:
-    """Look for laws with next values among a type's targets; give those that need them what they need.
+def due(parts: Parts, type_name: str) -> list[Look]:
+    """Looks to take at a type's targets, in this order: at all for laws of change before any other ones."""
+    targets = [t for t in parts.targets if t.type == type_name and t.type != TASK]
+    return [(type_name, target.property, inert) for inert in (True, False) for target in targets]
 
-    Cost: a search of at most `ROWS` rows per target that isn't explained by a law of two terms already.
+
+def revise(parts: Parts, look: Look) -> None:
+    """Look for a law with next values of one target; give it what it needs.
+
+    Cost: a search of at most `ROWS` rows, unless the target is explained by a law of two terms already.
     """
-    for inert in (True, False):
-        for target in [t for t in parts.targets if t.type == type_name and t.type != TASK]:
-            found = _search(parts, target)
-            if found is not None and found.inert >= inert:
-                parts.retarget(target, replace(target, given=found.given))
-                if found.lead is not None:
-                    rate, step = found.lead
-                    parts.lead((type_name, rate), target.property, step)
+    type_name, prop, inert = look
+    target = parts.property_model(type_name, prop).target
+    found = _search(parts, target)
+    if found is not None and found.inert >= inert:
+        parts.retarget(target, replace(target, given=found.given))
+        if found.lead is not None:
+            rate, step = found.lead
+            parts.lead((type_name, rate), prop, step)
 
 
 def in_order(targets: Iterable[Target]) -> tuple[Target, ...]:

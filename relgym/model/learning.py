@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
-from relgym.model.chaining import CHECK_AT, revise
+from relgym.clustering.turn import Turn
+from relgym.model.chaining import CHECK_AT, due, revise
 from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
@@ -47,16 +48,19 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
         parts.discover_targets(before, after)
     following = unwrapped(before.layout, before.vector, next_values(before, after))
     reports: dict[tuple[str, str], ClusterReport] = {}
+    turn = Turn()
     for type_name in dict.fromkeys(t.type for t in parts.targets):
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
             if before.layout.names[index] in after:
-                _learn_object(parts, percept, index, following, reports)
+                _learn_object(parts, percept, index, following, reports, turn)
     for type_name, table in parts.tables.items():
         if parts.open and table.seen in CHECK_AT:
-            revise(parts, type_name)
+            parts.looks += due(parts, type_name)
         forget(table, [m for t, m in parts.models.items() if t.type == type_name], parts.config.history)
+    if parts.looks and turn.take():
+        revise(parts, parts.looks.pop(0))
     if parts.laws is not None:
         stays = {i: name in after for i, name in enumerate(before.layout.names)}
         parts.laws.learn_one(percept, following, stays, parts.models)
@@ -64,7 +68,11 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
 
 
 def finish(parts: Parts) -> int:
-    """Re-learn every stale classifier now, without a budget; returns the work spent."""
+    """Make all searches that still wait, and re-learn every stale classifier, without a budget; the work spent."""
+    while parts.looks:
+        revise(parts, parts.looks.pop(0))
+    for target in parts.targets:
+        parts.models[target].search(parts.tables[target.type])
     return sum(parts.models[t].refresh(None) for t in parts.targets if not parts.governs(t))
 
 
@@ -74,6 +82,7 @@ def _learn_object(
     index: int,
     following: NDArray[np.float64],
     reports: dict[tuple[str, str], ClusterReport],
+    turn: Turn,
 ) -> None:
     layout = percept.layout
     type_name = layout.types[index].name
@@ -86,7 +95,7 @@ def _learn_object(
     for target in parts.targets:
         if target.type == type_name:
             y = float(following[layout.column(index, target.property)])
-            report = parts.models[target].learn_one(table, row, y, situation, example)
+            report = parts.models[target].learn_one(table, row, y, situation, example, turn)
             reports[layout.names[index], target.property] = report
 
 

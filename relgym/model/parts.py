@@ -13,7 +13,7 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
-from relgym.model.chaining import in_order
+from relgym.model.chaining import Look, in_order
 from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
@@ -49,6 +49,8 @@ class Parts:
         Turns scenes into relations and rows.
     laws
         Laws of motion; None with ``frames="world"``.
+    looks
+        Targets to be looked at for laws with next values, one in a step.
     """
 
     def __init__(self, schema: SceneSchema, config: ModelConfig, targets: Sequence[Target] | None) -> None:
@@ -68,6 +70,7 @@ class Parts:
         )
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}
+        self.looks: list[Look] = []
         self.laws: Laws | None = None
         if config.frames == "auto":
             self.laws = Laws(schema, None if targets is None else tuple(targets), config)

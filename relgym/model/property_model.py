@@ -14,6 +14,7 @@ from relgym.classification.mode_classifier import ModeClassifier
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
+from relgym.clustering.turn import Turn
 from relgym.config import ModelConfig
 from relgym.model.answers import Answers
 from relgym.model.casting import Casting
@@ -95,6 +96,7 @@ class PropertyModel(Answers):
         y: float,
         situation: Situation,
         example: Example,
+        turn: Turn | None = None,
     ) -> ClusterReport:
         """Take up one example: cluster it, then let the classifiers see where it belongs.
 
@@ -106,8 +108,10 @@ class PropertyModel(Answers):
             The property's next value.
         situation, example
             How the target object is situated, in a single scene.
+        turn
+            Leave for a dear search; default: given.
         """
-        report = self.clusterer.learn_one(table, row, y)
+        report = self.clusterer.learn_one(table, row, y, turn)
         self._unexplained = self._judge()
         if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
             self.spreads = measure(self.clusterer, table)
@@ -160,6 +164,12 @@ class PropertyModel(Answers):
         numbers = self.clusterer.keep(rows)
         exemplars = self.classifier.exemplars.columns["row"]
         exemplars[:] = numbers[exemplars]
+
+    def search(self, table: ExampleTable) -> None:
+        """Make up for a dear search that still waits for its turn, if there is one."""
+        if self.clusterer.due:
+            self.clusterer.approximate_now(table)
+            self.follow(table)
 
     def refresh(self, budget: int | None) -> int:
         """Re-learn stale classifiers within a budget of work (None: all); returns the work spent."""

@@ -89,8 +89,9 @@ def least_squares(
     centre = x[:, list(columns)].mean(axis=0) if intercept else np.zeros(len(columns))
     a = x[:, list(columns)] - centre
     shift = float(y.mean()) if intercept else 0.0
-    weights = _solve(a, y - shift)
-    weights += _solve(a, (y - shift) - _combine(a, weights))
+    factors = _factors(a)
+    weights = factors.solve(y - shift)
+    weights += factors.solve((y - shift) - _combine(a, weights))
     constant = shift - float((centre * weights).sum()) if intercept else 0.0
     kept = [k for k in np.argsort(columns, kind="stable") if weights[k] != 0.0]
     fit = LinearFit(tuple(columns[k] for k in kept), tuple(float(weights[k]) for k in kept), constant, 0.0)
@@ -102,31 +103,53 @@ def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np
     return total
 
 
-def _solve(a: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights of the least-squares solution; exactly zero for columns collinear with earlier ones."""
+@dataclass(frozen=True, slots=True)
+class _Factors:
+    """Orthonormal directions (None for columns collinear with earlier ones), and the triangle that leads back."""
+
+    q: list[NDArray[np.float64] | None]
+    r: NDArray[np.float64]
+
+    def solve(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weights of the least-squares solution; exactly zero for columns collinear with earlier ones."""
+        p = len(self.q)
+        weights = np.zeros(p)
+        for k, own in reversed(list(enumerate(self.q))):
+            if own is not None:
+                rest = sum(self.r[k, j] * weights[j] for j in range(k + 1, p) if self.q[j] is not None)
+                weights[k] = (float((own * y).sum()) - rest) / self.r[k, k]
+        return weights
+
+    def shares(self) -> NDArray[np.float64]:
+        """Square of what of each column all others don't reproduce, shape ``(p,)``; no column may be collinear."""
+        inverse = np.zeros_like(self.r)
+        for k in reversed(range(len(self.q))):
+            inverse[k] = -(self.r[k, k + 1 :, None] * inverse[k + 1 :]).sum(axis=0)
+            inverse[k, k] += 1.0
+            inverse[k] /= self.r[k, k]
+        found: NDArray[np.float64] = 1.0 / np.square(inverse).sum(axis=1)
+        return found
+
+
+def _factors(a: NDArray[np.float64]) -> _Factors:
+    """Gram-Schmidt, column by column, twice."""
     p = a.shape[1]
-    q = np.zeros_like(a)
+    q: list[NDArray[np.float64] | None] = []
     r = np.zeros((p, p))
-    used = np.zeros(p, dtype=bool)
     for k in range(p):
         column = a[:, k].copy()
         size = float(np.sqrt(np.square(column).sum()))
         for _ in range(2):  # twice is enough for orthogonality to rounding
-            for j in range(k):
-                if used[j]:
-                    part = float((q[:, j] * column).sum())
+            for j, other in enumerate(q):
+                if other is not None:
+                    part = float((other * column).sum())
                     r[j, k] += part
-                    column -= part * q[:, j]
+                    column -= part * other
         norm = float(np.sqrt(np.square(column).sum()))
-        if norm > PIVOT * size:
-            used[k] = True
-            r[k, k] = norm
-            q[:, k] = column / norm
-    weights = np.zeros(p)
-    for k in np.flatnonzero(used)[::-1]:
-        rest = sum(r[k, j] * weights[j] for j in range(k + 1, p) if used[j])
-        weights[k] = (float((q[:, k] * y).sum()) - rest) / r[k, k]
-    return weights
+        independent = norm > PIVOT * size
+        q.append(column / norm if independent else None)
+        r[k, k] = norm if independent else 0.0
+    return _Factors(q, r)
 
 
 def forward_stepwise(
@@ -190,8 +213,10 @@ def _choose(a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float,
 def _choose_among_many(
     a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int
 ) -> list[int]:
-    """The same at a fraction of the cost: the columns stay as they are, and only what is left of their squares is
-    kept up to date. That is less exact for columns that are nearly collinear with the chosen ones, hence `COARSE`."""
+    """The same at a fraction of the cost: only what is left of the columns' squares is kept up to date.
+
+    That is less exact for columns that are nearly collinear with the chosen ones, hence `COARSE`.
+    """
     sizes = np.einsum("ij,ij->j", a, a)
     pivots, basis, chosen = sizes.copy(), list[NDArray[np.float64]](), list[int]()
     while len(chosen) < limit:
@@ -229,15 +254,25 @@ def eliminate_backward(
     Later columns are tried first, so that of two interchangeable ones the earlier stays.
     """
     while fit.terms:
-        budget = fit.rss + 2.0 * sigma**2 * (1.0 + len(y) * 0.02)
-        smaller = [_without(x, y, fit, k) for k in range(len(fit.columns))]
+        allowed = 2.0 * sigma**2 * (1.0 + len(y) * 0.02)
+        smaller = [_without(x, y, fit, k) for k in _needless(x, fit, 4.0 * allowed + fit.rss)]
         if fit.intercept != 0.0:
             smaller.append(least_squares(x, y, fit.columns, intercept=False))
-        smaller = [s for s in smaller if s.rss <= budget and s.terms < fit.terms]
+        smaller = [s for s in smaller if s.rss <= fit.rss + allowed and s.terms < fit.terms]
         if not smaller:
             return fit
         fit = min(smaller, key=lambda s: (s.terms, s.columns, s.rss))
     return fit
+
+
+def _needless(x: NDArray[np.float64], fit: LinearFit, allowed: float) -> list[int]:
+    """Terms without which the residuals' squares may grow by no more than so much; the others needn't be tried."""
+    a = x[:, list(fit.columns)]
+    factors = _factors(a - a.mean(axis=0) if fit.intercept != 0.0 else a)
+    if any(own is None for own in factors.q):
+        return list(range(len(fit.columns)))
+    growth = np.square(np.array(fit.weights)) * factors.shares()
+    return [int(k) for k in np.flatnonzero(growth <= allowed)]
 
 
 def _without(x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, k: int) -> LinearFit:
