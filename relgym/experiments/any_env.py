@@ -32,7 +32,7 @@ from relgym.experiments.any_env_data import (
 )
 from relgym.experiments.any_env_fleet import fleet
 from relgym.experiments.any_env_flight import flight
-from relgym.experiments.any_env_memory import memory
+from relgym.experiments.any_env_memory import LIVES, memory
 from relgym.experiments.any_env_stream import prequential
 from relgym.experiments.bar import Measure, measured, report
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
@@ -143,7 +143,7 @@ def weight(model: WorldModel, prop: str, term: str) -> float:
     return terms.get(term, 0.0)
 
 
-ROWS: Final = (*SETTINGS, "lander", "stream", "fleet", "memory")
+ROWS: Final = (*SETTINGS, "lander", "stream", "fleet", *LIVES)
 """All rows."""
 
 
@@ -156,8 +156,8 @@ def row(name: str, seeds: Pairs, *, quick: bool, steps: int | None = None) -> st
     }
     if name in others:
         return report(name, others[name](seeds, quick=quick))
-    if name == "memory":
-        return report(name, memory(seeds, quick=quick, steps=steps, bound=steps and steps // 5))
+    if name in LIVES:
+        return report(name, memory(name, seeds, quick=quick, steps=steps, bound=steps and steps // 5))
     return report(name, _one_step(SETTINGS[name], seeds, quick=quick))
 
 
@@ -166,7 +166,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("rows", nargs="*", default=list(ROWS), choices=[*ROWS, []])
     parser.add_argument("--seeds", type=int, default=1, help="how many training seeds, each with a test seed")
-    parser.add_argument("--steps", type=int, help="length of the row 'memory', of which a fifth is kept")
+    parser.add_argument(
+        "--steps", type=int, help="length of a long life (rows 'memory'), of which a fifth is kept"
+    )
     parser.add_argument("--tuning", action="store_true")
     parser.add_argument("--quick", action="store_true")
     given = parser.parse_args(arguments)

@@ -1,20 +1,30 @@
-"""A long life: memory and cost of a step after many transitions, against those early on."""
+"""A long life: memory and cost of a step after many transitions, against those early on.
+
+Measure one life per process: the peak of memory is the whole process'.
+"""
 
 from __future__ import annotations
 
 import resource
 import time
-from collections.abc import Sequence
-from itertools import islice
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count, islice
+from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
+from relgym.experiments.accuracy import AXES
 from relgym.experiments.any_env_data import STUDIES, collect, nrmse_d, stream, view_of
 from relgym.experiments.bar import Measure, measured
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.evaluate import evaluate
 from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Transition
 
-__all__ = ["memory"]
+__all__ = ["LIVES", "Life", "memory"]
 
 STEPS, BOUND = 1_000_000, 200_000
 """Transitions, and examples kept: the default bound."""
@@ -22,45 +32,105 @@ STEPS, BOUND = 1_000_000, 200_000
 EARLY, WINDOW = 10_000, 2_000
 """Costs at the end are compared with those of as many steps before this one."""
 
+EXPERIMENT, BLOCKS, TEST_BLOCKS = 1, 400, 40
+"""The ball's world; blocks of it that are drawn at a time, each time from another seed; and blocks judged on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """A world to live in.
+
+    Attributes
+    ----------
+    transitions
+        Fresh ones without end, of a seed.
+    judged
+        Whether a model is still right: bars and figures, on fresh transitions of a test seed.
+    frames
+        As in `ModelConfig`: while laws of motion do, modes rest, and a life costs little.
+    """
+
+    transitions: Callable[[int], Iterator[Transition]]
+    judged: Callable[[WorldModel, int], list[Measure]]
+    frames: Literal["auto", "world"] = "auto"
+
+
+def _carts(seed: int) -> Iterator[Transition]:
+    study = STUDIES["cart"]
+    return (step.transition for step in stream(study, view_of(study), seed))
+
+
+def _cart_judged(model: WorldModel, test: int) -> list[Measure]:
+    error = nrmse_d(model, collect(STUDIES["cart"], 1_000, 2_000 + test))
+    return [measured(f"{prop}, still right", 1e-3, [error[prop]]) for prop in ("x", "th")]
+
+
+def _balls(seed: int) -> Iterator[Transition]:
+    for batch in count():
+        for block in ball_blocks(EXPERIMENT, seed=1_000 * seed + batch, blocks=BLOCKS):
+            yield from block.transitions()
+
+
+def _ball_judged(model: WorldModel, test: int) -> list[Measure]:
+    fresh = list(ball_blocks(EXPERIMENT, seed=test, blocks=TEST_BLOCKS, test=True))
+    found = evaluate(model, fresh, BALL_EXPERIMENTS[EXPERIMENT].modes())
+    return [measured(f"{axis}, wrong predictions", 0.001, [found[t].total.rate]) for axis, t in AXES.items()]
+
+
+LIVES: Final = {
+    "memory": Life(_carts, _cart_judged),
+    "memory-ball": Life(_balls, _ball_judged),
+    "memory-ball-modes": Life(_balls, _ball_judged, frames="world"),
+}
+"""Row 10, by the name of its row."""
+
 
 def memory(
+    name: str,
     seeds: Sequence[tuple[int, int]],
     *,
     quick: bool = False,
     steps: int | None = None,
     bound: int | None = None,
 ) -> list[Measure]:
-    """Row 10 on CartPole: a stream of fresh transitions, of the first seed."""
+    """Row 10: a stream of fresh transitions, of the first seed; `steps` of which `bound` are kept."""
     steps = steps or (12_000 if quick else STEPS)
     bound = bound or (2_000 if quick else BOUND)
-    study, (training, test) = STUDIES["cart"], seeds[0]
-    view = view_of(study)
-    model = WorldModel(view.schema, ModelConfig(history=bound))
-    costs, rows, peaks = np.empty(steps), [], []
-    for k, step in enumerate(islice(stream(study, view, training), steps)):
+    life, (training, test) = LIVES[name], seeds[0]
+    costs, rows, peaks = np.empty(steps), list[int](), list[float]()
+    model: WorldModel | None = None
+    for k, transition in enumerate(islice(life.transitions(training), steps)):
+        model = model or WorldModel(transition.before.schema, ModelConfig(history=bound, frames=life.frames))
         start = time.process_time()
-        model.learn_one(step.transition)
+        model.learn_one(transition)
         costs[k] = time.process_time() - start
         if k >= 1.5 * bound and k % 100 == 0:  # the first cut is at 1.25 times the bound
             rows.append(model.history)
             peaks.append(_peak())
+    assert model is not None, "there is at least one step"
     model.finish()
-    at, window = min(EARLY, steps // 2), min(WINDOW, steps // 4)
-    early, late = (float(np.median(part)) for part in (costs[at - window : at], costs[-window:]))
+    early, late = _medians(costs)
     print(
-        f"{steps:,} transitions, {bound:,} kept: {1e3 * early:.3g} ms a step at {at:,}, {1e3 * late:.3g} at the end"
+        f"{steps:,} transitions, {bound:,} kept: {1e3 * early:.3g} ms a step early, {1e3 * late:.3g} at the end"
+    )
+    print(
+        f"median by tenths: {', '.join(f'{1e3 * np.median(part):.3g}' for part in np.array_split(costs, 10))} ms"
     )
     print(
         f"worst step {1e3 * costs.max():.3g} ms; peak memory {peaks[-1] / 1024:.0f} MiB\n{model.describe(digits=5)}"
     )
-    error = nrmse_d(model, collect(study, 1_000, 2_000 + test))
     return [
         measured("median cost of a step at the end, over that at 10,000", 1.2, [late / early]),
         measured("most rows kept, over the bound", 1.3, [max(rows) / bound]),
         measured("peak memory at the end, over that at 1.5 bounds", 1.05, [peaks[-1] / peaks[0]]),
-        measured("x, still right", 1e-3, [error["x"]]),
-        measured("th, still right", 1e-3, [error["th"]]),
+        *life.judged(model, test),
     ]
+
+
+def _medians(costs: NDArray[np.float64]) -> tuple[float, float]:
+    """Median cost of a step early on and at the end, in seconds."""
+    at, window = min(EARLY, len(costs) // 2), min(WINDOW, len(costs) // 4)
+    return float(np.median(costs[at - window : at])), float(np.median(costs[-window:]))
 
 
 def _peak() -> float:
