@@ -20,6 +20,7 @@ from relgym.config import ModelConfig
 from relgym.experiments.any_env_data import (
     STUDIES,
     Lesson,
+    Policy,
     Study,
     at_random,
     collect,
@@ -27,6 +28,7 @@ from relgym.experiments.any_env_data import (
     learned,
     nrmse_d,
     pumping,
+    racing,
     recommended,
     regular,
 )
@@ -56,24 +58,32 @@ class Setting:
         Transitions learned from.
     bar
         Largest nRMSE-d.
-    pumped
-        Whether a car is driven by pumping; else actions are random.
+    policy
+        Who acts; default: anything.
     features
         What is switched on; default: what the default configuration recommends.
+    constants
+        Values at which a property is held, each of which a mode must state: property, value.
     """
 
     study: str
     train: int
     bar: float
-    pumped: bool = False
+    policy: Policy = at_random
     features: tuple[str, ...] = ()
+    constants: tuple[tuple[str, float], ...] = ()
 
+
+HELD: Final = (("x", -1.2), ("v", 0.0), ("v", -0.07))
+"""Where a car is held: at the left wall, and at its highest speed (to the left: to the right the goal comes first)."""
 
 SETTINGS: Final = {
     "mountain": Setting("mountain", 2_000, 1e-4),
     "mountain-continuous": Setting("mountain-continuous", 2_000, 1e-4),
-    "mountain-pumped": Setting("mountain", 20_000, 1e-3, pumped=True),
-    "mountain-continuous-pumped": Setting("mountain-continuous", 20_000, 1e-3, pumped=True),
+    "mountain-pumped": Setting("mountain", 20_000, 1e-3, pumping),
+    "mountain-continuous-pumped": Setting("mountain-continuous", 20_000, 1e-3, pumping),
+    "mountain-raced": Setting("mountain", 8_000, 1e-3, racing, constants=HELD),
+    "mountain-continuous-raced": Setting("mountain-continuous", 8_000, 1e-3, racing, constants=HELD),
     "cart": Setting("cart", 2_000, 1e-3),
     "pendulum": Setting("pendulum", 10_000, 1e-4),
     "acrobot": Setting("acrobot", 2_000, 0.1, features=("trig", "degree4")),
@@ -88,13 +98,17 @@ def _one_step(setting: Setting, seeds: Pairs, *, quick: bool) -> list[Measure]:
     study = STUDIES[setting.study]
     found: dict[tuple[str, float], list[float]] = {}
     for number, (training, test) in enumerate(seeds):
-        policy = pumping if setting.pumped else at_random
-        lesson = collect(study, min(setting.train, 1_000) if quick else setting.train, training, policy)
-        fresh = collect(study, 1_000 if quick else TEST, 2_000 + test, policy)
+        lesson = collect(
+            study, min(setting.train, 1_000) if quick else setting.train, training, setting.policy
+        )
+        fresh = collect(study, 1_000 if quick else TEST, 2_000 + test, setting.policy)
         model = _model(study, setting, lesson, verbose=not number)
         for what, value in _judged(study, model, fresh).items():
             found.setdefault((what, setting.bar), []).append(value)
-        for prop, term, value in () if setting.pumped else study.weights:
+        for prop, value in setting.constants:
+            held = min((abs(c - value) for c in _constants(model, prop)), default=np.inf)
+            found.setdefault((f"{prop}: a mode for being held at {value:g}, off by", 1e-7), []).append(held)
+        for prop, term, value in study.weights if setting.policy is at_random else ():
             off = abs(weight(model, prop, term) / value - 1.0)
             found.setdefault((f"{prop}: {value:g} {term}, off by", 0.01), []).append(off)
     return [measured(what, bar, values) for (what, bar), values in found.items()]
@@ -141,6 +155,11 @@ def weight(model: WorldModel, prop: str, term: str) -> float:
     own, *others = largest.roles
     terms: dict[str, float] = dict(own.terms) | {f"{r.type}.{name}": w for r in others for name, w in r.terms}
     return terms.get(term, 0.0)
+
+
+def _constants(model: WorldModel, prop: str) -> list[float]:
+    """Constants that modes of a property of `self` state."""
+    return [m.intercept for m in model.modes("self", prop) if not any(role.terms for role in m.roles)]
 
 
 ROWS: Final = (*SETTINGS, "lander", "stream", "fleet", *LIVES)

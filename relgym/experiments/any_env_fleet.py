@@ -29,13 +29,13 @@ from relgym.wrappers import VectorModelLearner
 
 __all__ = ["Diary", "fleet", "policy_speed", "taught"]
 
-ENVS, STEPS = 8, 1_000
+ENVS, STEPS = 8, 250
 """Envs of a fleet, and how often all of them step."""
 
 FEATURES: Final = {"cart": ("trig", "products"), "mountain": ("trig",)}
 """Envs of the fleets, and what the default's own advice switches on there."""
 
-ROLLOUT, QUEUE, POLICY_STEPS, REPEATS = 2_048, 16_384, 49_152, 3
+ROLLOUT, QUEUE, POLICY_STEPS, REPEATS = 2_048, 16_384, 32_768, 3
 """The watched agent: steps between updates (PPO's default); length of the queue to the learning process, which holds
 one rollout of all envs; steps of each training; trainings of each kind."""
 
