@@ -12,12 +12,14 @@ from relgym.classification.mode_classifier import ModeClassifier
 from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
-from relgym.clustering.roles import Binding
+from relgym.clustering.mode import NOISE
+from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions
 from relgym.model.functions import ModeFunctions, Verdict
 from relgym.model.grouping import distinct, members
+from relgym.model.guess import Guess, Guesses
 from relgym.model.limits import Limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
@@ -52,6 +54,8 @@ class Answers(ModeFunctions):
         Which modes are limits: they take no part in the vote but cut off what its winner predicts.
     stops
         Which modes are walls at work: they take no part in the vote either.
+    guesses
+        The best guess, where nothing is explained.
     """
 
     def __init__(
@@ -68,6 +72,7 @@ class Answers(ModeFunctions):
         self.spreads = Spreads()
         self.limits = Limits()
         self.stops = Stops()
+        self.guesses = Guesses()
         self._unexplained = False
 
     def bounds(self, mode: int) -> bool:
@@ -78,6 +83,32 @@ class Answers(ModeFunctions):
     def unexplained(self) -> bool:
         """Whether it is known by now that modes don't describe the target, or just some of its examples."""
         return self._unexplained
+
+    @property
+    def guess(self) -> Guess | None:
+        """The best guess, where it is what is answered: nothing is explained, or an approximation is worse."""
+        asked = self._unexplained or (self.clusterer.approximate and self.guesses.superior)
+        return self.guesses.best if asked else None
+
+    def guessed(
+        self, percept: Percept, index: int, following: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """What the best guess says of one object of n scenes, shape ``(n,)``; None if there is none.
+
+        Arguments as of `predict_batch`.
+        """
+        best, signature = self.guess, percept.situation(index).signature
+        if best is None:
+            return None
+        key = (id(signature), NOISE)
+        known = self._bindings.get(key)
+        if known is None or known[0] is not best.mode:
+            known = self._bindings[key] = (best.mode, bind(best.mode, signature))
+        binding = known[1]
+        if binding is None or binding.open:
+            return None
+        found: NDArray[np.float64] = binding.values(percept.rows(index, following, ordered=False))[:, 0]
+        return found
 
     def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
         """What every mode would predict, in the order of ``classifier.modes``; NaN where its roles are open.
@@ -115,9 +146,14 @@ class Answers(ModeFunctions):
             Next values predicted so far, shape ``(width,)``.
         """
         situation = percept.situation(index)
-        outcome = Outcome.UNEXPLAINED if self._unexplained else Outcome.NO_MODE
-        nothing = Prediction("", "", float("nan"), outcome)
-        if self._unexplained or not self.classifier.modes:
+        lost = self._unexplained or self.guess is not None
+        nothing = Prediction("", "", float("nan"), Outcome.UNEXPLAINED if lost else Outcome.NO_MODE)
+        if lost:
+            guessed, best = self.guessed(percept, index, following[None]), self.guesses.best
+            if guessed is None or best is None:
+                return nothing
+            return replace(nothing, value=float(guessed[0]), spread=best.mode.sigma)
+        if not self.classifier.modes:
             return nothing
         casts = self._casts(situation.signature)
         row = percept.rows(index, following[None], ordered=casts)
@@ -167,9 +203,11 @@ class Answers(ModeFunctions):
             np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.full(n, _NO_MODE, dtype=np.int8), np.zeros(n)
         )
         modes = self.classifier.modes
-        if self._unexplained:
+        if self._unexplained or self.guess is not None:
             verdict.outcomes[:] = _UNEXPLAINED
-        if self._unexplained or not modes:
+            guessed = self.guessed(percept, index, following)
+            return verdict if guessed is None else replace(verdict, values=guessed)
+        if not modes:
             return verdict
         situation = percept.situation(index)
         x = percept.rows(index, following, ordered=self._casts(situation.signature))

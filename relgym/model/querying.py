@@ -74,7 +74,7 @@ def predict_many(
             verdict.outcomes[~known & (verdict.outcomes == _PREDICTED)] = _OUTSIDE
             verdict.modes[~known] = 0
             key = (target.type, target.property)
-            lost[key] = lost.get(key, nowhere) | ~known
+            lost[key] = lost.get(key, nowhere) | (verdict.outcomes != _PREDICTED)
             keys.append((layout.names[index], target.property))
             verdicts.append(verdict)
     _derive(parts.schema, layout, vectors, following)
