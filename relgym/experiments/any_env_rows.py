@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -45,7 +46,8 @@ class Rows:
         What other learners are shown: the object's numbers, those of every object that is alone of its kind (with
         whether it is there), and the action's; shape ``(n, d)``.
     last
-        The last step's change of the same object, 0 where it has just come, shape ``(n, m)``.
+        The last step's change of the same object, or where it has just come of the last one of its type that has not,
+        shape ``(n, m)``.
     change, said
         What changed, and what the model said would, shape ``(n, m)``.
     sure
@@ -138,15 +140,22 @@ def _note(
         if found is None or name not in after:
             continue
         now = np.array([before[name][p] for p in found.properties])
-        was = now if earlier is None or name not in earlier else [earlier[name][p] for p in found.properties]
         parts = [prediction[name, p] for p in found.properties]
         found.step.append(number)
         found.seen.append(np.concatenate([before[name].values, others]))
-        found.last.append(now - np.array(was))
+        found.last.append(_last_change(found, earlier, name, now))
         found.change.append(np.array([after[name][p] for p in found.properties]) - now)
         found.said.append(np.array([p.value for p in parts]) - now)
         found.sure.append([p.ok for p in parts])
         found.ended.append(ended)
+
+
+def _last_change(
+    found: Rows, earlier: Scene | None, name: str, now: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    if earlier is not None and name in earlier:
+        return now - np.array([earlier[name][p] for p in found.properties])
+    return found.last[-1] if found.last else np.zeros(len(now))
 
 
 def _alone(view: object, scene: Scene) -> NDArray[np.float64]:
@@ -171,7 +180,10 @@ def rivals(columns: dict[str, NDArray[np.float64]], *, batch: bool) -> dict[str,
     for name, learner in _batch(half, rng).items() if batch else ():
         for row, y in zip(seen[:half], change[:half], strict=True):
             learner.learn_one(row, y)
-        found[name] = np.concatenate([np.full((half, change.shape[1]), np.nan), learner.predict_batch(seen[half:])])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a single target is a column here, which scikit-learn warns of
+            told = learner.predict_batch(seen[half:])
+        found[name] = np.concatenate([np.full((half, change.shape[1]), np.nan), told])
     return found
 
 

@@ -86,9 +86,13 @@ class Answers(ModeFunctions):
 
     @property
     def guess(self) -> Guess | None:
-        """The best guess, where it is what is answered: nothing is explained, or an approximation is worse."""
-        asked = self._unexplained or (self.clusterer.approximate and self.guesses.superior)
-        return self.guesses.best if asked else None
+        """The best guess, where it stands in for what isn't explained: nothing is, or hardly more than nearly."""
+        return self.guesses.best if self._unexplained or self.clusterer.approximate else None
+
+    @property
+    def _lost(self) -> bool:
+        """Whether modes aren't asked: nothing is explained, or an approximation errs more than the guess."""
+        return self._unexplained or (self.guess is not None and self.guesses.superior)
 
     def guessed(
         self, percept: Percept, index: int, following: NDArray[np.float64]
@@ -146,14 +150,9 @@ class Answers(ModeFunctions):
             Next values predicted so far, shape ``(width,)``.
         """
         situation = percept.situation(index)
-        lost = self._unexplained or self.guess is not None
-        nothing = Prediction("", "", float("nan"), Outcome.UNEXPLAINED if lost else Outcome.NO_MODE)
-        if lost:
-            guessed, best = self.guessed(percept, index, following[None]), self.guesses.best
-            if guessed is None or best is None:
-                return nothing
-            return replace(nothing, value=float(guessed[0]), spread=best.mode.sigma)
-        if not self.classifier.modes:
+        outcome = Outcome.UNEXPLAINED if self._lost else Outcome.NO_MODE
+        nothing = Prediction("", "", float("nan"), outcome)
+        if self._lost or not self.classifier.modes:
             return nothing
         casts = self._casts(situation.signature)
         row = percept.rows(index, following[None], ordered=casts)
@@ -203,11 +202,9 @@ class Answers(ModeFunctions):
             np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.full(n, _NO_MODE, dtype=np.int8), np.zeros(n)
         )
         modes = self.classifier.modes
-        if self._unexplained or self.guess is not None:
+        if self._lost:
             verdict.outcomes[:] = _UNEXPLAINED
-            guessed = self.guessed(percept, index, following)
-            return verdict if guessed is None else replace(verdict, values=guessed)
-        if not modes:
+        if self._lost or not modes:
             return verdict
         situation = percept.situation(index)
         x = percept.rows(index, following, ordered=self._casts(situation.signature))

@@ -45,7 +45,7 @@ WORSE = 1.01
 """A smaller function may be worse by this factor than the best."""
 
 TYPICAL = 2.0
-"""A guess that errs by more than this factor more in the median doesn't replace an approximation: rare large errors must
+"""A guess whose median error is larger by more than this factor doesn't replace an approximation: rare large errors must
 not decide over what is mostly right."""
 
 
