@@ -125,13 +125,13 @@ class Follower:
             return None
 
     def _expected(self, prediction: ScenePrediction | None) -> Scene | None:
-        """Where things should be now: as far on as in the last step, or where modes predict them."""
+        """Where things should be now: as far on as in the last step, or where modes predict or guess them."""
         if self._scene is None:
             return None
         scene = self._scene if self._earlier is None else extrapolated(self._earlier, self._scene)
         if prediction is None:
             return scene
-        said = {(p.object, p.property): p.value for p in prediction.parts if p.ok and p.object in scene}
+        said = {(p.object, p.property): p.value for p in prediction.parts if p.informed and p.object in scene}
         return scene.replace(said) if said else scene
 
     def _seen(

@@ -42,6 +42,12 @@ class TableView:
         name -> a distance that is far, in the column's units. Rows and *expected* objects of a kind are paired
         so that the sum of squared distances is smallest; a row farther than 1 from all is a new object. Default:
         the k-th row is always the same object.
+    changes
+        Columns whose last step's change is a property too, called ``vx_change`` after the column ``vx``; 0 for an
+        object that has just come. For envs whose next step depends on more than the table shows: what a driver is about
+        to do shows in what he has just done.
+    offsets
+        Whether clauses may test where other bodies' centres lie (`SceneSchema.offsets`). Default false.
     actions, static, up, planar
         As of `NumbersView`.
 
@@ -74,6 +80,8 @@ class TableView:
         rows: Sequence[Rows] | None = None,
         presence: str | None = None,
         match: Mapping[str, float] | None = None,
+        changes: Sequence[str] = (),
+        offsets: bool = False,
         actions: Sequence[str] | None = None,
         static: Sequence[Static] = (),
         up: str = "y",
@@ -84,7 +92,8 @@ class TableView:
         identifiers("columns", columns, width)
         self.columns, self._presence = tuple(columns), presence
         self._match = None if match is None else dict(match)
-        _check_columns(self.columns, [*([presence] if presence else ()), *(match or ())])
+        _check_columns(self.columns, [*([presence] if presence else ()), *(match or ()), *changes])
+        self.changes, self._offsets = tuple(changes), offsets
         self.rows = (Rows("row", count),) if rows is None else tuple(rows)
         if sum(part.count for part in self.rows) != count:
             raise ConfigError(
@@ -94,6 +103,7 @@ class TableView:
         self._acts, self._static, self._axes = Acts(action_space, actions), tuple(static), (up, planar)
         self._properties = tuple(name for name in self.columns if name != presence)
         self._shown = np.array([self.columns.index(name) for name in self._properties], np.intp)
+        self._changing = [self._properties.index(name) for name in self.changes]
         self._here = None if presence is None else self.columns.index(presence)
         self._scales = np.array(list((match or {}).values()), dtype=np.float64)
         if (self._scales <= 0.0).any():
@@ -111,12 +121,15 @@ class TableView:
         ]
         identifiers("names of the objects", [name for name, _ in objects], len(objects))
         types = (*merged([*kinds, *fixed]), self._acts.type)
-        return SceneSchema(types, (*objects, (ACTION, ACTION)), up=self._axes[0], planar=self._axes[1])
+        everything = (*objects, (ACTION, ACTION))
+        return SceneSchema(
+            types, everything, up=self._axes[0], planar=self._axes[1], offsets=self._offsets
+        )
 
     def _kind(self, part: Rows) -> ObjectType:
         return ObjectType(
             part.type or part.name,
-            (*self._properties, *part.constants),
+            (*self._properties, *(f"{name}_change" for name in self.changes), *part.constants),
             part.shape,
             pose=dict(part.pose),
             velocity=tuple(part.velocity),
@@ -149,8 +162,16 @@ class TableView:
             constants = np.array(list(part.constants.values()), dtype=np.float64)
             chosen = self._chosen(own[here], names, here, last, last if expected is None else expected)
             for name, row in zip(chosen, own[here], strict=True):
-                values[name] = np.concatenate([row[self._shown], constants])
+                shown = row[self._shown]
+                values[name] = np.concatenate([shown, self._changed(shown, name, last), constants])
         return self.schema.scene(values | self._fixed)
+
+    def _changed(self, shown: NDArray[np.float64], name: str, last: Scene | None) -> NDArray[np.float64]:
+        """By how much some of an object's numbers differ from those of the last scene."""
+        if last is None or name not in last:
+            return np.zeros(len(self._changing))
+        found: NDArray[np.float64] = (shown - last[name].values[: len(shown)])[self._changing]
+        return found
 
     def _chosen(
         self,
@@ -232,6 +253,8 @@ class TableView:
             "rows": [part.to_json() for part in self.rows],
             "presence": self._presence,
             "match": None if self._match is None else [[k, v] for k, v in self._match.items()],
+            "changes": list(self.changes),
+            "offsets": self._offsets,
             "actions": None if self._acts.names is None else list(self._acts.names),
             "static": [s.to_json() for s in self._static],
             "axes": list(self._axes),
@@ -247,6 +270,8 @@ class TableView:
             rows=[Rows.from_json(part) for part in data["rows"]],
             presence=data["presence"],
             match=None if data["match"] is None else {str(k): float(v) for k, v in data["match"]},
+            changes=data.get("changes", ()),
+            offsets=bool(data.get("offsets", False)),
             actions=data["actions"],
             static=[Static.from_json(s) for s in data["static"]],
             up=data["axes"][0],

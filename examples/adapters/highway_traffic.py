@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import highway_env  # noqa: F401 - registers the envs
 import numpy as np
 
+from relgym.experiments.recording import record
 from relgym.wrappers import ModelLearner, Rows, TableView
 
 COLUMNS = ("presence", "x", "y", "vx", "vy", "heading")
+ACTIONS = ("lane_left", "idle", "lane_right", "faster", "slower")
 CARS = 6
 """Rows of the table: the agent's own car, and the five nearest."""
 
@@ -30,8 +33,10 @@ class Args:
     """transitions of fresh episodes to test on"""
     seed: int = 0
     """seed of episodes and actions; tests begin 10,000 later"""
-    features: str = "trig"
+    features: str = "products"
     """what to switch on beside properties, as the default configuration advises; nothing: the default"""
+    record: str = ""
+    """a folder: only write what happens to files there, for `python -m relgym.experiments.any_env_tables`"""
 
 
 def highway() -> gym.Env[Any, Any]:
@@ -50,19 +55,27 @@ def highway() -> gym.Env[Any, Any]:
     )
 
 
-def learner_of(env: gym.Env[Any, Any], features: str) -> ModelLearner:
-    """The first row is the agent's own car, the others are whoever is near: matched by where they should be."""
-    view = TableView(
+def view_of(env: gym.Env[Any, Any]) -> TableView:
+    """The first row is the agent's own car, the others are whoever is near: matched by where they should be.
+
+    What a driver is about to do shows in how speeds and heading have just changed.
+    """
+    return TableView(
         env.observation_space,
         env.action_space,
         columns=COLUMNS,
         rows=[Rows("ego"), Rows("car", CARS - 1)],
         presence="presence",
         match={"x": 4.0, "y": 2.0, "vx": 5.0},
-        actions=("lane_left", "idle", "lane_right", "faster", "slower"),
+        changes=("vx", "vy", "heading"),
+        actions=ACTIONS,
     )
+
+
+def learner_of(env: gym.Env[Any, Any], features: str) -> ModelLearner:
+    """Two targets: where the agent's own car and the others will be."""
     config = {"features": tuple(features.split(",")) if features else ()}
-    return ModelLearner(env, view=view, targets=["ego.x", "car.x"], config=config)
+    return ModelLearner(env, view=view_of(env), targets=["ego.x", "car.x"], config=config)
 
 
 def live(env: ModelLearner, steps: int, seed: int) -> dict[str, tuple[list[float], list[float]]]:
@@ -84,13 +97,26 @@ def live(env: ModelLearner, steps: int, seed: int) -> dict[str, tuple[list[float
     return said
 
 
+def write(folder: Path, args: Args) -> None:
+    """Record as many steps under random actions as are learned from and tested on."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, steps, seed in (("", args.steps, args.seed), ("-test", args.test, args.seed + 10_000)):
+        env = highway()
+        found = record(env, view_of(env), lambda _, rng: int(rng.integers(len(ACTIONS))), steps, seed)
+        found.save(folder / f"highway{name}-{args.seed}.npz")
+
+
 def main(args: Args) -> None:
     """Learn, print the laws, then test on fresh episodes without learning."""
+    if args.record:
+        return write(Path(args.record), args)
     env = learner_of(highway(), args.features)
     live(env, args.steps, args.seed)
     for target in env.model.targets:
         for mode in env.model.modes(target.type, target.property):
             print(f"{target}: {mode.formula(4)}   ({mode.examples} transitions)")
+        if guess := env.model.property_model(target.type, target.property).guess:
+            print(f"{target}: {guess.text(4)}")
     for advice in env.model.advice():
         print(f"{advice.target}: {advice}")
     env.pause()

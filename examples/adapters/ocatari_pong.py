@@ -103,6 +103,7 @@ def learner_of(env: PongTable) -> ModelLearner:
         rows=[Rows(kind.lower(), type="ball" if kind == "Ball" else "paddle", **body) for kind in KINDS],
         presence="here",
         static=walls,
+        offsets=True,  # a paddle turns the ball by where it is hit
     )
     return ModelLearner(env, view=view, targets=["ball.dx", "ball.dy"])
 

@@ -32,6 +32,9 @@ ESTIMATE_AT = (64, 512, 4096)
 APPROXIMATE_AT = (256, 1024, 4096, 16384)
 """Numbers of examples after which an approximation is sought, if most of them are unexplained."""
 
+HOPELESS = 200
+"""Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
+
 LEAST_MEMBERS = 4
 """Examples that a mode of another model must explain here to be taken over."""
 
@@ -239,7 +242,8 @@ class ModeClusterer(Population):
 
         It is longer where searches are dear, for features, or may be in vain, since nobody said that there are laws.
         """
-        if self.approximate:  # what an approximation leaves is mostly its own tail
+        lost = self._log.seen >= HOPELESS and 2 * self.noise_examples > self._log.seen
+        if self.approximate or lost:  # what an approximation leaves is mostly its own tail
             return search.failures * search.failures
         return search.failures if doubtful else search.failures // 6
 

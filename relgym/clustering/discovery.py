@@ -29,6 +29,13 @@ EXACT = 24.0
 WIDE = 40
 """Searches of more columns than this draw fewer and larger samples."""
 
+COUNTED = 64
+"""A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels."""
+
+SIMPLE, WORDY = (1, 1, 4), 40
+"""Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so many
+examples: that a few small numbers add up to another one says little."""
+
 CHANGES = 0.2
 """A column that changes between so large a share of successive rows is no constant of a scene."""
 
@@ -66,6 +73,16 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
     return math.log2(max(spread / scale.tolerance, 2.0))
 
 
+def counts(y: NDArray[np.float64], scale: Scale) -> bool:
+    """Whether values are few whole multiples of one step, so that another one that fits says little."""
+    values = np.unique(y)
+    if not 3 <= len(values) <= COUNTED:
+        return False
+    steps = np.diff(values)
+    ratio = steps / steps.min()
+    return bool(steps.min() > 100.0 * scale.tolerance and np.abs(ratio - np.round(ratio)).max() < 1e-6)
+
+
 def find_mode(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -94,7 +111,10 @@ def find_mode(
     """
     needed = least_examples(y, scale, config) if needed is None else needed
     rows = _recent(len(y), fresh, rng)
-    for columns, terms, size in plans(stages, config):
+    simple = [SIMPLE] if counts(y, scale) else []
+    for number, (columns, terms, size) in enumerate([*simple, *plans(stages, config)]):
+        if simple and number:
+            needed = max(needed, WORDY)
         if len(rows) < max(needed, size):
             continue
         found = consensus(

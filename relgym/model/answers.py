@@ -12,12 +12,14 @@ from relgym.classification.mode_classifier import ModeClassifier
 from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
-from relgym.clustering.roles import Binding
+from relgym.clustering.mode import NOISE
+from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions
 from relgym.model.functions import ModeFunctions, Verdict
 from relgym.model.grouping import distinct, members
+from relgym.model.guess import Guess, Guesses
 from relgym.model.limits import Limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
@@ -52,6 +54,8 @@ class Answers(ModeFunctions):
         Which modes are limits: they take no part in the vote but cut off what its winner predicts.
     stops
         Which modes are walls at work: they take no part in the vote either.
+    guesses
+        The best guess, where nothing is explained.
     """
 
     def __init__(
@@ -68,6 +72,7 @@ class Answers(ModeFunctions):
         self.spreads = Spreads()
         self.limits = Limits()
         self.stops = Stops()
+        self.guesses = Guesses()
         self._unexplained = False
 
     def bounds(self, mode: int) -> bool:
@@ -78,6 +83,36 @@ class Answers(ModeFunctions):
     def unexplained(self) -> bool:
         """Whether it is known by now that modes don't describe the target, or just some of its examples."""
         return self._unexplained
+
+    @property
+    def guess(self) -> Guess | None:
+        """The best guess, where it stands in for what isn't explained: nothing is, or hardly more than nearly."""
+        return self.guesses.best if self._unexplained or self.clusterer.approximate else None
+
+    @property
+    def _lost(self) -> bool:
+        """Whether modes aren't asked: nothing is explained, or an approximation errs more than the guess."""
+        return self._unexplained or (self.guess is not None and self.guesses.superior)
+
+    def guessed(
+        self, percept: Percept, index: int, following: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """What the best guess says of one object of n scenes, shape ``(n,)``; None if there is none.
+
+        Arguments as of `predict_batch`.
+        """
+        best, signature = self.guess, percept.situation(index).signature
+        if best is None:
+            return None
+        key = (id(signature), NOISE)
+        known = self._bindings.get(key)
+        if known is None or known[0] is not best.mode:
+            known = self._bindings[key] = (best.mode, bind(best.mode, signature))
+        binding = known[1]
+        if binding is None or binding.open:
+            return None
+        found: NDArray[np.float64] = binding.values(percept.rows(index, following, ordered=False))[:, 0]
+        return found
 
     def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
         """What every mode would predict, in the order of ``classifier.modes``; NaN where its roles are open.
@@ -115,9 +150,9 @@ class Answers(ModeFunctions):
             Next values predicted so far, shape ``(width,)``.
         """
         situation = percept.situation(index)
-        outcome = Outcome.UNEXPLAINED if self._unexplained else Outcome.NO_MODE
+        outcome = Outcome.UNEXPLAINED if self._lost else Outcome.NO_MODE
         nothing = Prediction("", "", float("nan"), outcome)
-        if self._unexplained or not self.classifier.modes:
+        if self._lost or not self.classifier.modes:
             return nothing
         casts = self._casts(situation.signature)
         row = percept.rows(index, following[None], ordered=casts)
@@ -167,9 +202,9 @@ class Answers(ModeFunctions):
             np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.full(n, _NO_MODE, dtype=np.int8), np.zeros(n)
         )
         modes = self.classifier.modes
-        if self._unexplained:
+        if self._lost:
             verdict.outcomes[:] = _UNEXPLAINED
-        if self._unexplained or not modes:
+        if self._lost or not modes:
             return verdict
         situation = percept.situation(index)
         x = percept.rows(index, following, ordered=self._casts(situation.signature))

@@ -73,7 +73,8 @@ def finish(parts: Parts) -> int:
         revise(parts, parts.looks.pop(0))
     for target in parts.targets:
         parts.models[target].search(parts.tables[target.type])
-    return sum(parts.models[t].refresh(None) for t in parts.targets if not parts.governs(t))
+    spoken = [t for t in parts.targets if not parts.governs(t)]
+    return sum(parts.models[t].refresh(None) + parts.models[t].reconsider(parts.tables[t.type]) for t in spoken)
 
 
 def _learn_object(
@@ -104,6 +105,7 @@ def _refresh(parts: Parts) -> int:
     for target in parts.targets:
         if not parts.governs(target):  # no clause is asked where laws predict
             spent += parts.models[target].refresh(budget - spent)
+            spent += parts.models[target].reconsider(parts.tables[target.type]) if spent < budget else 0
         if spent >= budget:
             break
     return spent

@@ -18,8 +18,9 @@ __all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
 class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
-    Only `PREDICTED` is a mode's word. With every other outcome the value is *persistence*: the property keeps
-    its value, and that is a stopgap, not a claim.
+    Only `PREDICTED` is a mode's word. With every other outcome the value is a stopgap, not a claim: what is unexplained
+    is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes; else the property keeps
+    its value.
     """
 
     PREDICTED = "predicted by a mode"
@@ -59,7 +60,7 @@ class Prediction:
         (`relgym.laws.frames`), and then the roles are the target and all that it touches.
     spread
         Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
-        among a few) left, in units of the property; NaN where no mode predicts.
+        among a few) left, in units of the property; of a guess what it left; NaN where the property keeps its value.
     """
 
     object: str
@@ -76,6 +77,11 @@ class Prediction:
     def ok(self) -> bool:
         """Whether a mode predicted it."""
         return self.outcome is Outcome.PREDICTED
+
+    @builtins.property
+    def informed(self) -> bool:
+        """Whether a mode predicted it, or a guess was made."""
+        return self.ok or not math.isnan(self.spread)
 
 
 @dataclass(frozen=True, slots=True)

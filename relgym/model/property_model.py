@@ -20,6 +20,7 @@ from relgym.model.answers import Answers
 from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions, needed
 from relgym.model.functions import Verdict, bodies_of
+from relgym.model.guess import Guesses
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Situation
 from relgym.model.spread import Spreads, measure
@@ -177,6 +178,13 @@ class PropertyModel(Answers):
         spent = self.classifier.refresh(left)
         return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
 
+    def reconsider(self, table: ExampleTable) -> int:
+        """Guess anew where nothing is explained and it is time; returns the work spent."""
+        wanted = self._unexplained or self.clusterer.approximate
+        if not wanted or not self.guesses.stale(self.clusterer.seen):
+            return 0
+        return self.guesses.renew(self.clusterer, table)
+
     def retarget(self, target: Target, table: ExampleTable) -> None:
         """Be given other next values: modes and classifiers are learned again, from what is remembered."""
         self.target = target
@@ -229,6 +237,7 @@ class PropertyModel(Answers):
         return {
             "clusterer": self.clusterer.to_json(),
             "unexplained": self._unexplained,
+            "guess": self.guesses.to_json(),
             "spreads": self.spreads.to_json(),
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
@@ -244,6 +253,7 @@ class PropertyModel(Answers):
         """Take over what `to_json` and `to_arrays` wrote."""
         self.clusterer.restore(data["clusterer"], arrays)
         self._unexplained = bool(data["unexplained"])
+        self.guesses = Guesses.from_json(self.target, data.get("guess", {}))
         self.spreads = Spreads.from_json(data["spreads"])
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
         self.casting.restore(data["casting"])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.property_model import Verdict
+from relgym.model.property_model import PropertyModel, Verdict
 from relgym.model.scenes import wrap
 from relgym.scene.objects import Scene, SceneLayout, SceneSchema, Target
 
@@ -40,7 +40,8 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
             if not np.isfinite(one.value):
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
-                one = replace(one, value=float(scene.vector[column]), outcome=outcome, mode=0)
+                one = replace(one, outcome=outcome, mode=0, spread=np.nan)
+                one = _stopgap(parts.models[target], percept, index, following, one)
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
@@ -48,6 +49,21 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
     _derive(parts.schema, layout, scene.vector[None], following[None])
     wrap(layout, following)
     return ScenePrediction(Scene(scene.schema, layout, following), tuple(found))
+
+
+def _stopgap(
+    model: PropertyModel,
+    percept: Percept,
+    index: int,
+    following: NDArray[np.float64],
+    one: Prediction,
+) -> Prediction:
+    """A prediction that no mode makes, with the best guess as its value, or else the present one."""
+    guessed, best = model.guessed(percept, index, following[None]), model.guess
+    if guessed is None or best is None or not np.isfinite(guessed[0]):
+        column = percept.layout.column(index, model.target.property)
+        return replace(one, value=float(following[column]))
+    return replace(one, value=float(guessed[0]), spread=best.mode.sigma)
 
 
 def predict_many(
@@ -70,6 +86,10 @@ def predict_many(
                 verdict.values[lost.get(pair, nowhere)] = np.nan
                 verdict.outcomes[lost.get(pair, nowhere)] = _DEPENDS
             known = np.isfinite(verdict.values)
+            guessed = None if known.all() else parts.models[target].guessed(percept, index, following)
+            if guessed is not None:
+                told = ~known & np.isfinite(guessed)
+                following[told, layout.column(index, target.property)] = guessed[told]
             following[known, layout.column(index, target.property)] = verdict.values[known]
             verdict.outcomes[~known & (verdict.outcomes == _PREDICTED)] = _OUTSIDE
             verdict.modes[~known] = 0

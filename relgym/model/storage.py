@@ -156,6 +156,7 @@ def schema_to_json(schema: SceneSchema) -> dict[str, Any]:
         "kinematics": [[k.type, k.property, k.rate, k.step, k.uses_next] for k in schema.kinematics],
         "targets": None if schema.targets is None else [target_to_json(t) for t in schema.targets],
         "action_scale": [list(a) for a in schema.action_scale],
+        **({"offsets": True} if schema.offsets else {}),
     }
 
 
@@ -170,6 +171,7 @@ def schema_from_json(data: dict[str, Any]) -> SceneSchema:
         kinematics=tuple(Kinematics(*k) for k in data["kinematics"]),
         targets=None if targets is None else tuple(target_from_json(t) for t in targets),
         action_scale=tuple((str(p), float(low), float(high)) for p, low, high in data["action_scale"]),
+        offsets=bool(data.get("offsets", False)),
     )
 
 

@@ -50,7 +50,7 @@ class BoxRelations:
 
     def __init__(self, axes: Axes, position: FloatArray, low: FloatArray, high: FloatArray) -> None:
         self._axes = axes
-        self._position, self._low, self._high = position, low, high
+        self.position, self._low, self._high = position, low, high
         self._less: dict[int, _Pairs] = {}
 
     def along(self, kind: str, axis: int) -> _Pairs:
@@ -72,7 +72,7 @@ class BoxRelations:
 
     def prepare(self) -> None:
         """Work out all axes at once: cheaper where all of them will be asked for."""
-        low, high, position = self._low, self._high, self._position
+        low, high, position = self._low, self._high, self.position
         extent = high - low
         margin = ALIGN_MARGIN * np.minimum(extent[:, :, None], extent[:, None])
         less = (low[:, None] - high[:, :, None]) - (position[:, :, None] - position[:, None]) >= -margin
@@ -96,5 +96,5 @@ class BoxRelations:
 
     def _offset(self, axis: int) -> FloatArray:
         # Differences of positions first: far from the origin no precision is lost.
-        offset: FloatArray = self._position[axis][:, None] - self._position[axis][None]
+        offset: FloatArray = self.position[axis][:, None] - self.position[axis][None]
         return offset

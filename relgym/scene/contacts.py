@@ -24,6 +24,7 @@ distance   signed distance; negative by the penetration depth
 normal-*   components of the unit normal from B to A
 approach   (v_A - v_B) . n, in length per step: negative while A and B approach
 slip       tangential relative velocity: along t = (-n_y, n_x) in the plane, its magnitude in space
+offset-*   components of A's position minus B's, if the schema asks for them (`SceneSchema.offsets`)
 ========== ==================================================================================================
 """
 
@@ -38,7 +39,9 @@ next velocity.
 
 def contact_features(schema: SceneSchema) -> tuple[str, ...]:
     """Names of a schema's contact features, in the order of `Relations.contacts`."""
-    return ("distance", *(f"normal-{axis}" for axis in Axes.of(schema).names), "approach", "slip")
+    axes = Axes.of(schema).names
+    offsets = [f"offset-{axis}" for axis in axes] if schema.offsets else []
+    return ("distance", *(f"normal-{axis}" for axis in axes), "approach", "slip", *offsets)
 
 
 def velocity_columns(layout: SceneLayout, axes: Axes) -> NDArray[np.intp]:

@@ -61,6 +61,9 @@ class SceneSchema:
     action_scale
         ``(property, low, high)``: the physical range that [-1, 1] of each component of the env's action
         stands for.
+    offsets
+        Whether clauses may test where another body's centre lies, along the world's axes, beside distance and normal: a
+        paddle turns a ball by where it is hit.
     """
 
     types: tuple[ObjectType, ...]
@@ -70,6 +73,7 @@ class SceneSchema:
     kinematics: tuple[Kinematics, ...] = ()
     targets: tuple[Target, ...] | None = None
     action_scale: tuple[tuple[str, float, float], ...] = ()
+    offsets: bool = False
 
     def __post_init__(self) -> None:
         if self.up not in ("x", "y", "z"):

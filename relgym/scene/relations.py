@@ -165,10 +165,14 @@ class Relations:
         normal = self._normals(body)
         velocity = _joined([sight.velocity for sight in self._sights])
         approach, slip = contacts.motion(velocity[:, body, None] - velocity, normal)
-        out = np.empty((len(self), len(self._plan.pairs.number), len(normal) + 3))
+        last = len(normal) + 3
+        out = np.empty((len(self), len(self._plan.pairs.number), last + len(normal) * self._plan.offsets))
         out[..., 0] = self.distances(body)
-        out[..., 1:-2] = normal.transpose(2, 1, 0)
-        out[..., -2], out[..., -1] = approach.T, slip.T
+        out[..., 1 : last - 2] = normal.transpose(2, 1, 0)
+        out[..., last - 2], out[..., last - 1] = approach.T, slip.T
+        if self._plan.offsets:
+            position = _joined([sight.boxes.position for sight in self._sights])
+            out[..., last:] = (position[:, body, None] - position).transpose(2, 1, 0)
         out[:, body] = np.nan
         return out
 
@@ -304,6 +308,7 @@ class Extractor:
             pairs,
             np.flatnonzero(moves[pairs.first] | moves[pairs.second]),
             self._make_geometry(Bodies(names, shapes)),
+            self.schema.offsets,
         )
 
     def _make_geometry(self, bodies: Bodies) -> Geometry:

@@ -56,6 +56,7 @@ class Plan:
     pairs: Pairs
     moving: NDArray[np.intp]  # pairs in which at least one type has a velocity
     geometry: Geometry
+    offsets: bool = False  # whether contact features hold them
 
 
 class Sight:

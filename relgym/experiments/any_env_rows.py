@@ -1,0 +1,225 @@
+"""A recording learned from as it comes: what was said of every object, what came, and what other learners say of it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.baselines.base import Regressor
+from relgym.baselines.catalogue import make_regressor
+from relgym.baselines.fitted import FittedRegressor
+from relgym.baselines.kinds import Columns
+from relgym.config import ModelConfig
+from relgym.envs.views import TableView
+from relgym.experiments.recording import Recording
+from relgym.model.prediction import ScenePrediction
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Scene, Target, Transition
+from relgym.wrappers.follower import Follower
+from relgym.wrappers.study import Study
+
+__all__ = ["BATCH", "ONLINE", "Rows", "live", "rivals", "size"]
+
+ONLINE = ("constant velocity", "rls", "hoeffding", "amrules")
+"""Online baselines by name."""
+
+BATCH = ("tree", "forest", "MLP ensemble")
+"""Baselines that are fitted once, to the first half."""
+
+
+@dataclass
+class Rows:
+    """What happened to the objects of one type, one row per object and step.
+
+    Attributes
+    ----------
+    properties
+        Names of what is predicted.
+    step
+        Number of the step, shape ``(n,)``.
+    seen
+        What other learners are shown: the object's numbers, those of every object that is alone of its kind (with
+        whether it is there), and the action's; shape ``(n, d)``.
+    last
+        The last step's change of the same object, or where it has just come of the last one of its type that has not,
+        shape ``(n, m)``.
+    change, said
+        What changed, and what the model said would, shape ``(n, m)``.
+    sure
+        Whether a mode said it, shape ``(n, m)``.
+    ended
+        Whether the step ended the episode, shape ``(n,)``.
+    """
+
+    properties: tuple[str, ...]
+    step: list[int] = field(default_factory=list)
+    seen: list[NDArray[np.float64]] = field(default_factory=list)
+    last: list[NDArray[np.float64]] = field(default_factory=list)
+    change: list[NDArray[np.float64]] = field(default_factory=list)
+    said: list[NDArray[np.float64]] = field(default_factory=list)
+    sure: list[list[bool]] = field(default_factory=list)
+    ended: list[bool] = field(default_factory=list)
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """All of it as arrays."""
+        names = ("step", "seen", "last", "change", "said", "sure", "ended")
+        return {name: np.array(getattr(self, name)) for name in names}
+
+
+def live(
+    recording: Recording,
+    targets: Sequence[Target],
+    config: ModelConfig | None = None,
+    model: WorldModel | None = None,
+    *,
+    learn: bool = True,
+) -> tuple[WorldModel, dict[str, Rows]]:
+    """Predict, compare and learn, step by step, as a `ModelLearner` would.
+
+    Parameters
+    ----------
+    recording
+        What happened.
+    targets
+        What is predicted, in causal order.
+    config
+        Of a new model.
+    model
+        A model to go on from, instead of a new one.
+    learn
+        Whether to learn.
+
+    Returns
+    -------
+    The model, its classifiers up to date, and the rows of every type.
+    """
+    view = recording.view
+    model = WorldModel(view.schema, config, targets=targets) if model is None else model
+    study, follower = Study(model, learn=learn), Follower(view)
+    rows: dict[str, Rows] = {}
+    for target in model.targets:
+        own = tuple(t.property for t in model.targets if t.type == target.type)
+        rows.setdefault(target.type, Rows(own))
+    earlier: Scene | None = None
+    for number, step in enumerate(recording):
+        if step.first:
+            follower.begin(step.before, {})
+            earlier = None
+        now, before = follower.scene, follower.act(step.action)
+        prediction = study.expect(before)
+        transition = follower.follow(
+            before, prediction, step.after, {}, reward=0.0, terminated=step.terminated
+        )
+        study.take_up(transition, prediction)
+        if transition is not None and prediction is not None:
+            _note(rows, view, number, earlier, transition, prediction, ended=step.terminated)
+        earlier = now
+    model.finish()
+    return model, rows
+
+
+def _note(
+    rows: dict[str, Rows],
+    view: object,
+    number: int,
+    earlier: Scene | None,
+    transition: Transition,
+    prediction: ScenePrediction,
+    *,
+    ended: bool,
+) -> None:
+    before, after = transition.before, transition.after
+    others = _alone(view, before)
+    for name in before.layout.names:
+        found = rows.get(before[name].type.name)
+        if found is None or name not in after:
+            continue
+        now = np.array([before[name][p] for p in found.properties])
+        parts = [prediction[name, p] for p in found.properties]
+        found.step.append(number)
+        found.seen.append(np.concatenate([before[name].values, others]))
+        found.last.append(_last_change(found, earlier, name, now))
+        found.change.append(np.array([after[name][p] for p in found.properties]) - now)
+        found.said.append(np.array([p.value for p in parts]) - now)
+        found.sure.append([p.ok for p in parts])
+        found.ended.append(ended)
+
+
+def _last_change(
+    found: Rows, earlier: Scene | None, name: str, now: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    if earlier is not None and name in earlier:
+        return now - np.array([earlier[name][p] for p in found.properties])
+    return found.last[-1] if found.last else np.zeros(len(now))
+
+
+def _alone(view: object, scene: Scene) -> NDArray[np.float64]:
+    """Numbers of the objects that are alone of their kind, each behind whether it is there; zeros if not."""
+    kinds = [part for part in view.rows if part.count == 1] if isinstance(view, TableView) else []
+    found: list[NDArray[np.float64]] = [np.asarray(scene["action"].values)]
+    for part in kinds:
+        width = len(view.schema.type_of(part.name).properties) if isinstance(view, TableView) else 0
+        here = part.name in scene
+        found += [np.array([float(here)]), scene[part.name].values if here else np.zeros(width)]
+    return np.concatenate(found)
+
+
+def rivals(columns: dict[str, NDArray[np.float64]], *, batch: bool) -> dict[str, NDArray[np.float64]]:
+    """What other learners say of the same rows, the batch learners fitted to the first half; shape ``(n, m)`` each."""
+    seen, change = columns["seen"], columns["change"]
+    half, rng = len(seen) // 2, np.random.default_rng(0)
+    found = {"constant velocity": columns["last"]}
+    for name in ONLINE[1:] if find_spec("river") else ONLINE[1:2]:
+        learner = make_regressor(name, columns=Columns(tuple(range(change.shape[1]))), rng=rng)
+        found[name] = _along(learner, seen, change)
+    for name, learner in _batch(half, rng).items() if batch else ():
+        for row, y in zip(seen[:half], change[:half], strict=True):
+            learner.learn_one(row, y)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a single target is a column here, which scikit-learn warns of
+            told = learner.predict_batch(seen[half:])
+        found[name] = np.concatenate([np.full((half, change.shape[1]), np.nan), told])
+    return found
+
+
+def _along(
+    learner: Regressor, seen: NDArray[np.float64], change: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    found = np.zeros_like(change)
+    learner.learn_one(seen[0], change[0])
+    for k in range(1, len(seen)):
+        found[k] = learner.predict_one(seen[k])
+        learner.learn_one(seen[k], change[k])
+    return found
+
+
+def _batch(half: int, rng: np.random.Generator) -> dict[str, Regressor]:
+    found: dict[str, Regressor] = {}
+    if find_spec("sklearn") is not None:
+
+        def tree() -> object:
+            from sklearn.tree import DecisionTreeRegressor
+
+            return DecisionTreeRegressor(min_samples_leaf=3, random_state=0)
+
+        found["tree"] = FittedRegressor(tree, rng=rng, scale=False)
+        found["forest"] = make_regressor("forest", columns=Columns(()), rng=rng)
+    if find_spec("torch") is not None:
+        from relgym.baselines.ensemble import MLPEnsemble
+
+        found["MLP ensemble"] = MLPEnsemble(hidden=128, train_every=half, train_steps=3_000, seed=0)
+    return found
+
+
+def size(
+    guess: NDArray[np.float64], change: NDArray[np.float64], keep: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """nRMSE-d on some rows: root mean square error over the change's standard deviation there, shape ``(m,)``."""
+    error = np.sqrt(np.square(guess[keep] - change[keep]).mean(axis=0))
+    found: NDArray[np.float64] = error / np.maximum(change[keep].std(axis=0), 1e-12)
+    return found

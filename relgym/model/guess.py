@@ -1,0 +1,224 @@
+"""A best guess where nothing is explained: what least squares make of all examples, and never a claim.
+
+Of a property that follows from what nobody sees (a driver's intentions) no mode speaks, and it would keep its value; of
+a car's position that is far off. A guess is a sparse function of what the target and bodiless objects have, features
+included, that foretells best what it wasn't fitted to. It has no modes, no conditions and no say about what is a law:
+its outcome stays `UNEXPLAINED`. An approximation that errs more gives way to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.clusterer import ModeClusterer
+from relgym.clustering.columns import SlotSignature
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.features import MOST_FEATURES
+from relgym.clustering.mode import NOISE, Mode
+from relgym.clustering.roles import identify_roles
+from relgym.clustering.unification import reordered
+from relgym.numeric.stepwise import LinearFit, forward_stepwise, least_squares
+from relgym.scene.objects import Target
+
+__all__ = ["Guess", "Guesses"]
+
+LEAST, GROWTH = 64, 1.5
+"""A first guess after so many examples, another one when their number has grown by this factor."""
+
+MOST_ROWS, MOST_CELLS = 3_000, 1_000_000
+"""At most so many examples, evenly spread over time, choose terms: fewer where there are many features."""
+
+FITTED = 12_000
+"""At most so many determine the weights of the terms chosen."""
+
+SIZES = (1, 2, 4, 8, 16)
+"""Numbers of terms tried."""
+
+HELD_OUT = 1.0 / 3.0
+"""Share of the examples, the newest, on which sizes are compared."""
+
+WORSE = 1.01
+"""A smaller function may be worse by this factor than the best."""
+
+TYPICAL = 2.0
+"""A guess whose median error is larger by more than this factor doesn't replace an approximation: rare large errors must
+not decide over what is mostly right."""
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """A function of last resort.
+
+    Attributes
+    ----------
+    mode
+        The function, in a mode's form; its id is 0, as that of no mode, and its sigma what it leaves.
+    left
+        What it leaves of the change's standard deviation, on examples that it wasn't fitted to.
+    """
+
+    mode: Mode
+    left: float
+
+    def text(self, digits: int) -> str:
+        """For people."""
+        share = f"{100.0 * self.left:.2g} %"
+        return f"best guess, no law: {self.mode.formula(digits)}, which leaves {share} of the change"
+
+
+class Guesses:
+    """The best guess of one target, kept up to date as examples come.
+
+    Attributes
+    ----------
+    best
+        The guess; None as long as none is needed, or none is better than that nothing changes.
+    superior
+        Whether it is better in root mean square than the approximation that there is, and not much worse in the median.
+    """
+
+    def __init__(self) -> None:
+        self.best: Guess | None = None
+        self.superior = False
+        self._due = LEAST
+
+    def stale(self, seen: int) -> bool:
+        """Whether a new guess is due after so many examples."""
+        return seen >= self._due
+
+    def renew(self, clusterer: ModeClusterer, table: ExampleTable) -> int:
+        """Guess anew; the work done, in units of classifiers' work.
+
+        Cost O(rows * columns * terms) with at most `MOST_CELLS` for the first two, some 0.1 s.
+        """
+        self._due = int(GROWTH * max(LEAST, clusterer.seen))
+        numbers, slots = _alike(clusterer, table)
+        if len(numbers) < LEAST or slots.feature_count > MOST_FEATURES:
+            return 0
+        order, stages = slots.preference(clusterer.target)
+        order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
+        order = order[[slots.at(int(k)).property[-1:] != "'" for k in order]]
+        some = _spread(numbers, min(MOST_ROWS, max(LEAST, MOST_CELLS // len(order))))
+        x, change = _data(clusterer, table, slots, order, some)
+        cut = len(some) - int(HELD_OUT * len(some))
+        chosen, left = _chosen(x, change, cut)
+        if chosen is None:
+            self.best, self.superior = None, False
+            return x.size
+        mode = _fitted(clusterer, table, slots, order, _spread(numbers, FITTED), chosen.columns)
+        self.best = Guess(mode, left)
+        self.superior = _superior(clusterer, table, some[cut:], change[cut:] - chosen.predict(x[cut:]))
+        return int(x.size)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back."""
+        best = None if self.best is None else [self.best.mode.to_json(), self.best.left]
+        return {"best": best, "superior": self.superior, "due": self._due}
+
+    @classmethod
+    def from_json(cls, target: Target, data: dict[str, Any]) -> Guesses:
+        """Read what `to_json` wrote."""
+        found = cls()
+        if data:
+            best = data["best"]
+            found.best = None if best is None else Guess(Mode.from_json(target, best[0]), float(best[1]))
+            found.superior, found._due = bool(data["superior"]), int(data["due"])
+        return found
+
+
+def _alike(
+    clusterer: ModeClusterer, table: ExampleTable
+) -> tuple[NDArray[np.intp], SlotSignature]:
+    """Numbers of the examples whose own and bodiless columns are the newest one's, and its signature."""
+    ids = table.signature_ids[clusterer.rows]
+    slots = table.signatures[int(ids[-1])]
+    core = [(slots.named(k), slots.at(k).slot) for k in range(slots.core)]
+    fitting = [
+        k
+        for k in np.unique(ids).tolist()
+        if [(s.named(c), s.at(c).slot) for s in [table.signatures[k]] for c in range(s.core)] == core
+    ]
+    return np.flatnonzero(np.isin(ids, fitting)), slots
+
+
+def _spread(numbers: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+    if len(numbers) <= most:
+        return numbers
+    return numbers[np.linspace(0, len(numbers) - 1, most).astype(np.intp)]
+
+
+def _data(
+    clusterer: ModeClusterer,
+    table: ExampleTable,
+    slots: SlotSignature,
+    order: NDArray[np.intp],
+    numbers: NDArray[np.intp],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Columns and changes of some examples, shapes ``(n, d)`` and ``(n,)``."""
+    rows = table.x[clusterer.rows[numbers]]
+    present = slots.present(rows, clusterer.target)
+    return slots.matrix(rows, order), clusterer.y[numbers] - present
+
+
+def _chosen(
+    x: NDArray[np.float64], change: NDArray[np.float64], cut: int
+) -> tuple[LinearFit | None, float]:
+    """A function fitted to the first rows, of the smallest size that foretells the others well; what it leaves of them.
+
+    None if it is no better to say that nothing changes.
+    """
+    still = _size(change[cut:])
+    fits = [
+        forward_stepwise(x[:cut], change[:cut], sigma=1e-12, max_terms=k, eliminate=False)
+        for k in SIZES
+        if k < cut // 4
+    ]
+    errors = [_size(change[cut:] - fit.predict(x[cut:])) for fit in fits]
+    least = min(errors, default=np.inf)
+    if not least < still:
+        return None, 1.0
+    first = next(k for k, error in enumerate(errors) if error <= WORSE * least)
+    return fits[first], errors[first] / max(float(change[cut:].std()), 1e-300)
+
+
+def _fitted(
+    clusterer: ModeClusterer,
+    table: ExampleTable,
+    slots: SlotSignature,
+    order: NDArray[np.intp],
+    numbers: NDArray[np.intp],
+    columns: tuple[int, ...],
+) -> Mode:
+    """The function of these columns, fitted to many examples: the property's value, not its change."""
+    x, change = _data(clusterer, table, slots, order[list(columns)], numbers)
+    fit = least_squares(x, change, tuple(range(len(columns))))
+    weights = {columns[c]: w for c, w in zip(fit.columns, fit.weights, strict=True)}
+    if order[0] == slots.column(0, clusterer.target.property):  # the task's values count from 0
+        weights[0] = weights.get(0, 0.0) + 1.0
+    places = tuple(sorted(weights))
+    whole = LinearFit(places, tuple(weights[c] for c in places), fit.intercept, fit.rss)
+    roles = identify_roles(reordered(whole, order), slots)
+    sigma = float(np.sqrt(fit.rss / len(numbers)))
+    return Mode(NOISE, clusterer.target, roles, fit.intercept, sigma=sigma)
+
+
+def _superior(
+    clusterer: ModeClusterer, table: ExampleTable, numbers: NDArray[np.intp], left: NDArray[np.float64]
+) -> bool:
+    """Whether residuals are smaller than those of the modes there are, whichever of them is taken."""
+    rows, y = clusterer.rows[numbers], clusterer.y[numbers]
+    errors = [c.errors(table, rows, y, clusterer.scale)[0] for c in clusterer.clusters.values()]
+    if not errors:
+        return True
+    theirs = np.min(errors, axis=0)
+    typical = float(np.median(np.abs(left)))
+    return bool(_size(left) < _size(theirs) and typical <= TYPICAL * float(np.median(theirs)))
+
+
+def _size(left: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.square(left).mean()))
+
