@@ -36,7 +36,7 @@ __all__ = [
     "make_env",
 ]
 
-WARM_UP: Final = 500
+WARM_UP: Final = 250
 """Random steps that every arm begins with."""
 
 AGENT: Final[Mapping[str, Any]] = {

@@ -33,6 +33,10 @@ class DynaConfig:
     updates, updates_alone
         Gradient steps per real step while the model is trusted, and while it isn't; the latter none: as many as
         the algorithm was made for.
+    burst
+        Gradient steps at once, in fresh dreams, when the gate has opened and the algorithm's first random steps are
+        over. A model is often right long before the policy is: with it the policy need not wait for real steps to
+        catch up. 0: none.
     permute
         Whether dreams exchange the roles of objects of one type. The model licenses that, a net doesn't.
     redraw
@@ -58,6 +62,7 @@ class DynaConfig:
     capacity: int = 20_000
     updates: int = 20
     updates_alone: int | None = None
+    burst: int = 0
     permute: bool = True
     redraw: bool = True
     shuffle: int = 150
@@ -93,6 +98,7 @@ _LEAST = {
     "capacity": 1,
     "updates": 1,
     "updates_alone": 0,
+    "burst": 0,
     "shuffle": 0,
     "window": 1,
     "least": 1,

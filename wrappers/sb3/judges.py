@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig, ModelConfig
 from relgym.envs.tasks import Judgement
+from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import (
     ACTION,
@@ -29,6 +30,10 @@ _NOW, _NEXT = "now", "next"
 
 _EXACT: Final = ModelConfig(frames="world", clustering=ClusteringConfig(min_examples=5))
 """What a task says is free of noise, and success is rare at first: five examples found a mode."""
+
+
+_REMEMBERED: Final = 1_000
+_REVIEWED_EVERY: Final = 10
 
 
 class Judge(Protocol):
@@ -84,6 +89,10 @@ class LearnedTask:
         ]
         self._action = schema.type(ACTION).properties if ACTION in schema.order else ()
         self.model = WorldModel(self._small_schema(), config or _EXACT)
+        self._lessons: deque[NDArray[np.float64]] = deque(maxlen=_REMEMBERED)
+        self._together: set[tuple[int, int]] = set()
+        self._numbers: tuple[int, ...] = ()
+        self._reviewed_at = 0
 
     def _small_schema(self) -> SceneSchema:
         def named(pairs: list[tuple[str, str]]) -> tuple[str, ...]:
@@ -108,6 +117,7 @@ class LearnedTask:
         small = self.model.schema.scene({**values, TASK: [0.0, 0.0]})
         said = {(TASK, "reward"): float(reward), (TASK, "terminated"): float(terminated)}
         self.model.learn_one(Transition(small, small.replace(said)))
+        self._lessons.append(small.replace(said).vector)
 
     def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
         """What the modes say; NaN where none does."""
@@ -117,10 +127,31 @@ class LearnedTask:
             vectors[:, small.slice(k)] = self._part(name, layout, before, actions, after)
         found = self.model.predict_batch(small, vectors)
         task = small.index(TASK)
-        known = found.ok if self.model.seen else np.zeros(len(before), dtype=bool)
+        known = found.ok & self._ever_together(found)
         rewards = np.where(known, found.vectors[:, small.column(task, "reward")], np.nan)
         ended = found.vectors[:, small.column(task, "terminated")] > 0.5
         return Judgement(rewards, ended & known, np.zeros(len(before), dtype=bool))
+
+    def _ever_together(self, found: BatchPrediction) -> NDArray[np.bool_]:
+        """Where reward and termination come from modes that were right of one and the same real step."""
+        numbers = tuple(mode.id for prop in ("reward", "terminated") for mode in self.model.modes(TASK, prop))
+        if self.model.seen >= self._reviewed_at + _REVIEWED_EVERY or numbers != self._numbers:
+            self._reviewed_at, self._numbers = self.model.seen, numbers
+            self._together = self._review()
+        pairs = _pairs(found)
+        return np.array([pair in self._together for pair in pairs], dtype=bool)
+
+    def _review(self) -> set[tuple[int, int]]:
+        if not self._lessons:
+            return set()
+        small = self.model.schema.layout()
+        said = np.stack(self._lessons)
+        columns = [small.column(small.index(TASK), prop) for prop in ("reward", "terminated")]
+        asked = said.copy()
+        asked[:, columns] = 0.0
+        found = self.model.predict_batch(small, asked)
+        right = found.ok & (np.abs(found.vectors - said)[:, columns] <= 1e-6).all(axis=1)
+        return {pair for pair, good in zip(_pairs(found), right.tolist(), strict=True) if good}
 
     def _part(
         self, name: str, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
@@ -134,6 +165,12 @@ class LearnedTask:
         pairs, vectors = (self._now, before) if name == _NOW else (self._next, after)
         found: NDArray[np.float64] = vectors[:, [layout.column(layout.index(o), prop) for o, prop in pairs]]
         return found
+
+
+def _pairs(found: BatchPrediction) -> list[tuple[int, int]]:
+    """The modes of reward and termination, scene by scene."""
+    reward, ended = (found.parts.index((TASK, prop)) for prop in ("reward", "terminated"))
+    return list(zip(found.modes[:, reward].tolist(), found.modes[:, ended].tolist(), strict=True))
 
 
 class NeuralModel(Protocol):
