@@ -100,7 +100,7 @@ class ClassificationConfig:
         only learned anew where that isn't enough (§5.1). Default true.
     relearn_growth
         An imperfect or mended pair is learned anew when its rarer mode's examples have grown by this factor.
-        Default 2, range > 1. Raising it saves time and lets definitions age.
+        Default 1.5, range > 1. Raising it saves time and lets definitions age.
     """
 
     votes: Literal["soft", "hard"] = "soft"
@@ -128,7 +128,7 @@ class ClassificationConfig:
     noise_per_state: int = 200
     max_exemplars: int = 6000
     repair: bool = True
-    relearn_growth: float = 2.0
+    relearn_growth: float = 1.5
 
     def __post_init__(self) -> None:
         _one_of(self, votes=("soft", "hard"), context=("auto", "approached", "touching", "all"))

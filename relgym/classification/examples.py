@@ -23,6 +23,7 @@ __all__ = [
     "consequence",
     "difference",
     "mode_value",
+    "turned",
 ]
 
 Bools: TypeAlias = NDArray[np.bool_]
@@ -51,6 +52,9 @@ class Vocabulary:
     follows
         Own features that move along with the target: (name, k) says that ``name' = name + k * target'``. For each
         mode, ``name + k * F`` is offered as a number too: where the object would get to if that mode held.
+    present
+        The own feature that modes predict the next value of; empty: it isn't among them. For each mode, ``F * present``
+        is offered as a number too: less than zero where that mode would turn the motion round.
 
     Raises
     ------
@@ -64,6 +68,7 @@ class Vocabulary:
     own: tuple[str, ...] = ()
     contact: frozenset[str] = frozenset()
     follows: tuple[tuple[str, float], ...] = ()
+    present: str = ""
 
     def __post_init__(self) -> None:
         names = Counter((*self.relations, *self.unary, *self.pair, *self.own))
@@ -79,14 +84,15 @@ class Vocabulary:
         """Plain JSON-able dictionary."""
         names = ("relations", "unary", "pair", "own")
         plain = {name: list(getattr(self, name)) for name in names}
-        return plain | {"contact": sorted(self.contact), "follows": [list(pair) for pair in self.follows]}
+        follows = [list(pair) for pair in self.follows]
+        return plain | {"contact": sorted(self.contact), "follows": follows, "present": self.present}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Vocabulary:
         """Inverse of `to_dict`."""
-        names = {name: tuple(value) for name, value in data.items() if name not in ("contact", "follows")}
-        follows = tuple((str(name), float(k)) for name, k in data.get("follows", ()))
-        return cls(contact=frozenset(data["contact"]), follows=follows, **names)
+        names = {name: tuple(data[name]) for name in ("relations", "unary", "pair", "own")}
+        follows = tuple((str(name), float(k)) for name, k in data["follows"])
+        return cls(**names, contact=frozenset(data["contact"]), follows=follows, present=data["present"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,6 +216,11 @@ def consequence(name: str, k: float, mode: int) -> str:
     """Name of the number that says where a property would get to if a mode held."""
     size = f"{abs(k):.6g}"
     return f"{name} {'-' if k < 0 else '+'} {'' if size == '1' else f'{size} '}{mode_value(mode)}"
+
+
+def turned(mode: int, present: str) -> str:
+    """Name of the product of a mode's prediction and the present value: negative where the sign changes."""
+    return f"{mode_value(mode)} * {present}"
 
 
 def difference(i: int, j: int) -> str:

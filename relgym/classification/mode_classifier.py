@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -269,13 +269,17 @@ class ModeClassifier:
         keep, wrong = self.config.ambiguous == "keep", 0
         explained = dict(zip(self.modes, np.asarray(fits).tolist(), strict=True))
         for at, ((i, j), pair) in enumerate(self._pairs.items()):
-            for_i, for_j = (assigned == m or (not keep and (assigned, m) in self._covered) for m in (i, j))
+            for_i, for_j = (assigned == m or self._covers(m, assigned, explained) for m in (i, j))
             other = j if for_i else i
             if for_i == for_j or (explained[other] and not keep):
                 continue
             wrong += pair.observe(outcomes[at], for_i, self.config.relearn_growth)
             self._voting.recount(at)
         return wrong
+
+    def _covers(self, mode: int, assigned: int, explained: Mapping[int, bool]) -> bool:
+        """Whether a mode explains an example that was assigned to one it covers, see `pair_labels`."""
+        return explained[mode] and (assigned, mode) in self._covered
 
     def _familiarity(self) -> Familiarity:
         if self._seen is None:
@@ -326,9 +330,10 @@ class ModeClassifier:
         self._voting.set_pairs(self.classifiers)
         self._seen = None
         assigned, fits = self.exemplars.assigned, self.exemplars.columns["fits"]
+        useful = len(assigned) and self.config.ambiguous != "keep"
         self._covered = {
             (k, m)
-            for at, m in enumerate(self.modes if len(assigned) else ())
+            for at, m in enumerate(self.modes if useful else ())
             for k in covered_by(assigned, fits[:, at] | (assigned == m))
         }
 

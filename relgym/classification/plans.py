@@ -15,7 +15,15 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 
 from relgym.classification.binary import BinaryClassifier
-from relgym.classification.examples import Bools, Example, Vocabulary, consequence, difference, mode_value
+from relgym.classification.examples import (
+    Bools,
+    Example,
+    Vocabulary,
+    consequence,
+    difference,
+    mode_value,
+    turned,
+)
 from relgym.classification.views import Context
 from relgym.logic.clause import ANY, Clause, Literal
 from relgym.logic.csp import World, solutions
@@ -113,8 +121,10 @@ class Planner:
         both = {difference(i, j): (places[i], places[j]) for i in modes for j in modes if i < j}
         self._follows = tuple((vocabulary.own.index(name), k) for name, k in vocabulary.follows)
         ahead = [consequence(name, k, mode) for name, k in vocabulary.follows for mode in modes]
+        self._present = tuple(vocabulary.own.index(name) for name in (vocabulary.present,) if name)
+        back = [turned(mode, vocabulary.present) for _ in self._present for mode in modes]
         behind = first + len(modes)
-        known = {name: (behind + at, -1) for at, name in enumerate(ahead)}
+        known = {name: (behind + at, -1) for at, name in enumerate([*ahead, *back])}
         self._scalars: dict[str, tuple[int, int]] = own | single | both | known
         self._pairs: list[_Pair] = []
         self._version = 0
@@ -148,6 +158,9 @@ class Planner:
         scalars = [*example.own.tolist(), *values]
         if self._follows:
             scalars += [scalars[column] + k * value for column, k in self._follows for value in values]
+        if self._present:
+            present = scalars[self._present[0]]
+            scalars += [present * value for value in values]
         pair = example.pair.tolist()
         return [stage if isinstance(stage, int) else _run(stage, scalars, pair) for stage in plan.stages]
 

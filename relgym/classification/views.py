@@ -17,6 +17,7 @@ from relgym.classification.examples import (
     consequence,
     difference,
     mode_value,
+    turned,
 )
 from relgym.classification.exemplars import Exemplars
 from relgym.config import ClassificationConfig
@@ -47,6 +48,8 @@ class Scope:
         Ids of the two modes if their functions are features, else none.
     follows
         (name, column among the own features, k): see `Vocabulary.follows`.
+    present
+        (name, column among the own features) of `Vocabulary.present`, if there is one.
     """
 
     relations: tuple[tuple[str, int], ...]
@@ -55,6 +58,7 @@ class Scope:
     own: tuple[tuple[str, int], ...]
     modes: tuple[int, ...] = ()
     follows: tuple[tuple[str, int, float], ...] = ()
+    present: tuple[tuple[str, int], ...] = ()
 
     @classmethod
     def of(cls, vocabulary: Vocabulary, config: ClassificationConfig, modes: Sequence[int] = ()) -> Scope:
@@ -67,7 +71,9 @@ class Scope:
         v = vocabulary
         shown = tuple(modes) if config.mode_function_features else ()
         follows = tuple((name, v.own.index(name), k) for name, k in v.follows)
-        return cls(offered(v.relations), offered(v.unary), offered(v.pair), offered(v.own), shown, follows)
+        present = tuple((name, v.own.index(name)) for name in (v.present,) if name)
+        facts = (offered(v.relations), offered(v.unary), offered(v.pair), offered(v.own))
+        return cls(*facts, shown, follows, present)
 
     @property
     def scalars(self) -> tuple[str, ...]:
@@ -80,7 +86,8 @@ class Scope:
             return ()
         i, j = self.modes
         ahead = [consequence(name, k, mode) for name, _, k in self.follows for mode in self.modes]
-        return mode_value(i), mode_value(j), difference(i, j), *ahead
+        back = [turned(mode, name) for name, _ in self.present for mode in self.modes]
+        return mode_value(i), mode_value(j), difference(i, j), *ahead, *back
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +190,8 @@ class View:
         if scope.modes:
             i, j = (self.values[:, self.modes.index(mode)] for mode in scope.modes)
             ahead = [self.own[:, column] + k * value for _, column, k in scope.follows for value in (i, j)]
-            parts.append(np.column_stack([i, j, i - j, *ahead]))
+            back = [self.own[:, column] * value for _, column in scope.present for value in (i, j)]
+            parts.append(np.column_stack([i, j, i - j, *ahead, *back]))
         return np.concatenate(parts, axis=1)
 
 

@@ -38,7 +38,7 @@ class Conditions:
     def __init__(self, schema: SceneSchema, target: Target) -> None:
         own, alone = target.type, {t.name for t in schema.types if not t.has_body}
         self.pairs = tuple(p for p in target.given if own == TASK or p[0] == own or p[0] in alone)
-        self._own = own
+        self._own, self._property = own, target.property
         self._columns: dict[int, NDArray[np.intp]] = {}
 
     def __getstate__(self) -> dict[str, object]:
@@ -50,9 +50,10 @@ class Conditions:
         return tuple((p if t == self._own else f"{t}.{p}") + PRIME for t, p in self.pairs)
 
     def vocabulary(self, base: Vocabulary, follows: tuple[tuple[str, float], ...]) -> Vocabulary:
-        """The vocabulary with the next values as further own features."""
+        """The vocabulary with the next values as further own features, and what it needs to know of the target."""
         known = tuple(pair for pair in follows if pair[0] in base.own)
-        return replace(base, own=(*base.own, *self.names), follows=known)
+        present = self._property if self._property in base.own else ""
+        return replace(base, own=(*base.own, *self.names), follows=known, present=present)
 
     def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """The next values on regression rows ``(n, d)``, shape ``(n, len(pairs))``; NaN where an object is missing."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from toy_situations import BALL_VOCABULARY, BOUNCE, FLY, HALT, RAMP, Labelled, ball_stream
@@ -53,6 +55,24 @@ def test_halting_is_a_threshold_on_a_mode_function(items: list[Labelled]) -> Non
     [clause] = found.definition.clauses
     [literal] = clause.literals
     assert (literal.relation, literal.op, literal.threshold) == ("F3", ">", pytest.approx(0.0, abs=2e-3))
+
+
+def test_halting_is_friction_that_would_turn_the_motion_round() -> None:
+    # Friction either way, at walls on either side: only the sign of (prediction x present value) tells it from halting.
+    rng = np.random.default_rng(3)
+    vx, push = rng.uniform(-1.0, 1.0, size=60), rng.uniform(-1.0, 1.0, size=60)
+    slowed = np.abs(push) < np.abs(vx)
+    change = -np.sign(vx) * np.abs(push)
+    example = ball_stream(1, rng=rng).__next__().example
+    examples = [replace(example, own=np.array([v, 0.0])) for v in vx]
+    values = np.column_stack([np.zeros(60), vx + change])
+    lesson = Lesson(
+        View.of_batch(ExampleBatch.stack(examples), (0, 1), values), np.arange(60), ~slowed, np.ones(60)
+    )
+    vocabulary, config = replace(BALL_VOCABULARY, present="vx"), ClassificationConfig()
+    found = learn_pair(0, 1, lesson, Scope.of(vocabulary, config, (0, 1)), config)
+    [clause] = found.definition.clauses
+    assert [str(literal) for literal in clause] == ["F1 * vx <= 0"]
 
 
 @pytest.mark.parametrize(

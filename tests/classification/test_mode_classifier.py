@@ -331,3 +331,22 @@ def test_an_ambiguous_example_speaks_for_both_modes_against_a_third() -> None:
     told = {(c.i, c.j): sum(map(sum, c.counts)) for c in classifier.classifiers}
     assert told[0, 1] == 0
     assert told[0, 2] == told[1, 2] == pytest.approx(200, rel=2e-3)
+
+
+def test_what_a_covering_mode_fails_to_explain_teaches_the_two_apart() -> None:
+    # Mode 1 explains nearly all of mode 0's examples: the rare others are all that tells the two apart.
+    items = list(ball_stream(400, rng=np.random.default_rng(0)))
+    classifier = _empty((0, 1))
+
+    def observe(at: int, *, both: bool) -> None:
+        classifier.observe(items[at].example, 0, np.array([True, both]), np.zeros(2))
+
+    for at in range(300):
+        observe(at, both=True)
+    slots = len(classifier.exemplars)
+    fits, values = np.ones((slots, 2), dtype=np.bool_), np.zeros((slots, 2))
+    classifier.sync((0, 1), np.zeros(slots, dtype=np.int64), fits, values)  # what covers what is noted here
+    for at in range(300, 304):
+        observe(at, both=False)
+    assert [0, 1] in classifier.to_dict()["covered"]
+    assert sum(map(sum, classifier.classifiers[0].counts)) == 4

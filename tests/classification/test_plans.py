@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,7 +23,8 @@ _BATCH = ExampleBatch.stack([item.example for item in _ITEMS])
 _VALUES = np.array([item.values for item in _ITEMS])
 _MODES = tuple(range(6))
 _ROWS = np.arange(len(_ITEMS))
-_SCOPE = Scope.of(BALL_VOCABULARY, ClassificationConfig(), (1, 3))
+_VOCABULARY = replace(BALL_VOCABULARY, follows=(("vy", 0.5),), present="vx")
+_SCOPE = Scope.of(_VOCABULARY, ClassificationConfig(), (1, 3))
 _VIEW = View.of_batch(_BATCH, _MODES, _VALUES)
 
 
@@ -65,7 +68,7 @@ def _tree(context: Context, clause: Clause | None, rng: np.random.Generator) -> 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(_classifiers(), min_size=1, max_size=3))
 def test_single_and_batch_take_the_same_way(classifiers: list[BinaryClassifier]) -> None:
-    planner = Planner(BALL_VOCABULARY, _MODES)
+    planner = Planner(_VOCABULARY, _MODES)
     planner.set_pairs(classifiers)
     single = [planner.outcomes(item.example, item.values.tolist()) for item in _ITEMS[:60]]
     batch = np.column_stack([c.decide_batch(_VIEW, _ROWS[:60]) for c in classifiers])
@@ -76,7 +79,7 @@ def test_changed_pairs_are_worked_out_anew_and_others_kept() -> None:
     touching = Definition((Clause((Literal("intersect", (0, 1)),)),))
     ramp = Definition((Clause((Literal("ramp", (1,)),)),))
     first, second = (BinaryClassifier(1, 3, _SCOPE, "touching", d) for d in (touching, ramp))
-    planner = Planner(BALL_VOCABULARY, _MODES)
+    planner = Planner(_VOCABULARY, _MODES)
     for pairs in ([first, first], [first, second], [second, first], [second]):
         planner.set_pairs(pairs)
         for at in range(40):
@@ -88,7 +91,7 @@ def test_changed_pairs_are_worked_out_anew_and_others_kept() -> None:
 def test_the_order_of_objects_is_irrelevant(position: int) -> None:
     bounce = Clause((Literal("intersect", (0, 1)), Literal("approach", (0, 1), op="<=", threshold=0.0)))
     classifier = BinaryClassifier(1, 3, _SCOPE, "touching", Definition((bounce,)))
-    planner = Planner(BALL_VOCABULARY, _MODES)
+    planner = Planner(_VOCABULARY, _MODES)
     planner.set_pairs([classifier])
     order = np.roll(np.arange(6), position)
     for item in _ITEMS[:50]:
