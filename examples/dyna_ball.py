@@ -42,6 +42,7 @@ def make_env() -> gym.Env[Any, Any]:
 def main(args: Args) -> None:
     """Train SAC with Dyna, test it, and print the laws it dreamed by."""
     from stable_baselines3 import SAC
+    from stable_baselines3.common.logger import Logger
 
     env = make_env()
     env.action_space.seed(args.seed)
@@ -68,6 +69,7 @@ def main(args: Args) -> None:
         device="cpu",
         **replay_options(env.observation_space),
     )
+    agent.set_logger(Logger(None, []))  # nothing is logged, and no folder left behind
     agent.learn(args.decisions, callback=dyna)
     gate = dyna.apprentice.gate
     print(f"prequential error {gate.error:.3f}, trusted: {gate.open}, imagined: {dyna.imagined:,} decisions")

@@ -41,6 +41,7 @@ def make_env() -> gym.Env[Any, Any]:
 def main(args: Args) -> None:
     """Train SAC with Dyna, test it, and lay a dreamed episode beside the real one."""
     from stable_baselines3 import SAC
+    from stable_baselines3.common.logger import Logger
 
     env = make_env()
     env.action_space.seed(args.seed)
@@ -57,6 +58,7 @@ def main(args: Args) -> None:
         device="cpu",
         **replay_options(env.observation_space),
     )
+    agent.set_logger(Logger(None, []))  # nothing is logged, and no folder left behind
     agent.learn(args.steps, callback=dyna)
     gate = dyna.apprentice.gate
     print(

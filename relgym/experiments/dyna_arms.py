@@ -226,6 +226,7 @@ def make_agent(arm: Arm, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -
     """
     try:
         from stable_baselines3 import SAC
+        from stable_baselines3.common.logger import Logger
 
         from relgym.wrappers.sb3.replay import replay_options
     except ImportError as missing:
@@ -235,7 +236,9 @@ def make_agent(arm: Arm, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -
     mixing = replay_options(env.observation_space, gamma=AGENT["gamma"])
     env.action_space.seed(seed)
     updates = arm.updates if arm.model == "none" else 1  # until the model is trusted
-    return SAC("MlpPolicy", env, seed=seed, gradient_steps=updates, **{**AGENT, **mixing, **changes})
+    agent = SAC("MlpPolicy", env, seed=seed, gradient_steps=updates, **{**AGENT, **mixing, **changes})
+    agent.set_logger(Logger(None, []))  # one of Stable-Baselines3's own leaves an empty folder behind
+    return agent
 
 
 def make_dyna(

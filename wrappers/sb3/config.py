@@ -34,9 +34,10 @@ class DynaConfig:
         Gradient steps per real step while the model is trusted, and while it isn't; the latter none: as many as
         the algorithm was made for.
     burst
-        Gradient steps at once, in fresh dreams, when the gate has opened and the algorithm's first random steps are
-        over. A model is often right long before the policy is: with it the policy need not wait for real steps to
-        catch up. 0: none.
+        Gradient steps at once, in fresh dreams all the while, the first time that the model is trusted and the
+        algorithm's random steps are over; 0: none. A model of few objects is often exact long before real steps at
+        `updates` each have trained a policy: raising it trades computing for real steps. Should hold `updates` *
+        `every`, a round of dreams, many times.
     permute
         Whether dreams exchange the roles of objects of one type. The model licenses that, a net doesn't.
     redraw

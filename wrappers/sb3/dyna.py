@@ -88,7 +88,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self._like = like
         self._rng = np.random.default_rng([self.config.seed, 0])
         self._dreamed_at = 0
-        self._behind = self.config.burst
+        self._made_up = False
         self._known = 0.0
         self._apprentice: Apprentice | None = None
         self._imagination: Imagination | None = None
@@ -153,15 +153,14 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         return each * int(self.training_env.num_envs * self.model.train_freq.frequency)
 
     def _catch_up(self, trusted: bool) -> None:
-        """Once per opening of the gate: train in dreams at once, as much as many real steps would have brought."""
-        if not trusted:
-            self._behind = self.config.burst
-        elif self._behind and self.num_timesteps > self.model.learning_starts:
-            each = self.config.updates * self.config.every  # as many per round of dreams as otherwise
-            for done in range(0, self._behind, each):
-                self._dream()
-                self.model.train(min(each, self._behind - done), batch_size=self.model.batch_size)
-            self._behind = 0
+        """Train at once, the first time that the model is trusted, as much as many real steps would have brought."""
+        if not trusted or self._made_up or self.num_timesteps <= self.model.learning_starts:
+            return
+        self._made_up = True
+        each = self.config.updates * self.config.every  # per round of dreams, as later on
+        for done in range(0, self.config.burst, each):
+            self._dream()
+            self.model.train(min(each, self.config.burst - done), batch_size=self.model.batch_size)
 
     def _dream(self) -> None:
         started = perf_counter()

@@ -27,13 +27,18 @@ from relgym.wrappers.sb3.acting import acting_all
 __all__ = ["Judge", "LearnedTask", "NeuralModel", "NeuralTask"]
 
 _NOW, _NEXT = "now", "next"
+_TOLD: Final = ("reward", "terminated")
+_RIGHT: Final = 1e-6  # how far a right verdict may be off
 
 _EXACT: Final = ModelConfig(frames="world", clustering=ClusteringConfig(min_examples=5))
 """What a task says is free of noise, and success is rare at first: five examples found a mode."""
 
 
 _REMEMBERED: Final = 1_000
-_REVIEWED_EVERY: Final = 10
+"""Of so many real steps, the latest, it is looked up which modes were right together."""
+
+_REVIEW: Final = 10
+"""Real steps between two such reviews while the modes stay the same ones: a review costs some milliseconds."""
 
 
 class Judge(Protocol):
@@ -71,6 +76,10 @@ class LearnedTask:
     Notes
     -----
     What depends on one among several objects of a type can't be learned so.
+
+    Policies seek out what a judge is wrong about. Reward and termination are learned apart, and the thresholds of
+    their clauses differ by a hair: in between, a bonus for an end would be paid without one, again and again. So
+    where the two modes never were right of one and the same real step, the judge doesn't know.
     """
 
     learned: Final = True
@@ -91,8 +100,7 @@ class LearnedTask:
         self.model = WorldModel(self._small_schema(), config or _EXACT)
         self._lessons: deque[NDArray[np.float64]] = deque(maxlen=_REMEMBERED)
         self._together: set[tuple[int, int]] = set()
-        self._numbers: tuple[int, ...] = ()
-        self._reviewed_at = 0
+        self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
 
     def _small_schema(self) -> SceneSchema:
         def named(pairs: list[tuple[str, str]]) -> tuple[str, ...]:
@@ -100,8 +108,8 @@ class LearnedTask:
 
         parts = {_NOW: named(self._now), _NEXT: named(self._next), ACTION: self._action}
         types = [ObjectType(name, properties) for name, properties in parts.items() if properties]
-        types.append(ObjectType(TASK, ("reward", "terminated")))
-        targets = (Target(TASK, "reward"), Target(TASK, "terminated"))
+        types.append(ObjectType(TASK, _TOLD))
+        targets = tuple(Target(TASK, prop) for prop in _TOLD)
         return SceneSchema(tuple(types), tuple((t.name, t.name) for t in types), targets=targets)
 
     def learn_step(self, transition: Transition, reward: float, *, terminated: bool) -> None:
@@ -134,23 +142,23 @@ class LearnedTask:
 
     def _ever_together(self, found: BatchPrediction) -> NDArray[np.bool_]:
         """Where reward and termination come from modes that were right of one and the same real step."""
-        numbers = tuple(mode.id for prop in ("reward", "terminated") for mode in self.model.modes(TASK, prop))
-        if self.model.seen >= self._reviewed_at + _REVIEWED_EVERY or numbers != self._numbers:
-            self._reviewed_at, self._numbers = self.model.seen, numbers
-            self._together = self._review()
-        pairs = _pairs(found)
-        return np.array([pair in self._together for pair in pairs], dtype=bool)
+        seen, modes = self._reviewed
+        now = tuple(mode.id for prop in _TOLD for mode in self.model.modes(TASK, prop))
+        if self.model.seen >= seen + _REVIEW or now != modes:
+            self._reviewed, self._together = (self.model.seen, now), self._right_together()
+        return np.array([pair in self._together for pair in _pairs(found)], dtype=bool)
 
-    def _review(self) -> set[tuple[int, int]]:
+    def _right_together(self) -> set[tuple[int, int]]:
+        """Modes of reward and termination that give what was said of some remembered step."""
         if not self._lessons:
             return set()
         small = self.model.schema.layout()
         said = np.stack(self._lessons)
-        columns = [small.column(small.index(TASK), prop) for prop in ("reward", "terminated")]
+        columns = [small.column(small.index(TASK), prop) for prop in _TOLD]
         asked = said.copy()
         asked[:, columns] = 0.0
         found = self.model.predict_batch(small, asked)
-        right = found.ok & (np.abs(found.vectors - said)[:, columns] <= 1e-6).all(axis=1)
+        right = found.ok & (np.abs(found.vectors - said)[:, columns] <= _RIGHT).all(axis=1)
         return {pair for pair, good in zip(_pairs(found), right.tolist(), strict=True) if good}
 
     def _part(
@@ -169,7 +177,7 @@ class LearnedTask:
 
 def _pairs(found: BatchPrediction) -> list[tuple[int, int]]:
     """The modes of reward and termination, scene by scene."""
-    reward, ended = (found.parts.index((TASK, prop)) for prop in ("reward", "terminated"))
+    reward, ended = (found.parts.index((TASK, prop)) for prop in _TOLD)
     return list(zip(found.modes[:, reward].tolist(), found.modes[:, ended].tolist(), strict=True))
 
 
