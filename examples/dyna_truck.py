@@ -1,6 +1,6 @@
 """How few real steps does an agent need that dreams in what it has learned? Push a truck to its goal, and stop.
 
-Needs the extra sb3. Run: python examples/dyna_truck.py --steps 1500
+Needs the extra sb3. Run: python examples/dyna_truck.py --steps 1000
 """
 
 from __future__ import annotations
@@ -21,12 +21,14 @@ from relgym.wrappers.sb3 import Dyna, DynaConfig, TransitionRecorder, replay_opt
 class Args:
     """Settings; each is a command-line option."""
 
-    steps: int = 1500
+    steps: int = 1000
     """real steps"""
-    warm_up: int = 500
+    warm_up: int = 250
     """of them random, at first"""
     updates: int = 20
     """gradient steps per real step, once the model is trusted"""
+    burst: int = 20_000
+    """gradient steps at once, when the model is first trusted"""
     episodes: int = 50
     """test episodes"""
     seed: int = 0
@@ -46,7 +48,7 @@ def main(args: Args) -> None:
     env = make_env()
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
-    dyna = Dyna(model, DynaConfig(updates=args.updates, seed=args.seed))
+    dyna = Dyna(model, DynaConfig(updates=args.updates, burst=args.burst, seed=args.seed))
     agent = SAC(
         "MlpPolicy",
         env,
