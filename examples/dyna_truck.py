@@ -25,9 +25,9 @@ class Args:
     """real steps"""
     warm_up: int = 250
     """of them random, at first"""
-    updates: int = 20
+    updates: int = 40
     """gradient steps per real step, once the model is trusted"""
-    burst: int = 20_000
+    burst: int = 10_000
     """gradient steps at once, when the model is first trusted"""
     episodes: int = 50
     """test episodes"""

@@ -138,6 +138,7 @@ _BALL_DREAMS: Final[Mapping[str, Any]] = {
     "from_start": 0.3,
     "redraw": False,
     "permute": False,
+    "updates": 20,
     "burst": 0,
 }
 """Episodes are long and their steps short, so dreams branch off anywhere. Goals in mid-air would teach nothing, nor
@@ -151,14 +152,14 @@ COURSES: Final = {
     )
 }
 
-_DYNA: Final[Mapping[str, Any]] = {"updates": 20, "burst": 20_000}
-"""Of all arms with a model: in a run of 1,000 real steps 30 or so for each of them, as in the arm `sac30`."""
+_DYNA: Final[Mapping[str, Any]] = {"updates": 40, "burst": 10_000}
+"""Of all arms with a model: 10,000 and 40 per real step make 36 for each of the first 1,000 real steps."""
 
 ARMS: Final = {
     arm.name: arm
     for arm in (
         Arm("sac", "SAC", "none"),
-        Arm("sac30", "SAC, 30 updates a step", "none", updates=30),
+        Arm("sac40", "SAC, 40 updates a step", "none", updates=40),
         Arm("sac-permuted", "SAC, objects permuted", "none", varied=True),
         Arm("ensemble", "Dyna, MLP ensemble", "neural", **_DYNA, learned=True, doubted=False),
         Arm("relgym", "Dyna, relgym", "relational", **_DYNA, learned=True, varied=True),

@@ -107,7 +107,7 @@ def _truck(found: Found) -> Shown:
 
 def _ball(found: Found) -> Shown:
     runs = _runs(found)
-    steps = {arm: median(map(reached, own)) for arm in ("sac", "sac30") if (own := _of(runs, arm))}
+    steps = {arm: median(map(reached, own)) for arm in ("sac", "sac40") if (own := _of(runs, arm))}
     best = min(steps, key=lambda arm: steps[arm], default="sac")
     return _compared(runs, _fewer(runs, best, 4.0))
 
@@ -201,7 +201,7 @@ def _times(found: Found) -> str:
 
 
 _DREAMS: Final[Mapping[str, Any]] = {"real": 1_000, "updates": 30_000}
-_FEW: Final[Mapping[str, int]] = {"sac30": 5_000, "ensemble": 2_500}
+_FEW: Final[Mapping[str, int]] = {"sac40": 5_000, "ensemble": 2_500}
 """Real steps at most, where an arm's are costly and it is enough to know that it needs more."""
 
 _CHANGE: Final[Mapping[str, Any]] = {"after": _TURN, "arguments": _LIGHT}
@@ -215,7 +215,7 @@ ROWS: Final[Mapping[int, Row]] = {
     ),
     3: Row(
         "BallGoal: real decisions to success",
-        _learning("ball", ("relgym", "relgym-given", "sac", "sac30"), _BALL_STEPS),
+        _learning("ball", ("relgym", "relgym-given", "sac", "sac40"), _BALL_STEPS),
         _ball,
     ),
     4: Row(
