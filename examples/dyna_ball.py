@@ -1,7 +1,7 @@
 """Does dreaming pay where things bounce? Fly a ball with weak thrusters from place to place, and stay there.
 
 The ball acts once in five steps: the laws that the model learns are those of single steps. Needs the extra sb3.
-Run: python examples/dyna_ball.py --decisions 2000
+Run: python examples/dyna_ball.py --decisions 3000
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from relgym.wrappers.sb3 import Dyna, DynaConfig, TransitionRecorder, replay_opt
 class Args:
     """Settings; each is a command-line option."""
 
-    decisions: int = 2000
+    decisions: int = 3000
     """real decisions, of five steps each"""
-    warm_up: int = 500
+    warm_up: int = 250
     """of them random, at first"""
     updates: int = 20
     """gradient steps per decision, once the model is trusted"""
@@ -42,17 +42,19 @@ def make_env() -> gym.Env[Any, Any]:
 def main(args: Args) -> None:
     """Train SAC with Dyna, test it, and print the laws it dreamed by."""
     from stable_baselines3 import SAC
+    from stable_baselines3.common.logger import Logger
 
     env = make_env()
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
-    # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals stay where they are.
+    # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals and walls stay where they are.
     config = DynaConfig(
         horizon=30,
         dreams=32,
         every=20,
         from_start=0.3,
         redraw=False,
+        permute=False,
         updates=args.updates,
         seed=args.seed,
     )
@@ -68,6 +70,7 @@ def main(args: Args) -> None:
         device="cpu",
         **replay_options(env.observation_space),
     )
+    agent.set_logger(Logger(None, []))  # nothing is logged, and no folder left behind
     agent.learn(args.decisions, callback=dyna)
     gate = dyna.apprentice.gate
     print(f"prequential error {gate.error:.3f}, trusted: {gate.open}, imagined: {dyna.imagined:,} decisions")

@@ -1,6 +1,6 @@
 """How few real steps does an agent need that dreams in what it has learned? Push a truck to its goal, and stop.
 
-Needs the extra sb3. Run: python examples/dyna_truck.py --steps 1500
+Needs the extra sb3. Run: python examples/dyna_truck.py --steps 1000
 """
 
 from __future__ import annotations
@@ -21,12 +21,14 @@ from relgym.wrappers.sb3 import Dyna, DynaConfig, TransitionRecorder, replay_opt
 class Args:
     """Settings; each is a command-line option."""
 
-    steps: int = 1500
+    steps: int = 1000
     """real steps"""
-    warm_up: int = 500
+    warm_up: int = 250
     """of them random, at first"""
-    updates: int = 20
+    updates: int = 40
     """gradient steps per real step, once the model is trusted"""
+    burst: int = 10_000
+    """gradient steps at once, when the model is first trusted"""
     episodes: int = 50
     """test episodes"""
     seed: int = 0
@@ -41,11 +43,12 @@ def make_env() -> gym.Env[Any, Any]:
 def main(args: Args) -> None:
     """Train SAC with Dyna, test it, and lay a dreamed episode beside the real one."""
     from stable_baselines3 import SAC
+    from stable_baselines3.common.logger import Logger
 
     env = make_env()
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
-    dyna = Dyna(model, DynaConfig(updates=args.updates, seed=args.seed))
+    dyna = Dyna(model, DynaConfig(updates=args.updates, burst=args.burst, seed=args.seed))
     agent = SAC(
         "MlpPolicy",
         env,
@@ -57,6 +60,7 @@ def main(args: Args) -> None:
         device="cpu",
         **replay_options(env.observation_space),
     )
+    agent.set_logger(Logger(None, []))  # nothing is logged, and no folder left behind
     agent.learn(args.steps, callback=dyna)
     gate = dyna.apprentice.gate
     print(

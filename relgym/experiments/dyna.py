@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from time import perf_counter
+from time import process_time
 from typing import Any, Final
 
 import gymnasium as gym
@@ -43,9 +43,9 @@ class Run:
     solved_at
         Real steps after which success was seen twice in a row; none: never.
     seconds
-        Wall time, evaluations included.
+        Processor time of one core, evaluations included: what else a machine does doesn't count.
     learning_seconds, dreaming_seconds
-        Of it, time that the model took to foretell and learn, and to dream.
+        Wall time that the model took to foretell and learn, and to dream.
     trusted
         Share of the real steps at which the model was trusted.
     laws
@@ -176,9 +176,9 @@ def run(
                 heard(*curve[-1])
             return to_the_end or solved_at(curve) is None
 
-    started = perf_counter()
+    started = process_time()
     algorithm.learn(steps, callback=CallbackList([*([own] if own is not None else []), Check()]))
-    seconds = perf_counter() - started
+    seconds = process_time() - started
     if met is not None:
         met(algorithm, getattr(own, "world", None))
     learning, dreaming, laws = _costs(own)

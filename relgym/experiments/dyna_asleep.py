@@ -148,6 +148,9 @@ def _watched(env: gym.Env[Any, Any], config: DynaConfig, *, real: int, seed: int
 def _agent(dreams: Any, seed: int) -> Any:
     import torch
     from stable_baselines3 import SAC
+    from stable_baselines3.common.logger import Logger
 
     torch.set_num_threads(1)
-    return SAC("MlpPolicy", dreams, seed=seed, **_AGENT)
+    agent = SAC("MlpPolicy", dreams, seed=seed, **_AGENT)
+    agent.set_logger(Logger(None, []))  # one of Stable-Baselines3's own leaves an empty folder behind
+    return agent

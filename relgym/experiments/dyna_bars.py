@@ -34,8 +34,9 @@ _HEAD: Final = """# What dreaming is worth
 `python -m relgym.experiments.dyna_bars` wrote this page; nothing on it is typed by hand. Each section is a row of
 bars. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than five, no more were run (*of* in the
 tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250 real steps; *each* lists the real
-steps to it, the smallest first. *time* is wall time, tests included, on a machine with two cores that did other things
-too; *learning* and *dreaming* are parts of it. The [guide](../guides/dyna.md) says how it works."""
+steps to it, the smallest first. *time* is processor time, tests included (a run has one thread); *learning* and
+*dreaming* are wall time on a machine with two cores that did five other things too, and so may be longer. The
+[guide](../guides/dyna.md) says how it works."""
 
 
 def wanted(row: Row, *, seeds: int, arms: Sequence[str]) -> list[Task]:

@@ -27,7 +27,7 @@ NEED_SB3 = {
         "of 1 test episodes reach the goal",
     ),
     "dyna_truck.py": (
-        ["--steps", "400", "--warm_up", "390", "--episodes", "2"],
+        ["--steps", "400", "--warm_up", "390", "--burst", "20", "--episodes", "2"],
         "of 2 test episodes end on the goal after 400 real steps",
     ),
 }

@@ -116,7 +116,7 @@ def test_every_arm_runs(arm: str) -> None:
         testing=Examination(COURSES["truck"], episodes=3),
         heard=lambda at, good: heard.append((at, good)),
         agent={"learning_starts": 245, "batch_size": 16},
-        dyna={} if ARMS[arm].model == "none" else {"dreams": 8, "updates": 1},
+        dyna={} if ARMS[arm].model == "none" else {"dreams": 8, "updates": 1, "burst": 2},
     )
     assert found.curve == tuple(heard)
     assert [at for at, _ in heard] == [250]

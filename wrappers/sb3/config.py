@@ -33,6 +33,11 @@ class DynaConfig:
     updates, updates_alone
         Gradient steps per real step while the model is trusted, and while it isn't; the latter none: as many as
         the algorithm was made for.
+    burst
+        Gradient steps at once, in fresh dreams all the while, the first time that the model is trusted and the
+        algorithm's random steps are over; 0: none. A model of few objects is often exact long before real steps at
+        `updates` each have trained a policy: raising it trades computing for real steps. Should hold `updates` *
+        `every`, a round of dreams, many times.
     permute
         Whether dreams exchange the roles of objects of one type. The model licenses that, a net doesn't.
     redraw
@@ -58,6 +63,7 @@ class DynaConfig:
     capacity: int = 20_000
     updates: int = 20
     updates_alone: int | None = None
+    burst: int = 0
     permute: bool = True
     redraw: bool = True
     shuffle: int = 150
@@ -93,6 +99,7 @@ _LEAST = {
     "capacity": 1,
     "updates": 1,
     "updates_alone": 0,
+    "burst": 0,
     "shuffle": 0,
     "window": 1,
     "least": 1,

@@ -88,6 +88,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self._like = like
         self._rng = np.random.default_rng([self.config.seed, 0])
         self._dreamed_at = 0
+        self._made_up = False
         self._known = 0.0
         self._apprentice: Apprentice | None = None
         self._imagination: Imagination | None = None
@@ -125,6 +126,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
             self._dream()
         self.buffer.trusted = trusted
         self.model.gradient_steps = self._gradient_steps(trusted)
+        self._catch_up(trusted)
         self._log()
         return True
 
@@ -149,6 +151,16 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         if each is None:
             return self._usual
         return each * int(self.training_env.num_envs * self.model.train_freq.frequency)
+
+    def _catch_up(self, trusted: bool) -> None:
+        """Train at once, the first time that the model is trusted, as much as many real steps would have brought."""
+        if not trusted or self._made_up or self.num_timesteps <= self.model.learning_starts:
+            return
+        self._made_up = True
+        each = self.config.updates * self.config.every  # per round of dreams, as later on
+        for done in range(0, self.config.burst, each):
+            self._dream()
+            self.model.train(min(each, self.config.burst - done), batch_size=self.model.batch_size)
 
     def _dream(self) -> None:
         started = perf_counter()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig, ModelConfig
 from relgym.envs.tasks import Judgement
+from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import (
     ACTION,
@@ -26,9 +27,18 @@ from relgym.wrappers.sb3.acting import acting_all
 __all__ = ["Judge", "LearnedTask", "NeuralModel", "NeuralTask"]
 
 _NOW, _NEXT = "now", "next"
+_TOLD: Final = ("reward", "terminated")
+_RIGHT: Final = 1e-6  # how far a right verdict may be off
 
 _EXACT: Final = ModelConfig(frames="world", clustering=ClusteringConfig(min_examples=5))
 """What a task says is free of noise, and success is rare at first: five examples found a mode."""
+
+
+_REMEMBERED: Final = 1_000
+"""Of so many real steps, the latest, it is looked up which modes were right together."""
+
+_REVIEW: Final = 10
+"""Real steps between two such reviews while the modes stay the same ones: a review costs some milliseconds."""
 
 
 class Judge(Protocol):
@@ -66,6 +76,10 @@ class LearnedTask:
     Notes
     -----
     What depends on one among several objects of a type can't be learned so.
+
+    Policies seek out what a judge is wrong about. Reward and termination are learned apart, and the thresholds of
+    their clauses differ by a hair: in between, a bonus for an end would be paid without one, again and again. So
+    where the two modes never were right of one and the same real step, the judge doesn't know.
     """
 
     learned: Final = True
@@ -84,6 +98,9 @@ class LearnedTask:
         ]
         self._action = schema.type(ACTION).properties if ACTION in schema.order else ()
         self.model = WorldModel(self._small_schema(), config or _EXACT)
+        self._lessons: deque[NDArray[np.float64]] = deque(maxlen=_REMEMBERED)
+        self._together: set[tuple[int, int]] = set()
+        self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
 
     def _small_schema(self) -> SceneSchema:
         def named(pairs: list[tuple[str, str]]) -> tuple[str, ...]:
@@ -91,8 +108,8 @@ class LearnedTask:
 
         parts = {_NOW: named(self._now), _NEXT: named(self._next), ACTION: self._action}
         types = [ObjectType(name, properties) for name, properties in parts.items() if properties]
-        types.append(ObjectType(TASK, ("reward", "terminated")))
-        targets = (Target(TASK, "reward"), Target(TASK, "terminated"))
+        types.append(ObjectType(TASK, _TOLD))
+        targets = tuple(Target(TASK, prop) for prop in _TOLD)
         return SceneSchema(tuple(types), tuple((t.name, t.name) for t in types), targets=targets)
 
     def learn_step(self, transition: Transition, reward: float, *, terminated: bool) -> None:
@@ -108,6 +125,7 @@ class LearnedTask:
         small = self.model.schema.scene({**values, TASK: [0.0, 0.0]})
         said = {(TASK, "reward"): float(reward), (TASK, "terminated"): float(terminated)}
         self.model.learn_one(Transition(small, small.replace(said)))
+        self._lessons.append(small.replace(said).vector)
 
     def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
         """What the modes say; NaN where none does."""
@@ -117,10 +135,31 @@ class LearnedTask:
             vectors[:, small.slice(k)] = self._part(name, layout, before, actions, after)
         found = self.model.predict_batch(small, vectors)
         task = small.index(TASK)
-        known = found.ok if self.model.seen else np.zeros(len(before), dtype=bool)
+        known = found.ok & self._ever_together(found)
         rewards = np.where(known, found.vectors[:, small.column(task, "reward")], np.nan)
         ended = found.vectors[:, small.column(task, "terminated")] > 0.5
         return Judgement(rewards, ended & known, np.zeros(len(before), dtype=bool))
+
+    def _ever_together(self, found: BatchPrediction) -> NDArray[np.bool_]:
+        """Where reward and termination come from modes that were right of one and the same real step."""
+        seen, modes = self._reviewed
+        now = tuple(mode.id for prop in _TOLD for mode in self.model.modes(TASK, prop))
+        if self.model.seen >= seen + _REVIEW or now != modes:
+            self._reviewed, self._together = (self.model.seen, now), self._right_together()
+        return np.array([pair in self._together for pair in _pairs(found)], dtype=bool)
+
+    def _right_together(self) -> set[tuple[int, int]]:
+        """Modes of reward and termination that give what was said of some remembered step."""
+        if not self._lessons:
+            return set()
+        small = self.model.schema.layout()
+        said = np.stack(self._lessons)
+        columns = [small.column(small.index(TASK), prop) for prop in _TOLD]
+        asked = said.copy()
+        asked[:, columns] = 0.0
+        found = self.model.predict_batch(small, asked)
+        right = found.ok & (np.abs(found.vectors - said)[:, columns] <= _RIGHT).all(axis=1)
+        return {pair for pair, good in zip(_pairs(found), right.tolist(), strict=True) if good}
 
     def _part(
         self, name: str, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
@@ -134,6 +173,12 @@ class LearnedTask:
         pairs, vectors = (self._now, before) if name == _NOW else (self._next, after)
         found: NDArray[np.float64] = vectors[:, [layout.column(layout.index(o), prop) for o, prop in pairs]]
         return found
+
+
+def _pairs(found: BatchPrediction) -> list[tuple[int, int]]:
+    """The modes of reward and termination, scene by scene."""
+    reward, ended = (found.parts.index((TASK, prop)) for prop in _TOLD)
+    return list(zip(found.modes[:, reward].tolist(), found.modes[:, ended].tolist(), strict=True))
 
 
 class NeuralModel(Protocol):

@@ -226,6 +226,29 @@ def test_updates_are_counted_per_real_step() -> None:
     assert counts == [64, 24]
 
 
+def test_what_a_trusted_model_could_have_taught_is_made_up_for_once() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    world, counts = LineModel(), []
+    algorithm = agent("SAC", flat())
+    dyna = Dyna(world, DynaConfig(**QUICK, burst=30))
+    for off, steps in (
+        (0.0, 20),
+        (3.0, 30),
+        (0.0, 30),
+    ):  # right, as wrong as if the world had changed, right again
+        world.off = off
+        before = getattr(algorithm, "_n_updates", 0)
+        algorithm.learn(steps, callback=dyna, reset_num_timesteps=False)
+        counts.append((algorithm._n_updates - before, dyna.apprentice.gate.switches))
+    assert counts[0] == (10 * 2 + 30, 1)  # the first 10 steps are random
+    assert [switches for _, switches in counts] == [1, 2, 3]
+    assert counts[2][0] <= 30 * 2  # the gate opened again, and nothing was made up for
+    shut = agent("SAC", flat())
+    shut.learn(20, callback=Dyna(LineModel(off=1.0), DynaConfig(**QUICK, burst=30)))
+    assert shut._n_updates == 10
+
+
 def test_refusals_name_the_remedy() -> None:
     import stable_baselines3
 

@@ -57,6 +57,24 @@ def test_the_push_task_is_learned_from_what_it_says(rng: np.random.Generator) ->
     assert (said.terminated != [s.terminated for s in fresh])[known].mean() < 0.1
 
 
+def test_it_knows_no_verdict_whose_parts_never_went_together(rng: np.random.Generator) -> None:
+    steps = [*pushes(200, 0.0, rng), *pushes(400, 0.9, rng)]
+    judge = LearnedTask(steps[0].start.schema, MOVING)
+    for step in steps:
+        judge.learn_step(step.transition, step.reward, terminated=step.terminated)
+    # On the goal, slower and slower. Only a stop is paid for, and a stop is an end.
+    goal = steps[0].start.schema.type_of("goal")
+    start = steps[0].start.replace({("goal", "ahead"): 0.3, ("truck", "vx"): 0.2})
+    assert goal.properties == ("ahead",)
+    speeds = np.concatenate([np.linspace(0.0, 0.1, 2_001), [0.0]])
+    after = np.stack([start.replace({("truck", "vx"): v, ("goal", "ahead"): 0.3 - v}).vector for v in speeds])
+    before = np.tile(start.vector, (len(speeds), 1))
+    said = judge.judge(start.layout, before, np.zeros((len(speeds), 1)), after)
+    paid = np.nan_to_num(said.rewards) > 1.0
+    assert paid[0] and said.terminated[0]
+    assert (said.terminated[paid]).all()
+
+
 def test_it_says_nothing_before_it_was_told(rng: np.random.Generator) -> None:
     steps = pushes(5, 0.0, rng)
     judge = LearnedTask(steps[0].start.schema, MOVING)
