@@ -207,7 +207,8 @@ def _recent(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """The newest rows and a random choice of older ones, ascending."""
     if n <= SEARCH:
         return np.arange(n)
-    newest = np.arange(n - max(fresh, SEARCH // 2), n)
+    # Fresh ones may outnumber the rows: some of them have become a mode's tail in the meantime.
+    newest = np.arange(max(n - max(fresh, SEARCH // 2), 0), n)
     older = (
         rng.choice(newest[0], size=min(int(newest[0]), SEARCH // 2), replace=False)
         if newest[0]

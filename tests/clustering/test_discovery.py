@@ -102,3 +102,14 @@ def test_a_mode_among_the_noise_is_found_by_its_newest_example(rng: np.random.Ge
     assert found.size == 15
     assert found.fit.weights == pytest.approx((-0.8227241, -0.425), abs=1e-12)
     assert found.fit.intercept == pytest.approx(-0.000245, abs=1e-12)
+
+
+def test_fresh_rows_may_outnumber_those_left_to_search(rng: np.random.Generator) -> None:
+    # Of 900 rows that no search has seen some have become a mode's tail, and 600 are left.
+    x = rng.normal(size=(600, 3))
+    y = 2.0 * x[:, 0]
+    found = find_mode(
+        x, y, np.zeros(600, dtype=int), stages=(3,), fresh=900, scale=SCALE, config=CONFIG, rng=rng
+    )
+    assert found is not None
+    assert found.fit.weights == pytest.approx((2.0,), abs=1e-12)
