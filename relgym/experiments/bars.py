@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -16,7 +16,15 @@ from relgym.experiments.accuracy import AXES, Outcome, accuracy, ball_bars
 from relgym.experiments.bar import Measure, report
 from relgym.experiments.cost import query_bars, query_cost, step_bars, step_cost
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
-from relgym.experiments.noise import SIGMAS, VARIANCES, Sigma, best_sigmas, noise_bars, noise_outcomes
+from relgym.experiments.noise import (
+    SIGMAS,
+    VARIANCES,
+    NoiseOutcome,
+    Sigma,
+    best_sigmas,
+    noise_bars,
+    noise_outcomes,
+)
 from relgym.experiments.online import follow, last, learned
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.experiments.stream import box_then_ramp, prequential_bars, same_model, stream_bars
@@ -114,21 +122,23 @@ def _bystanders(request: Request) -> Section:
     return "truck-push, bystanders and 2, 3 and 4 boxes", bystander_bars(beside, counted), []
 
 
+def _heard(outcomes: Iterable[NoiseOutcome]) -> Iterator[NoiseOutcome]:
+    """Tell of each outcome as it comes: all of them take an hour."""
+    for each in outcomes:
+        told = f"variance {each.variance:g}, sigma {each.sigma}, seed {each.seed}: {dict(each.errors)}"
+        print(f"  {told}", flush=True)
+        yield each
+
+
 def _noise(request: Request) -> Section:
     # Noise larger than expected is known to teach nothing, at a high price: every step is searched in vain.
     hand = {variance: [sigma for sigma in SIGMAS if sigma >= variance**0.5] for variance in VARIANCES}
-    best = best_sigmas(noise_outcomes(training=TUNING_SEEDS[:1], test=TUNING_TEST_SEED, sigmas=hand))
+    best = best_sigmas(_heard(noise_outcomes(training=TUNING_SEEDS[:1], test=TUNING_TEST_SEED, sigmas=hand)))
     sigmas: dict[float, list[Sigma]] = {}
     for (variance, _), sigma in best.items():
         chosen = sigmas.setdefault(variance, ["auto"])
         chosen += [sigma] if sigma not in chosen else []
-    outcomes = []
-    for each in noise_outcomes(training=request.training, test=request.tests[0], sigmas=sigmas):
-        outcomes.append(each)
-        print(
-            f"  variance {each.variance:g}, sigma {each.sigma}, seed {each.seed}: {dict(each.errors)}",
-            flush=True,
-        )
+    outcomes = list(_heard(noise_outcomes(training=request.training, test=request.tests[0], sigmas=sigmas)))
     return "noise, experiment 1", noise_bars(outcomes, best), []
 
 
