@@ -47,7 +47,8 @@ class TableView:
         object that has just come. For envs whose next step depends on more than the table shows: what a driver is about
         to do shows in what he has just done.
     offsets
-        Whether clauses may test where other bodies' centres lie (`SceneSchema.offsets`). Default false.
+        Whether clauses may test gaps to other bodies and where their centres lie (`SceneSchema.offsets`). Default
+        false.
     actions, static, up, planar
         As of `NumbersView`.
 
