@@ -33,8 +33,8 @@ COUNTED = 64
 """A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels."""
 
 SIMPLE, WORDY = (1, 1, 4), 40
-"""Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so many
-examples: that a few small numbers add up to another one says little."""
+"""Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so
+many examples: that a few small numbers add up to another one says little."""
 
 CHANGES = 0.2
 """A column that changes between so large a share of successive rows is no constant of a scene."""

@@ -225,11 +225,6 @@ class Answers(ModeFunctions):
         if self.config.abstain and len(modes) > 1:
             waiting = ranking.seen.copy()
             verdict.outcomes[~waiting] = _OUTSIDE
-            for mode in np.unique(ranking.modes[~waiting, 0]):
-                binding = self._binding(situation.signature, int(mode))
-                if binding is not None and not binding.open:
-                    part = ~waiting & (ranking.modes[:, 0] == mode)
-                    verdict.values[part] = binding.values(x[part])[:, 0]
         for place in range(len(modes)):
             for mode in np.unique(ranking.modes[waiting, place]):
                 binding = self._binding(situation.signature, int(mode))
@@ -248,15 +243,32 @@ class Answers(ModeFunctions):
                 break
         self.limits.cut_off_all(verdict.values, verdict.modes)
         self.stops.apply(situation.signature, x, verdict.values, verdict.modes)
+        if self.config.abstain and len(modes) > 1:
+            self._lean(verdict, ranking.modes[:, 0], ~ranking.seen, situation.signature, x)
         return verdict
 
     def _leaning(self, mode: int, signature: SlotSignature, x: list[float]) -> Prediction:
-        """Outside experience: no claim, but the value is what the vote's winner says, if no role is open."""
+        """Outside experience: no claim, but the value that the vote's winner gives, if none of its roles is open."""
         binding = self._binding(signature, mode)
         if binding is None or binding.open:
             return Prediction("", "", float("nan"), Outcome.OUTSIDE)
         spread = self.spreads.of(mode, tuple(x[k] for k in action_columns(signature).tolist()))
         return Prediction("", "", binding.value(x), Outcome.OUTSIDE, spread=spread)
+
+    def _lean(
+        self,
+        verdict: Verdict,
+        winners: NDArray[np.int64],
+        outside: NDArray[np.bool_],
+        signature: SlotSignature,
+        x: NDArray[np.float64],
+    ) -> None:
+        """`_leaning` of all scenes that are outside experience, shape ``(n,)``."""
+        for mode in np.unique(winners[outside]):
+            binding = self._binding(signature, int(mode))
+            if binding is not None and not binding.open:
+                part = outside & (winners == mode)
+                verdict.values[part] = binding.values(x[part])[:, 0]
 
     def _stopped(self, found: Prediction, signature: SlotSignature, row: NDArray[np.float64]) -> Prediction:
         """The prediction, or the constant of a stop that it runs into."""

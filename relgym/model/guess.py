@@ -81,8 +81,8 @@ class Guesses:
     best
         The guess; None as long as none is needed, or none is better than that nothing changes.
     errors
-        What the modes' and the guess's predictions were off by lately: discounted means of squares, and of square roots,
-        which rare large errors hardly move, shape ``(2, 2)``.
+        What the modes' and the guess's predictions were off by lately: discounted means of squares, and of square
+        roots, which rare large errors hardly move, shape ``(2, 2)``.
     """
 
     def __init__(self) -> None:
@@ -144,9 +144,7 @@ class Guesses:
         return found
 
 
-def _alike(
-    clusterer: ModeClusterer, table: ExampleTable
-) -> tuple[NDArray[np.intp], SlotSignature]:
+def _alike(clusterer: ModeClusterer, table: ExampleTable) -> tuple[NDArray[np.intp], SlotSignature]:
     """Numbers of the examples whose own and bodiless columns are the newest one's, and its signature."""
     ids = table.signature_ids[clusterer.rows]
     slots = table.signatures[int(ids[-1])]
@@ -178,9 +176,7 @@ def _data(
     return slots.matrix(rows, order), clusterer.y[numbers] - present
 
 
-def _chosen(
-    x: NDArray[np.float64], change: NDArray[np.float64], cut: int
-) -> tuple[LinearFit | None, float]:
+def _chosen(x: NDArray[np.float64], change: NDArray[np.float64], cut: int) -> tuple[LinearFit | None, float]:
     """A function fitted to the first rows, of the smallest size that foretells the others well; what it leaves of them.
 
     None if it is no better to say that nothing changes.
@@ -222,4 +218,3 @@ def _fitted(
 
 def _size(left: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.square(left).mean()))
-

@@ -324,7 +324,9 @@ def _free(t: ObjectType) -> tuple[str, ...]:
 
 def _gaps(names: tuple[str, ...]) -> list[int]:
     """Columns of the contact features that are told of all pairs where offsets are asked for, touching or not."""
-    return [k for k, name in enumerate(names) if name in ("distance", "approach") or name.startswith("offset-")]
+    return [
+        k for k, name in enumerate(names) if name in ("distance", "approach") or name.startswith("offset-")
+    ]
 
 
 def _approached(approach: NDArray[np.float64], body: int) -> NDArray[np.bool_]:
