@@ -155,9 +155,8 @@ def test_the_command_measures_pong(tmp_path: Path, capsys: pytest.CaptureFixture
     for name, seed in (("", 0), ("-test", 5)):
         recording = played(400, seed)
         before, after = recording.before.copy(), recording.after.copy()
-        turned = np.where(
-            np.arange(401) // 20 % 2, 1.0, -1.0
-        )  # every twenty frames, whatever it is that does it
+        # Every twenty frames, whatever it is that does it.
+        turned = np.where(np.arange(401) // 20 % 2, 1.0, -1.0)
         before[:, 1, 5], after[:, 1, 5] = turned[:-1], turned[1:]
         changed = replace(recording, before=before, after=after)
         changed.save(tmp_path / f"pong{name}-{TUNING_SEEDS[0]}.npz")
