@@ -32,6 +32,9 @@ WIDE = 40
 COUNTED = 64
 """A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels."""
 
+RECENT = 4_096
+"""So many examples show whether a target counts something."""
+
 SIMPLE, WORDY = (1, 1, 4), 40
 """Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so
 many examples: that a few small numbers add up to another one says little."""
@@ -74,8 +77,8 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
 
 
 def counts(y: NDArray[np.float64], scale: Scale) -> bool:
-    """Whether values are few whole multiples of one step, so that another one that fits says little."""
-    values = np.unique(y)
+    """Whether a target's latest values are few whole multiples of one step, so that another that fits says little."""
+    values = np.unique(y[-RECENT:])
     if not 3 <= len(values) <= COUNTED:
         return False
     steps = np.diff(values)
