@@ -13,7 +13,13 @@ from relgym.clustering.population import Population
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit
 
-__all__ = ["LastResort", "last_resort"]
+__all__ = ["LastResort", "last_resort", "timely"]
+
+APPROXIMATE_AT = (256, 1024, 4096, 16384)
+"""Numbers of examples after which an approximation is sought, if most of them are unexplained."""
+
+OFTENER_AT = (512, 1536, 2048, 3072, 6144, 8192, 12288)
+"""Among features also after these, since more examples choose better among many."""
 
 MOST_ROWS = 1500
 """At most so many rows, the newest, determine an approximation."""
@@ -29,6 +35,11 @@ class LastResort:
     signature: int
     fit: LinearFit
     sigma: float
+
+
+def timely(seen: int, *, features: bool) -> bool:
+    """Whether it is time to look for an approximation, among features or without, after so many examples."""
+    return seen in APPROXIMATE_AT or (features and seen in OFTENER_AT)
 
 
 def last_resort(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from points import learned, schema_of, transitions
 
-from relgym.clustering.last_resort import last_resort
+from relgym.clustering.last_resort import last_resort, timely
 from relgym.model.world_model import WorldModel
 
 SHIP = schema_of(("v", "th"), ("fire",))
@@ -36,6 +36,14 @@ def test_an_engine_that_fires_as_it_likes_is_described_by_what_it_does_on_averag
 
 def test_it_is_only_sought_among_features_that_were_asked_for() -> None:
     assert not fly(300, 0).property_model("self", "v").clusterer.approximate
+
+
+def test_it_is_sought_oftener_among_features() -> None:
+    times = {
+        features: [n for n in range(5_000) if timely(n, features=features)] for features in (False, True)
+    }
+    assert times[False] == [256, 1024, 4096]
+    assert times[True] == [256, 512, 1024, 1536, 2048, 3072, 4096]
 
 
 def test_an_approximation_gives_way_to_a_better_one_only() -> None:
