@@ -47,7 +47,8 @@ class TableView:
         object that has just come. For envs whose next step depends on more than the table shows: what a driver is about
         to do shows in what he has just done.
     offsets
-        Whether clauses may test where other bodies' centres lie (`SceneSchema.offsets`). Default false.
+        Whether clauses may test gaps to other bodies and where their centres lie (`SceneSchema.offsets`). Default
+        false.
     actions, static, up, planar
         As of `NumbersView`.
 
@@ -122,9 +123,7 @@ class TableView:
         identifiers("names of the objects", [name for name, _ in objects], len(objects))
         types = (*merged([*kinds, *fixed]), self._acts.type)
         everything = (*objects, (ACTION, ACTION))
-        return SceneSchema(
-            types, everything, up=self._axes[0], planar=self._axes[1], offsets=self._offsets
-        )
+        return SceneSchema(types, everything, up=self._axes[0], planar=self._axes[1], offsets=self._offsets)
 
     def _kind(self, part: Rows) -> ObjectType:
         return ObjectType(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -15,6 +16,7 @@ import numpy as np
 from gymnasium import spaces
 from ocatari.core import OCAtari
 
+from relgym.experiments.recording import record
 from relgym.scene.shapes import Box
 from relgym.wrappers import ModelLearner, Rows, Static, TableView
 
@@ -30,8 +32,12 @@ class Args:
 
     steps: int = 16000
     """transitions to learn from, frameskip 1"""
+    test: int = 8000
+    """transitions of fresh games to record for testing"""
     seed: int = 0
-    """seed of episodes and actions"""
+    """seed of episodes and actions; games to test on begin 10,000 later"""
+    record: str = ""
+    """a folder: only write what happens to files there, for `python -m relgym.experiments.any_env_tables`"""
 
 
 class PongTable(gym.Env[Any, Any]):
@@ -85,7 +91,7 @@ class PongTable(gym.Env[Any, Any]):
         return table
 
 
-def learner_of(env: PongTable) -> ModelLearner:
+def view_of(env: PongTable) -> TableView:
     """Rows are bodies; the walls, which the list doesn't show, are added."""
     body: dict[str, Any] = {
         "shape": Box(),
@@ -96,7 +102,7 @@ def learner_of(env: PongTable) -> ModelLearner:
         Static(name, {"px": 80.0, "py": HEIGHT - y, "sx": 400.0, "sy": 20.0}, type="wall", shape=Box())
         for name, y in (("ceiling", TOP - 10.0), ("floor", BOTTOM + 10.0))
     ]
-    view = TableView(
+    return TableView(
         env.observation_space,
         env.action_space,
         columns=COLUMNS,
@@ -105,7 +111,11 @@ def learner_of(env: PongTable) -> ModelLearner:
         static=walls,
         offsets=True,  # a paddle turns the ball by where it is hit
     )
-    return ModelLearner(env, view=view, targets=["ball.dx", "ball.dy"])
+
+
+def learner_of(env: PongTable) -> ModelLearner:
+    """Predicted are the ball's displacements per frame."""
+    return ModelLearner(env, view=view_of(env), targets=["ball.dx", "ball.dy"])
 
 
 def tracking(table: Any, rng: np.random.Generator) -> int:
@@ -125,8 +135,18 @@ def kind_of(before: Any, after: Any) -> str:
     return "flight" if (before["dx"], before["dy"]) == (after["dx"], after["dy"]) else "other change"
 
 
+def write(folder: Path, args: Args) -> None:
+    """Record as many steps of the tracking policy as are learned from and tested on."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, steps, seed in (("", args.steps, args.seed), ("-test", args.test, args.seed + 10_000)):
+        env = PongTable()
+        record(env, view_of(env), tracking, steps, seed).save(folder / f"pong{name}-{args.seed}.npz")
+
+
 def main(args: Args) -> None:
     """Learn while playing; print how often predictions were exact, by what happened, and the laws."""
+    if args.record:
+        return write(Path(args.record), args)
     env = learner_of(PongTable())
     rng = np.random.default_rng(args.seed)
     seen: Counter[str] = Counter()

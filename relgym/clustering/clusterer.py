@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.assignments import AssignmentLog
-from relgym.clustering.discovery import find_mode, least_examples
+from relgym.clustering.discovery import counts, find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.extension import extended
@@ -31,6 +31,9 @@ ESTIMATE_AT = (64, 512, 4096)
 
 HOPELESS = 200
 """Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
+
+RECENT = 4_096
+"""So many examples show whether a target counts something."""
 
 LEAST_MEMBERS = 4
 """Examples that a mode of another model must explain here to be taken over."""
@@ -294,6 +297,7 @@ class ModeClusterer(Population):
             config=self.config,
             rng=self._rng,
             needed=self._needed,
+            counting=counts(self.y[-RECENT:], self.scale),
         )
         if found is None:
             return False

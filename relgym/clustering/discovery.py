@@ -33,8 +33,8 @@ COUNTED = 64
 """A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels."""
 
 SIMPLE, WORDY = (1, 1, 4), 40
-"""Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so many
-examples: that a few small numbers add up to another one says little."""
+"""Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so
+many examples: that a few small numbers add up to another one says little."""
 
 CHANGES = 0.2
 """A column that changes between so large a share of successive rows is no constant of a scene."""
@@ -94,6 +94,7 @@ def find_mode(
     config: ClusteringConfig,
     rng: np.random.Generator,
     needed: int | None = None,
+    counting: bool = False,
 ) -> Consensus | None:
     """Search rows of one slot signature for a function that enough of them obey.
 
@@ -108,10 +109,12 @@ def find_mode(
         Number of rows at the end that no earlier search has seen: each sample holds one of them.
     needed
         Examples that found a mode; default: `least_examples` of these responses.
+    counting
+        Whether the target counts something (`counts`).
     """
     needed = least_examples(y, scale, config) if needed is None else needed
     rows = _recent(len(y), fresh, rng)
-    simple = [SIMPLE] if counts(y, scale) else []
+    simple = [SIMPLE] if counting else []
     for number, (columns, terms, size) in enumerate([*simple, *plans(stages, config)]):
         if simple and number:
             needed = max(needed, WORDY)

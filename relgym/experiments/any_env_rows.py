@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 
@@ -18,18 +19,19 @@ from relgym.config import ModelConfig
 from relgym.envs.views import TableView
 from relgym.experiments.recording import Recording
 from relgym.model.prediction import ScenePrediction
+from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Target, Transition
 from relgym.wrappers.follower import Follower
 from relgym.wrappers.study import Study
 
-__all__ = ["BATCH", "ONLINE", "Rows", "live", "rivals", "size"]
+__all__ = ["ONLINE", "Rows", "live", "rivals", "size", "stream"]
 
-ONLINE = ("constant velocity", "rls", "hoeffding", "amrules")
+ONLINE = ("persistence", "constant velocity", "rls", "hoeffding", "amrules")
 """Online baselines by name."""
 
-BATCH = ("tree", "forest", "MLP ensemble")
-"""Baselines that are fitted once, to the first half."""
+
+_COLUMNS = ("step", "now", "seen", "last", "change", "said", "sure", "ended")
 
 
 @dataclass
@@ -42,6 +44,8 @@ class Rows:
         Names of what is predicted.
     step
         Number of the step, shape ``(n,)``.
+    now
+        What the properties were, shape ``(n, m)``.
     seen
         What other learners are shown: the object's numbers, those of every object that is alone of its kind (with
         whether it is there), and the action's; shape ``(n, d)``.
@@ -58,6 +62,7 @@ class Rows:
 
     properties: tuple[str, ...]
     step: list[int] = field(default_factory=list)
+    now: list[NDArray[np.float64]] = field(default_factory=list)
     seen: list[NDArray[np.float64]] = field(default_factory=list)
     last: list[NDArray[np.float64]] = field(default_factory=list)
     change: list[NDArray[np.float64]] = field(default_factory=list)
@@ -67,8 +72,12 @@ class Rows:
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """All of it as arrays."""
-        names = ("step", "seen", "last", "change", "said", "sure", "ended")
-        return {name: np.array(getattr(self, name)) for name in names}
+        return {name: np.array(getattr(self, name)) for name in _COLUMNS}
+
+    def until(self, step: int) -> Rows:
+        """The rows of the steps before this one."""
+        count = bisect_left(self.step, step)
+        return Rows(self.properties, *(getattr(self, name)[:count] for name in _COLUMNS))
 
 
 def live(
@@ -142,6 +151,7 @@ def _note(
         now = np.array([before[name][p] for p in found.properties])
         parts = [prediction[name, p] for p in found.properties]
         found.step.append(number)
+        found.now.append(now)
         found.seen.append(np.concatenate([before[name].values, others]))
         found.last.append(_last_change(found, earlier, name, now))
         found.change.append(np.array([after[name][p] for p in found.properties]) - now)
@@ -154,7 +164,8 @@ def _last_change(
     found: Rows, earlier: Scene | None, name: str, now: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     if earlier is not None and name in earlier:
-        return now - np.array([earlier[name][p] for p in found.properties])
+        last: NDArray[np.float64] = now - np.array([earlier[name][p] for p in found.properties])
+        return last
     return found.last[-1] if found.last else np.zeros(len(now))
 
 
@@ -173,8 +184,8 @@ def rivals(columns: dict[str, NDArray[np.float64]], *, batch: bool) -> dict[str,
     """What other learners say of the same rows, the batch learners fitted to the first half; shape ``(n, m)`` each."""
     seen, change = columns["seen"], columns["change"]
     half, rng = len(seen) // 2, np.random.default_rng(0)
-    found = {"constant velocity": columns["last"]}
-    for name in ONLINE[1:] if find_spec("river") else ONLINE[1:2]:
+    found = {"persistence": np.zeros_like(change), "constant velocity": columns["last"]}
+    for name in ONLINE[2:] if find_spec("river") else ONLINE[2:3]:
         learner = make_regressor(name, columns=Columns(tuple(range(change.shape[1]))), rng=rng)
         found[name] = _along(learner, seen, change)
     for name, learner in _batch(half, rng).items() if batch else ():
@@ -187,9 +198,7 @@ def rivals(columns: dict[str, NDArray[np.float64]], *, batch: bool) -> dict[str,
     return found
 
 
-def _along(
-    learner: Regressor, seen: NDArray[np.float64], change: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _along(learner: Regressor, seen: NDArray[np.float64], change: NDArray[np.float64]) -> NDArray[np.float64]:
     found = np.zeros_like(change)
     learner.learn_one(seen[0], change[0])
     for k in range(1, len(seen)):
@@ -223,3 +232,33 @@ def size(
     error = np.sqrt(np.square(guess[keep] - change[keep]).mean(axis=0))
     found: NDArray[np.float64] = error / np.maximum(change[keep].std(axis=0), 1e-12)
     return found
+
+
+def stream(name: str, rows: Rows, *, verbose: bool, batch: bool) -> Iterator[tuple[str, float]]:
+    """How the model compares with the best online baseline in the second half of the stream, property by property.
+
+    Parameters
+    ----------
+    name
+        Of the type of object, for people.
+    rows
+        What happened, and what the model said.
+    verbose
+        Whether to print a table of all learners.
+    batch
+        Whether that lists learners which are fitted once.
+    """
+    columns = rows.columns()
+    late = np.arange(len(columns["step"])) >= len(columns["step"]) // 2
+    kinds = {"all steps": late, "the episode goes on": late & ~columns["ended"].astype(bool)}
+    said = {"relgym": columns["said"]} | rivals(columns, batch=batch)
+    lines: list[list[Cell]] = []
+    for kind, keep in kinds.items():
+        sizes = {who: size(guess, columns["change"], keep) for who, guess in said.items()}
+        for k, prop in enumerate(rows.properties):
+            lines.append([f"{name}.{prop}, {kind}", *(f"{s[k]:.3g}" for s in sizes.values())])
+            best = min(float(s[k]) for who, s in sizes.items() if who in ONLINE)
+            what = f"{name}.{prop}, prequential, {kind}, over the best online baseline"
+            yield what, float(sizes["relgym"][k]) / best
+    if verbose:
+        print(table(["nRMSE-d", *said], lines), "\n", flush=True)

@@ -83,7 +83,7 @@ class Recording:
         """Write one compressed file of arrays; nothing in it is ever evaluated."""
         view = np.frombuffer(json.dumps(self.view.to_json()).encode(), np.uint8)
         names = ("before", "actions", "after", "terminated", "truncated")
-        arrays: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in names}
         np.savez_compressed(path, view=view, **arrays)
 
     @classmethod

@@ -28,6 +28,9 @@ from relgym.model.stops import Stops
 
 __all__ = ["Answers"]
 
+ROUGH = 4.0
+"""So many times the rounding noise can't be rounding."""
+
 _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
     OUTCOMES.index(o)
     for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
@@ -86,8 +89,13 @@ class Answers(ModeFunctions):
 
     @property
     def guess(self) -> Guess | None:
-        """The best guess, where it stands in for what isn't explained: nothing is, or hardly more than nearly."""
-        return self.guesses.best if self._unexplained or self.clusterer.approximate else None
+        """The best guess, where it stands in for what isn't explained: nothing is, or nothing exactly."""
+        return self.guesses.best if self._unexplained or self.inexact else None
+
+    @property
+    def inexact(self) -> bool:
+        """Whether modes are approximations, or leave more than rounding explains."""
+        return self.clusterer.approximate or self.clusterer.scale.sigma > ROUGH * self.clusterer.floor
 
     @property
     def _lost(self) -> bool:
@@ -101,18 +109,21 @@ class Answers(ModeFunctions):
 
         Arguments as of `predict_batch`.
         """
-        best, signature = self.guess, percept.situation(index).signature
-        if best is None:
-            return None
-        key = (id(signature), NOISE)
-        known = self._bindings.get(key)
-        if known is None or known[0] is not best.mode:
-            known = self._bindings[key] = (best.mode, bind(best.mode, signature))
-        binding = known[1]
-        if binding is None or binding.open:
+        binding = self._guessing(percept.situation(index).signature)
+        if binding is None:
             return None
         found: NDArray[np.float64] = binding.values(percept.rows(index, following, ordered=False))[:, 0]
         return found
+
+    def _guessing(self, signature: SlotSignature) -> Binding | None:
+        """The best guess over a signature's columns."""
+        best, key = self.guess, (id(signature), NOISE)
+        if best is None:
+            return None
+        known = self._bindings.get(key)
+        if known is None or known[0] is not best.mode:
+            known = self._bindings[key] = (best.mode, bind(best.mode, signature))
+        return None if known[1] is None or known[1].open else known[1]
 
     def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
         """What every mode would predict, in the order of ``classifier.modes``; NaN where its roles are open.
@@ -161,7 +172,7 @@ class Answers(ModeFunctions):
             example, self._values_one(situation.signature, x, self.classifier.modes)
         )
         if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
-            return replace(nothing, outcome=Outcome.OUTSIDE)
+            return self._leaning(ranking.modes[0], situation.signature, x)
         layout, order = percept.layout, situation.order[0] if casts else situation.plain
         for place, mode in enumerate(ranking.modes):
             binding = self._binding(situation.signature, mode)
@@ -232,7 +243,32 @@ class Answers(ModeFunctions):
                 break
         self.limits.cut_off_all(verdict.values, verdict.modes)
         self.stops.apply(situation.signature, x, verdict.values, verdict.modes)
+        if self.config.abstain and len(modes) > 1:
+            self._lean(verdict, ranking.modes[:, 0], ~ranking.seen, situation.signature, x)
         return verdict
+
+    def _leaning(self, mode: int, signature: SlotSignature, x: list[float]) -> Prediction:
+        """Outside experience: no claim, but the value that the vote's winner gives, if none of its roles is open."""
+        binding = self._binding(signature, mode)
+        if binding is None or binding.open:
+            return Prediction("", "", float("nan"), Outcome.OUTSIDE)
+        spread = self.spreads.of(mode, tuple(x[k] for k in action_columns(signature).tolist()))
+        return Prediction("", "", binding.value(x), Outcome.OUTSIDE, spread=spread)
+
+    def _lean(
+        self,
+        verdict: Verdict,
+        winners: NDArray[np.int64],
+        outside: NDArray[np.bool_],
+        signature: SlotSignature,
+        x: NDArray[np.float64],
+    ) -> None:
+        """`_leaning` of all scenes that are outside experience, shape ``(n,)``."""
+        for mode in np.unique(winners[outside]):
+            binding = self._binding(signature, int(mode))
+            if binding is not None and not binding.open:
+                part = outside & (winners == mode)
+                verdict.values[part] = binding.values(x[part])[:, 0]
 
     def _stopped(self, found: Prediction, signature: SlotSignature, row: NDArray[np.float64]) -> Prediction:
         """The prediction, or the constant of a stop that it runs into."""

@@ -44,9 +44,12 @@ HELD_OUT = 1.0 / 3.0
 WORSE = 1.01
 """A smaller function may be worse by this factor than the best."""
 
-TYPICAL = 2.0
-"""A guess whose median error is larger by more than this factor doesn't replace an approximation: rare large errors must
-not decide over what is mostly right."""
+TYPICAL = 1.5
+"""A guess whose typical error (its mean root) is larger by more than this factor doesn't replace an approximation: rare
+large errors must not decide over what is mostly right."""
+
+MEMORY = 300.0
+"""Over about so many examples errors are averaged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,14 +80,26 @@ class Guesses:
     ----------
     best
         The guess; None as long as none is needed, or none is better than that nothing changes.
-    superior
-        Whether it is better in root mean square than the approximation that there is, and not much worse in the median.
+    errors
+        What the modes' and the guess's predictions were off by lately: discounted means of squares, and of square
+        roots, which rare large errors hardly move, shape ``(2, 2)``.
     """
 
     def __init__(self) -> None:
         self.best: Guess | None = None
-        self.superior = False
+        self.errors = np.zeros((2, 2))
         self._due = LEAST
+
+    @property
+    def superior(self) -> bool:
+        """Whether the guess is better than what modes say, in root mean square, and mostly not much worse."""
+        (modes, typical_modes), (own, typical) = self.errors.tolist()
+        return self.best is not None and own < modes and typical <= TYPICAL * typical_modes
+
+    def compare(self, modes: float, own: float) -> None:
+        """Take in by how much the modes' prediction and the guess, made before the outcome was learned, were off."""
+        off = np.abs([modes, own])
+        self.errors += (np.column_stack([np.square(off), np.sqrt(off)]) - self.errors) / MEMORY
 
     def stale(self, seen: int) -> bool:
         """Whether a new guess is due after so many examples."""
@@ -107,17 +122,16 @@ class Guesses:
         cut = len(some) - int(HELD_OUT * len(some))
         chosen, left = _chosen(x, change, cut)
         if chosen is None:
-            self.best, self.superior = None, False
+            self.best = None
             return x.size
         mode = _fitted(clusterer, table, slots, order, _spread(numbers, FITTED), chosen.columns)
         self.best = Guess(mode, left)
-        self.superior = _superior(clusterer, table, some[cut:], change[cut:] - chosen.predict(x[cut:]))
         return int(x.size)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
         best = None if self.best is None else [self.best.mode.to_json(), self.best.left]
-        return {"best": best, "superior": self.superior, "due": self._due}
+        return {"best": best, "errors": self.errors.tolist(), "due": self._due}
 
     @classmethod
     def from_json(cls, target: Target, data: dict[str, Any]) -> Guesses:
@@ -126,13 +140,11 @@ class Guesses:
         if data:
             best = data["best"]
             found.best = None if best is None else Guess(Mode.from_json(target, best[0]), float(best[1]))
-            found.superior, found._due = bool(data["superior"]), int(data["due"])
+            found.errors, found._due = np.array(data["errors"], dtype=np.float64), int(data["due"])
         return found
 
 
-def _alike(
-    clusterer: ModeClusterer, table: ExampleTable
-) -> tuple[NDArray[np.intp], SlotSignature]:
+def _alike(clusterer: ModeClusterer, table: ExampleTable) -> tuple[NDArray[np.intp], SlotSignature]:
     """Numbers of the examples whose own and bodiless columns are the newest one's, and its signature."""
     ids = table.signature_ids[clusterer.rows]
     slots = table.signatures[int(ids[-1])]
@@ -164,9 +176,7 @@ def _data(
     return slots.matrix(rows, order), clusterer.y[numbers] - present
 
 
-def _chosen(
-    x: NDArray[np.float64], change: NDArray[np.float64], cut: int
-) -> tuple[LinearFit | None, float]:
+def _chosen(x: NDArray[np.float64], change: NDArray[np.float64], cut: int) -> tuple[LinearFit | None, float]:
     """A function fitted to the first rows, of the smallest size that foretells the others well; what it leaves of them.
 
     None if it is no better to say that nothing changes.
@@ -206,19 +216,5 @@ def _fitted(
     return Mode(NOISE, clusterer.target, roles, fit.intercept, sigma=sigma)
 
 
-def _superior(
-    clusterer: ModeClusterer, table: ExampleTable, numbers: NDArray[np.intp], left: NDArray[np.float64]
-) -> bool:
-    """Whether residuals are smaller than those of the modes there are, whichever of them is taken."""
-    rows, y = clusterer.rows[numbers], clusterer.y[numbers]
-    errors = [c.errors(table, rows, y, clusterer.scale)[0] for c in clusterer.clusters.values()]
-    if not errors:
-        return True
-    theirs = np.min(errors, axis=0)
-    typical = float(np.median(np.abs(left)))
-    return bool(_size(left) < _size(theirs) and typical <= TYPICAL * float(np.median(theirs)))
-
-
 def _size(left: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.square(left).mean()))
-

@@ -74,7 +74,9 @@ def finish(parts: Parts) -> int:
     for target in parts.targets:
         parts.models[target].search(parts.tables[target.type])
     spoken = [t for t in parts.targets if not parts.governs(t)]
-    return sum(parts.models[t].refresh(None) + parts.models[t].reconsider(parts.tables[t.type]) for t in spoken)
+    return sum(
+        parts.models[t].refresh(None) + parts.models[t].reconsider(parts.tables[t.type]) for t in spoken
+    )
 
 
 def _learn_object(

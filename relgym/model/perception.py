@@ -130,6 +130,8 @@ class Perception:
         self.libraries = {t.name: library_of(features, t.name, t.angles) for t in schema.types}
         self.extractor = Extractor(schema, geometry=geometry)
         self._contact_names = self.extractor.features
+        self.approach = self._contact_names.index("approach")
+        self.gaps = _gaps(self._contact_names) if schema.offsets else []
         self._pair_names = tuple(sorted({p for t in schema.types if t.has_body for p in _free(t)}))
         self._unary_names = self.extractor.unary_names
         self._forget()
@@ -276,19 +278,22 @@ class Percept:
         own = padded[:, perception.own_columns(self.layout, target)]
         numbers = padded[:, perception.feature_columns(self.layout)]
         contacts = relations.contacts(body)
+        gaps = contacts[..., perception.gaps].copy()
+        at = perception.approach
         # Contact facts are facts of touching pairs (design §4): a normal towards something far says nothing.
         contacts[~relations.touched(body)] = np.nan
-        parting = contacts[..., -2] > APPROACH_EPS
+        parting = contacts[..., at] > APPROACH_EPS
         # Where bodies part, the contact does nothing any more, whichever way it faces: only that they part is said.
-        contacts[parting, :-2] = contacts[parting, -1] = np.nan
-        pair = np.concatenate([contacts, numbers], axis=2)
-        pair[:, body] = np.nan
+        contacts[parting, :at] = contacts[parting, at + 1] = np.nan
         table = perception.unary_table(self.layout)
         every = np.broadcast_to(table, (n, *table.shape))
         nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
         close, struck = relations.context(body), None
         if perception.parting:
-            close, struck = _without(close, parting), _approached(contacts[..., -2], body)
+            close, struck = _without(close, parting), _approached(contacts[..., at], body)
+        contacts[..., perception.gaps] = gaps
+        pair = np.concatenate([contacts, numbers], axis=2)
+        pair[:, body] = np.nan
         return ExampleBatch(nothing, every, close, pair, own, body, struck)
 
     def _bodiless(self, target: int) -> ExampleBatch:
@@ -315,6 +320,13 @@ def _free(t: ObjectType) -> tuple[str, ...]:
     """Properties that are no pose component: those that may be compared with thresholds (R2)."""
     pose = {k for k in t.pose_columns() if k >= 0} if t.has_body else set()
     return tuple(p for k, p in enumerate(t.properties) if k not in pose)
+
+
+def _gaps(names: tuple[str, ...]) -> list[int]:
+    """Columns of the contact features that are told of all pairs where offsets are asked for, touching or not."""
+    return [
+        k for k, name in enumerate(names) if name in ("distance", "approach") or name.startswith("offset-")
+    ]
 
 
 def _approached(approach: NDArray[np.float64], body: int) -> NDArray[np.bool_]:

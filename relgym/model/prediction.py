@@ -19,8 +19,8 @@ class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
     Only `PREDICTED` is a mode's word. With every other outcome the value is a stopgap, not a claim: what is unexplained
-    is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes; else the property keeps
-    its value.
+    is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes; outside experience it is
+    what the mode says that would win the vote; else the property keeps its value.
     """
 
     PREDICTED = "predicted by a mode"
@@ -60,7 +60,8 @@ class Prediction:
         (`relgym.laws.frames`), and then the roles are the target and all that it touches.
     spread
         Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
-        among a few) left, in units of the property; of a guess what it left; NaN where the property keeps its value.
+        among a few) left, in units of the property; of a stopgap what it left there; NaN where the property keeps its
+        value.
     """
 
     object: str
@@ -80,7 +81,7 @@ class Prediction:
 
     @builtins.property
     def informed(self) -> bool:
-        """Whether a mode predicted it, or a guess was made."""
+        """Whether a mode predicted it, or the stopgap is more than that nothing changes."""
         return self.ok or not math.isnan(self.spread)
 
 

@@ -112,6 +112,7 @@ class PropertyModel(Answers):
         turn
             Leave for a dear search; default: given.
         """
+        self._compare(situation, example, table.x[row], y)
         report = self.clusterer.learn_one(table, row, y, turn)
         self._unexplained = self._judge()
         if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
@@ -131,6 +132,19 @@ class PropertyModel(Answers):
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
         return report
+
+    def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
+        """Let the guess and the modes foretell an example before it is learned from."""
+        binding = self._guessing(situation.signature)
+        if binding is None or self._unexplained or not self.classifier.modes:
+            return
+        row = x[: len(situation.signature.columns)].tolist()
+        values = self._values_one(situation.signature, row, self.classifier.modes)
+        own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])
+        first = self.classifier.rank(replace(example, own=own), values).modes[0]
+        said = values[self.classifier.modes.index(first)]
+        if np.isfinite(said):
+            self.guesses.compare(said - y, binding.value(row) - y)
 
     @property
     def base_features(self) -> int:
@@ -180,7 +194,7 @@ class PropertyModel(Answers):
 
     def reconsider(self, table: ExampleTable) -> int:
         """Guess anew where nothing is explained and it is time; returns the work spent."""
-        wanted = self._unexplained or self.clusterer.approximate
+        wanted = self._unexplained or self.inexact
         if not wanted or not self.guesses.stale(self.clusterer.seen):
             return 0
         return self.guesses.renew(self.clusterer, table)

@@ -85,13 +85,15 @@ def predict_many(
             for pair in parts.models[target].needs if lost else ():
                 verdict.values[lost.get(pair, nowhere)] = np.nan
                 verdict.outcomes[lost.get(pair, nowhere)] = _DEPENDS
-            known = np.isfinite(verdict.values)
-            guessed = None if known.all() else parts.models[target].guessed(percept, index, following)
+            told = np.isfinite(verdict.values)
+            known = told & (verdict.outcomes == _PREDICTED)
+            column = layout.column(index, target.property)
+            guessed = None if told.all() else parts.models[target].guessed(percept, index, following)
             if guessed is not None:
-                told = ~known & np.isfinite(guessed)
-                following[told, layout.column(index, target.property)] = guessed[told]
-            following[known, layout.column(index, target.property)] = verdict.values[known]
-            verdict.outcomes[~known & (verdict.outcomes == _PREDICTED)] = _OUTSIDE
+                rest = ~told & np.isfinite(guessed)
+                following[rest, column] = guessed[rest]
+            following[told, column] = verdict.values[told]
+            verdict.outcomes[~told & (verdict.outcomes == _PREDICTED)] = _OUTSIDE
             verdict.modes[~known] = 0
             key = (target.type, target.property)
             lost[key] = lost.get(key, nowhere) | ~known

@@ -62,8 +62,9 @@ class SceneSchema:
         ``(property, low, high)``: the physical range that [-1, 1] of each component of the env's action
         stands for.
     offsets
-        Whether clauses may test where another body's centre lies, along the world's axes, beside distance and normal: a
-        paddle turns a ball by where it is hit.
+        Whether clauses may test gaps: where another body's centre lies along the world's axes, how far away it is and
+        how fast the two approach, touching or not. Default: contacts only, and of these no offset. A paddle turns a
+        ball by where it is hit.
     """
 
     types: tuple[ObjectType, ...]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.clustering.discovery import Scale, find_mode, identified, least_examples, plans
+from relgym.clustering.discovery import Scale, counts, find_mode, identified, least_examples, plans
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, least_squares
@@ -102,3 +102,24 @@ def test_a_mode_among_the_noise_is_found_by_its_newest_example(rng: np.random.Ge
     assert found.size == 15
     assert found.fit.weights == pytest.approx((-0.8227241, -0.425), abs=1e-12)
     assert found.fit.intercept == pytest.approx(-0.000245, abs=1e-12)
+
+
+def test_few_multiples_of_one_step_are_counted() -> None:
+    assert counts(np.array([0.0, 2.0, -1.0, 0.0]), SCALE)
+    assert counts(np.array([0.25, 1.0, 0.5]), SCALE)
+    assert not counts(np.array([0.0, 1.0, 0.0]), SCALE)  # either or
+    assert not counts(np.array([0.0, 1.0, 1.5, 2.1]), SCALE)
+    assert not counts(np.arange(100.0), SCALE)
+
+
+def test_of_what_counts_a_few_small_numbers_add_up_to_another_by_chance(rng: np.random.Generator) -> None:
+    x = rng.integers(-3, 4, size=(36, 5)).astype(float)
+    y = rng.integers(-3, 4, size=36).astype(float)
+    y[:15] = x[:15, 1] - x[:15, 2] + x[:15, 3]
+    arguments = {"stages": (5,), "fresh": 36, "scale": SCALE, "config": CONFIG}
+    found = [
+        find_mode(x, y, np.zeros(36, dtype=int), rng=rng, counting=counting, **arguments)
+        for counting in (False, True)
+    ]
+    assert found[0] is not None
+    assert found[1] is None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from worlds import ROOM_TARGETS, Raw, room, scene, schema_of
@@ -66,6 +68,22 @@ def test_contact_facts_are_facts_of_touching_pairs() -> None:
     left, right = (SCHEMA.layout().bodies.index(SCHEMA.layout().index(n)) for n in ("left", "right"))
     assert np.isfinite(example.pair[0, left][contact]).all()
     assert np.isnan(example.pair[0, right][contact]).all()
+
+
+def test_gaps_are_told_of_all_pairs_where_they_are_asked_for() -> None:
+    schema = replace(SCHEMA, offsets=True)
+    ball, bodies = schema.layout().index("ball"), schema.layout().bodies
+    right = bodies.index(schema.layout().index("right"))
+    percept = Perception(schema, ()).percept(schema.layout(), world().vector[None])
+    names = percept.perception.vocabulary(BALL).pair
+    numbers = dict(zip(names, percept.situation(ball).examples.pair[0, right].tolist(), strict=True))
+    assert numbers["distance"] == pytest.approx(3.0)
+    assert numbers["approach"] == pytest.approx(0.02)
+    assert (numbers["offset-x"], numbers["offset-y"]) == (-4.0, 0.0)
+    assert np.isnan(numbers["normal-x"]) and np.isnan(numbers["slip"])
+    percept = looked(world())
+    plain = dict(zip(names, percept.situation(ball).examples.pair[0, right].tolist(), strict=False))
+    assert np.isnan(plain["distance"]) and np.isnan(plain["approach"])
 
 
 def squeezed(vx: float) -> Scene:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes import random_vectors, schema_of
@@ -40,6 +42,14 @@ def test_ball_on_a_floor() -> None:
     assert np.isnan(features(schema, vectors)[0]).all()
     # Seen from the floor: the normal and the relative velocity turn round, so approach and slip stay.
     np.testing.assert_array_equal(features(schema, vectors, body=1)[0], [0.0, 0.0, -1.0, -2.0, -3.0])
+
+
+def test_offsets_are_told_where_they_are_asked_for() -> None:
+    schema, vectors = ball_over(Box(), [0.5, 1.5], (3.0, -2.0))
+    asked = replace(schema, offsets=True)
+    assert contact_features(asked) == (*CONTACT_FEATURES, "offset-x", "offset-y")
+    np.testing.assert_array_equal(features(asked, vectors)[1], [*features(schema, vectors)[1], 0.5, 1.5])
+    np.testing.assert_array_equal(features(asked, vectors, body=1)[0, -2:], [-0.5, -1.5])
 
 
 def test_ball_on_a_slope() -> None:

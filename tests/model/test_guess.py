@@ -1,0 +1,111 @@
+"""Best guesses: what stands in for what isn't explained, and never for what is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from points import formulas, learned, schema_of, transitions
+
+from relgym.model.guess import Guesses
+from relgym.model.prediction import Outcome
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Target, Transition
+
+SCHEMA = schema_of(("x", "v"), ("a",))
+V = Target("self", "v")
+
+
+def drivers(n: int, seed: int = 0) -> list[Transition]:
+    """Half of what changes v is as the action says, the other half as somebody nobody sees likes."""
+    rng = np.random.default_rng(seed)
+    whims = rng.normal(size=n).tolist()
+    return transitions(
+        SCHEMA,
+        lambda s, u: [s[0] + s[1], s[1] + u[0] + whims.pop()],
+        rng.normal(size=(n, 2)),
+        rng.normal(size=(n, 1)),
+    )
+
+
+def strollers(n: int) -> list[Transition]:
+    """v changes as it likes."""
+    rng = np.random.default_rng(0)
+    whims = rng.normal(size=n).tolist()
+    return transitions(
+        SCHEMA, lambda s, u: [s[0], s[1] + whims.pop()], rng.normal(size=(n, 2)), rng.normal(size=(n, 1))
+    )
+
+
+@pytest.fixture(scope="module")
+def model() -> WorldModel:
+    return learned(SCHEMA, drivers(400))
+
+
+def off(model: WorldModel, steps: list[Transition]) -> float:
+    said = [model.predict_one(t.before)["self", "v"].value for t in steps]
+    return float(np.std([v - t.after["self"]["v"] for v, t in zip(said, steps, strict=True)]))
+
+
+def test_what_is_not_explained_is_guessed_and_said_not_to_be(model: WorldModel) -> None:
+    fresh = drivers(200, seed=1)
+    one = model.predict_one(fresh[0].before)["self", "v"]
+    assert one.outcome is Outcome.UNEXPLAINED
+    assert one.informed and not one.ok
+    assert one.spread == pytest.approx(1.0, rel=0.15)
+    assert off(model, fresh) == pytest.approx(1.0, rel=0.2)
+    guess = model.property_model("self", "v").guess
+    assert guess is not None
+    weights = dict(guess.mode.roles[0].terms)
+    assert weights["v"] == pytest.approx(1.0, abs=0.2)
+    assert guess.left == pytest.approx(np.sqrt(0.5), rel=0.2)  # half of the variance is a whim
+    assert guess.text(2).startswith("best guess, no law: v' = ")
+
+
+def test_what_is_explained_is_not_guessed(model: WorldModel) -> None:
+    assert formulas(model, "x") == ["x' = x + v"]
+    assert model.property_model("self", "x").guess is None
+
+
+def test_a_guess_that_is_no_better_than_no_change_is_none() -> None:
+    model = learned(SCHEMA, strollers(400))
+    one = model.predict_one(strollers(1)[0].before)["self", "v"]
+    assert model.property_model("self", "v").guess is None
+    assert not one.informed and one.value == strollers(1)[0].before["self"]["v"]
+
+
+def test_guesses_come_alone_and_in_batches_with_the_same_bits(model: WorldModel) -> None:
+    scenes = [t.before for t in drivers(20, seed=2)]
+    batch = model.predict_batch(scenes[0].layout, np.stack([s.vector for s in scenes]))
+    for k, scene in enumerate(scenes):
+        assert model.predict_one(scene).scene.vector.tobytes() == batch.vectors[k].tobytes()
+
+
+def test_a_loaded_model_guesses_the_same(model: WorldModel, tmp_path: Path) -> None:
+    model.save(tmp_path / "model.json")
+    again, scene = WorldModel.load(tmp_path / "model.json"), drivers(1, seed=3)[0].before
+    assert again.predict_one(scene).scene.vector.tobytes() == model.predict_one(scene).scene.vector.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("usual", "rare", "own", "better"),
+    [
+        (0.5, 0.5, 0.3, True),
+        (0.3, 0.3, 0.5, False),
+        (0.3, 5.0, 0.35, True),  # hardly worse as a rule, and never so far off
+        (0.01, 5.0, 0.35, False),  # smaller in root mean square, but mostly worse by far
+    ],
+)
+def test_a_guess_replaces_modes_that_err_more(
+    model: WorldModel, usual: float, rare: float, own: float, better: bool
+) -> None:
+    guesses = Guesses()
+    for k in range(1000):
+        guesses.compare(rare if k % 20 == 0 else usual, own)
+    assert not guesses.superior  # there is none
+    guesses.best = model.property_model("self", "v").guess
+    assert guesses.superior is better
+    again = Guesses.from_json(V, guesses.to_json())
+    assert again.superior is better
+    assert again.to_json() == guesses.to_json()
