@@ -32,9 +32,6 @@ ESTIMATE_AT = (64, 512, 4096)
 HOPELESS = 200
 """Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
 
-RECENT = 4_096
-"""So many examples show whether a target counts something."""
-
 LEAST_MEMBERS = 4
 """Examples that a mode of another model must explain here to be taken over."""
 
@@ -283,13 +280,12 @@ class ModeClusterer(Population):
     def _search_once(
         self, table: ExampleTable, signature: int, pool: NDArray[np.intp], *, fresh: int
     ) -> bool:
-        y = self.y[pool]
         slots = table.signatures[signature]
         order, stages = slots.preference(self.target)
         rows = self.rows[pool]
         found = find_mode(
             slots.matrix(table.x[rows], order),
-            y,
+            self.y[pool],
             table.strata[rows],
             stages=stages,
             fresh=fresh,
@@ -297,7 +293,7 @@ class ModeClusterer(Population):
             config=self.config,
             rng=self._rng,
             needed=self._needed,
-            counting=counts(self.y[-RECENT:], self.scale),
+            counting=counts(self.y, self.scale),
         )
         if found is None:
             return False

@@ -29,8 +29,9 @@ EXACT = 24.0
 WIDE = 40
 """Searches of more columns than this draw fewer and larger samples."""
 
-COUNTED = 64
-"""A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels."""
+COUNTED, RECENT = 64, 4_096
+"""A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels.
+The newest so many values show it."""
 
 SIMPLE, WORDY = (1, 1, 4), 40
 """Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so
@@ -74,8 +75,8 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
 
 
 def counts(y: NDArray[np.float64], scale: Scale) -> bool:
-    """Whether values are few whole multiples of one step, so that another one that fits says little."""
-    values = np.unique(y)
+    """Whether recent values are few whole multiples of one step, so that another one that fits says little."""
+    values = np.unique(y[-RECENT:])
     if not 3 <= len(values) <= COUNTED:
         return False
     steps = np.diff(values)
