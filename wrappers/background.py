@@ -21,8 +21,8 @@ Packed: TypeAlias = tuple[tuple[str, ...], NDArray[np.float64], tuple[str, ...],
 """Objects and vector before, objects and vector after: a transition without its schema."""
 
 PARCELS = 64
-"""Transitions travel in parcels, of which the queue holds about so many: one by one they would cost the agent more time
-in sending than in writing them down."""
+"""Transitions travel in parcels, of which the queue holds about so many: one by one, sending them costs the agent's
+process several times as much."""
 
 
 class Background:
@@ -59,9 +59,8 @@ class Background:
         context = multiprocessing.get_context("spawn")
         self._size = max(1, length // PARCELS)
         self._parcel: list[Packed | None] = []
-        self._queue: Any = context.Queue(
-            (length + 1 - self._size) // self._size
-        )  # a last parcel is being packed
+        # Beside the parcels in the queue one is being packed.
+        self._queue: Any = context.Queue((length + 1 - self._size) // self._size)
         self._queue.cancel_join_thread()  # who exits must not wait for a process that may be dead
         self._answers, remote = context.Pipe(duplex=False)
         self._process = context.Process(

@@ -246,7 +246,7 @@ class ModeClusterer(Population):
     def _hopeless(self, table: ExampleTable) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""
         allowed = self.config.approximate and self.config.noise_std == "auto"
-        if not allowed or not timely(self._log.seen, features=self._dear(table)):
+        if not allowed or not timely(self, table, again=self.approximate):
             return False
         # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
         return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
