@@ -22,7 +22,7 @@ Packed: TypeAlias = tuple[tuple[str, ...], NDArray[np.float64], tuple[str, ...],
 
 PARCELS = 64
 """Transitions travel in parcels, of which the queue holds about so many: one by one, sending them costs the agent's
-process several times as much."""
+process twice as much."""
 
 
 class Background:
