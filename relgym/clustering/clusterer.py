@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
-from relgym.clustering.turn import Turn
+from relgym.clustering.turn import Search, Turn
 from relgym.clustering.unification import reordered
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
@@ -37,14 +37,6 @@ LEAST_MEMBERS = 4
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
-
-
-@dataclass(slots=True)
-class _Search:
-    """When to search the noise of one slot signature next."""
-
-    waiting: int = 0
-    failures: int = 0
 
 
 class ModeClusterer(Population):
@@ -81,7 +73,7 @@ class ModeClusterer(Population):
         self.approximate = False
         self.due = False
         self._rng = np.random.default_rng(seed)
-        self._searches: dict[int, _Search] = {}
+        self._searches: dict[int, Search] = {}
         self._largest = 0.0  # number among the columns and the target's values
         self._reach = 0.0  # value of the target
         self._spread = 0.0  # noise found in the data, rounding apart
@@ -211,7 +203,7 @@ class ModeClusterer(Population):
 
     def _discover(self, table: ExampleTable, example: int, turn: Turn) -> None:
         signature = int(table.signature_ids[self.rows[example]])
-        search = self._searches.setdefault(signature, _Search())
+        search = self._searches.setdefault(signature, Search())
         search.waiting += 1
         slots = table.signatures[signature]
         dear, more = bool(slots.features), False
@@ -233,7 +225,7 @@ class ModeClusterer(Population):
             self._adopt(table, signature, wider)
         search.waiting = search.waiting if more else 0
 
-    def _patience(self, search: _Search, doubtful: bool) -> int:
+    def _patience(self, search: Search, doubtful: bool) -> int:
         """News to wait for until the next search: the more, the oftener it was in vain.
 
         It is longer where searches are dear, for features, or may be in vain, since nobody said that there are laws.
@@ -394,7 +386,7 @@ class ModeClusterer(Population):
         self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}
         self.clusters = {int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]}
-        self._searches = {int(i): _Search(int(w), int(f)) for i, w, f in data["searches"]}
+        self._searches = {int(i): Search(int(w), int(f)) for i, w, f in data["searches"]}
         self._rng.bit_generator.state = data["random"]
         if arrays:
             self._log = AssignmentLog.from_arrays(arrays)

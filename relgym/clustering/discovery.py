@@ -29,9 +29,11 @@ EXACT = 24.0
 WIDE = 40
 """Searches of more columns than this draw fewer and larger samples."""
 
-COUNTED, RECENT = 64, 4_096
-"""A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels.
-The newest so many values show it."""
+COUNTED = 64
+"""A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels."""
+
+RECENT = 4_096
+"""So many examples show whether a target counts something."""
 
 SIMPLE, WORDY = (1, 1, 4), 40
 """Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so
@@ -75,7 +77,7 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
 
 
 def counts(y: NDArray[np.float64], scale: Scale) -> bool:
-    """Whether recent values are few whole multiples of one step, so that another one that fits says little."""
+    """Whether a target's latest values are few whole multiples of one step, so that another that fits says little."""
     values = np.unique(y[-RECENT:])
     if not 3 <= len(values) <= COUNTED:
         return False

@@ -1,8 +1,29 @@
-"""Whose turn it is: of all targets' dear searches one at a time, so that no single step of the world waits for all."""
+"""When to search: one kind of noise ever more rarely while that finds nothing, and whose turn it is for what is dear.
+
+Of all targets' dear searches one is made at a time, so that no single step of the world waits for all.
+"""
 
 from __future__ import annotations
 
-__all__ = ["Turn"]
+from dataclasses import dataclass
+
+__all__ = ["Search", "Turn"]
+
+
+@dataclass(slots=True)
+class Search:
+    """When to search the noise of one slot signature next.
+
+    Attributes
+    ----------
+    waiting
+        Unexplained examples since the last search.
+    failures
+        Searches in a row that found nothing.
+    """
+
+    waiting: int = 0
+    failures: int = 0
 
 
 class Turn:

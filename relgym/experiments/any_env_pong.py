@@ -99,10 +99,14 @@ def _shares(columns: dict[str, NDArray[np.float64]], *, verbose: bool) -> Iterat
         ]
         print(table(["fresh games", "frames", "exact", "dx", "dy", "sign of dx"], lines), "\n", flush=True)
     flight, wall, paddle = (kinds == number for number in range(3))
-    yield "flight, exact", 0.999, float(exact[flight].all(axis=1).mean())
-    yield "walls, exact", 0.99, float(exact[wall].all(axis=1).mean())
-    yield "paddles, sign of dx", 0.95, float(sign[paddle].mean())
-    yield "paddles, dy exact", 0.64, float(exact[paddle, 1].mean())
+    yield "flight, exact", 0.999, _share(exact[flight].all(axis=1))
+    yield "walls, exact", 0.99, _share(exact[wall].all(axis=1))
+    yield "paddles, sign of dx", 0.95, _share(sign[paddle])
+    yield "paddles, dy exact", 0.64, _share(exact[paddle, 1])
+
+
+def _share(right: NDArray[np.bool_]) -> float:
+    return float(right.mean()) if len(right) else float("nan")
 
 
 def names(model: WorldModel, target: Target, relation: str) -> bool:

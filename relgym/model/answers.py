@@ -94,8 +94,9 @@ class Answers(ModeFunctions):
 
     @property
     def inexact(self) -> bool:
-        """Whether modes are approximations, or leave more than rounding explains."""
-        return self.clusterer.approximate or self.clusterer.scale.sigma > ROUGH * self.clusterer.floor
+        """Whether modes are approximations, or leave more than rounding explains, and nobody said that they would."""
+        rough = self.clusterer.scale.sigma > ROUGH * self.clusterer.floor
+        return self.clusterer.approximate or (rough and self.clusterer.config.noise_std == "auto")
 
     @property
     def _lost(self) -> bool:
