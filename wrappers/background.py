@@ -20,6 +20,10 @@ __all__ = ["Background"]
 Packed: TypeAlias = tuple[tuple[str, ...], NDArray[np.float64], tuple[str, ...], NDArray[np.float64]]
 """Objects and vector before, objects and vector after: a transition without its schema."""
 
+PARCELS = 64
+"""Transitions travel in parcels, of which the queue holds about so many: one by one, sending them costs the agent's
+process twice as much."""
+
 
 class Background:
     """A process that owns a model and learns, in order, what is put into its queue.
@@ -34,7 +38,7 @@ class Background:
         As of `Study`.
     queue
         Most transitions that may wait, >= 1. Raising it drops fewer when learning falls behind, and lets the model lag
-        more.
+        more. From 128 on they are sent several at a time, a 64th of this number.
 
     Attributes
     ----------
@@ -53,7 +57,10 @@ class Background:
     ) -> None:
         length = checked_count("background", queue, 1, 10**7)
         context = multiprocessing.get_context("spawn")
-        self._queue: Any = context.Queue(length)
+        self._size = max(1, length // PARCELS)
+        self._parcel: list[Packed | None] = []
+        # Beside the parcels in the queue one is being packed.
+        self._queue: Any = context.Queue((length + 1 - self._size) // self._size)
         self._queue.cancel_join_thread()  # who exits must not wait for a process that may be dead
         self._answers, remote = context.Pipe(duplex=False)
         self._process = context.Process(
@@ -68,11 +75,15 @@ class Background:
 
     def put(self, transition: Transition) -> bool:
         """Queue one transition; false, and counted, when the queue is full."""
-        try:
-            self._queue.put_nowait(_packed(transition))
-        except queues.Full:
-            self.dropped += 1
-            return False
+        self._parcel.append(_packed(transition))
+        if len(self._parcel) >= self._size:
+            try:
+                self._queue.put_nowait(self._parcel)
+            except queues.Full:
+                self._parcel.pop()
+                self.dropped += 1
+                return False
+            self._parcel = []  # the one that was sent is pickled later, by the queue's thread
         self.sent += 1
         return True
 
@@ -100,10 +111,11 @@ class Background:
     def _ask(self) -> None:
         while self._process.is_alive():
             try:
-                self._queue.put(None, timeout=1.0)
-                return
+                self._queue.put([*self._parcel, None], timeout=1.0)
             except queues.Full:
                 continue
+            self._parcel = []
+            return
         raise EOFError
 
     def close(self) -> None:
@@ -121,14 +133,14 @@ def _learn(
     """The process' life: learn what comes; answer every ``None`` with all that was learned so far."""
     trouble: Exception | None = None
     while True:
-        packed = queue.get()
-        if packed is None:
-            answers.send((model, prequential) if trouble is None else trouble)
-        elif trouble is None:
-            try:
-                _take_up(model, prequential, precision, _unpacked(model.schema, packed))
-            except Exception as error:
-                trouble = error
+        for packed in queue.get():
+            if packed is None:
+                answers.send((model, prequential) if trouble is None else trouble)
+            elif trouble is None:
+                try:
+                    _take_up(model, prequential, precision, _unpacked(model.schema, packed))
+                except Exception as error:
+                    trouble = error
 
 
 def _take_up(

@@ -32,8 +32,8 @@ NEARLY_ALL = 0.9
 NORMAL = 1.6449
 """So many standard deviations hold that share of a normal distribution."""
 
-MANY_FEATURES = 200
-"""Among so many columns an approximation may have twice as many terms as a mode."""
+MANY_FEATURES = (200, 800)
+"""Among so many columns an approximation may have twice, or three times, as many terms as a mode."""
 
 ROUNDS = 3
 """Fits, each to what the one before was good for."""
@@ -50,7 +50,7 @@ class Approximation:
 
 def terms_of(columns: int, config: ClusteringConfig) -> int:
     """Largest number of weights of an approximation among so many columns."""
-    return config.max_terms * (2 if columns > MANY_FEATURES else 1)
+    return config.max_terms * (1 + sum(columns > many for many in MANY_FEATURES))
 
 
 def approximate(

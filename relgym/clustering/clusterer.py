@@ -13,7 +13,7 @@ from relgym.clustering.discovery import counts, find_mode, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.extension import extended
-from relgym.clustering.last_resort import last_resort
+from relgym.clustering.last_resort import last_resort, timely
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
@@ -28,9 +28,6 @@ __all__ = ["ClusterReport", "ModeClusterer"]
 
 ESTIMATE_AT = (64, 512, 4096)
 """Numbers of examples after which the noise is estimated anew."""
-
-APPROXIMATE_AT = (256, 1024, 4096, 16384)
-"""Numbers of examples after which an approximation is sought, if most of them are unexplained."""
 
 HOPELESS = 200
 """Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
@@ -105,7 +102,7 @@ class ModeClusterer(Population):
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
             self._discover(table, example, turn)
-        self.due |= self._hopeless()
+        self.due |= self._hopeless(table)
         if self.due and (not self._dear(table) or turn.take()):
             self.approximate_now(table)
         after = set(self.clusters)
@@ -210,9 +207,8 @@ class ModeClusterer(Population):
         search.waiting += 1
         slots = table.signatures[signature]
         dear, more = bool(slots.features), False
-        if search.waiting <= self._patience(search, dear or bool(slots.chained)) or (
-            dear and not turn.take()
-        ):
+        patience = self._patience(search, dear or bool(slots.chained))
+        if search.waiting <= patience or (dear and not turn.take()):
             return
         for _ in range(1 if dear else MOST_DISCOVERIES):
             pool = self._pool(table, signature)
@@ -239,10 +235,10 @@ class ModeClusterer(Population):
             return search.failures * search.failures
         return search.failures if doubtful else search.failures // 6
 
-    def _hopeless(self) -> bool:
+    def _hopeless(self, table: ExampleTable) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""
         allowed = self.config.approximate and self.config.noise_std == "auto"
-        if not allowed or self._log.seen not in APPROXIMATE_AT:
+        if not allowed or not timely(self, table, again=self.approximate):
             return False
         # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
         return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
@@ -276,13 +272,12 @@ class ModeClusterer(Population):
     def _search_once(
         self, table: ExampleTable, signature: int, pool: NDArray[np.intp], *, fresh: int
     ) -> bool:
-        y = self.y[pool]
         slots = table.signatures[signature]
         order, stages = slots.preference(self.target)
         rows = self.rows[pool]
         found = find_mode(
             slots.matrix(table.x[rows], order),
-            y,
+            self.y[pool],
             table.strata[rows],
             stages=stages,
             fresh=fresh,

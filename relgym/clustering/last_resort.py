@@ -13,7 +13,13 @@ from relgym.clustering.population import Population
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit
 
-__all__ = ["LastResort", "last_resort"]
+__all__ = ["LastResort", "last_resort", "timely"]
+
+APPROXIMATE_AT = (256, 1024, 4096, 16384)
+"""Numbers of examples after which an approximation is sought, if most of them are unexplained."""
+
+OFTENER_AT = (512, 1536, 2048, 3072, 6144, 8192, 12288)
+"""Among features also after these, since more examples choose better among many: unless noise is what is left."""
 
 MOST_ROWS = 1500
 """At most so many rows, the newest, determine an approximation."""
@@ -31,6 +37,18 @@ class LastResort:
     sigma: float
 
 
+def timely(population: Population, table: ExampleTable, *, again: bool) -> bool:
+    """Whether it is time to look for an approximation; `again`: there is one already."""
+    if population.seen in APPROXIMATE_AT or population.seen not in OFTENER_AT:
+        return population.seen in APPROXIMATE_AT
+    signature, recent = _recent(population, table)
+    slots = table.signatures[signature]
+    if not slots.features or not again:
+        return bool(slots.features)
+    change = population.y[recent] - slots.present(table.x[population.rows[recent]], population.target)
+    return population.scale.sigma <= LEFT * float(change.std())
+
+
 def last_resort(
     population: Population, table: ExampleTable, *, floor: float, again: bool
 ) -> LastResort | None:
@@ -45,9 +63,7 @@ def last_resort(
     again
         Whether the present modes are approximations too.
     """
-    recent = np.arange(max(0, len(population.y) - MOST_ROWS), len(population.y))
-    signature = int(table.signature_ids[population.rows[-1]])
-    recent = recent[table.signature_ids[population.rows[recent]] == signature]
+    signature, recent = _recent(population, table)
     slots, rows, y = table.signatures[signature], population.rows[recent], population.y[recent]
     order, stages = slots.preference(population.target)
     order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
@@ -71,6 +87,13 @@ def last_resort(
     elif 2 * population.noise_examples <= population.seen and found.sigma > 0.5 * population.scale.sigma:
         return None
     return LastResort(signature, reordered(found.fit, order), found.sigma)
+
+
+def _recent(population: Population, table: ExampleTable) -> tuple[int, NDArray[np.intp]]:
+    """The newest example's signature, and the newest examples that have it."""
+    recent = np.arange(max(0, len(population.y) - MOST_ROWS), len(population.y))
+    signature = int(table.signature_ids[population.rows[-1]])
+    return signature, recent[table.signature_ids[population.rows[recent]] == signature]
 
 
 def _reach(errors: NDArray[np.float64]) -> float:

@@ -109,7 +109,8 @@ def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
         return None
     known = frozenset(model.config.features)
     trials = [_try(model, table, recent, kinds) for kinds in LIBRARIES if not known.issuperset(kinds)]
-    if min((t.left for t in trials if t is not None), default=1.0) > GOOD:
+    good = min((t.left for t in trials if t is not None), default=1.0) <= GOOD
+    if not good and not known.issuperset(LAST_RESORT):
         trials.append(_try(model, table, recent, LAST_RESORT))
     best = _choose([t for t in trials if t is not None], left)
     if best is not None:

@@ -98,3 +98,4 @@ def test_the_wider_the_library_the_more_terms() -> None:
     config = ClusteringConfig()
     assert terms_of(20, config) == config.max_terms
     assert terms_of(500, config) == 2 * config.max_terms
+    assert terms_of(1_000, config) == 3 * config.max_terms

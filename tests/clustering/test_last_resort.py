@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
+import pytest
 from points import learned, schema_of, transitions
 
-from relgym.clustering.last_resort import last_resort
+from relgym.clustering.discovery import Scale
+from relgym.clustering.last_resort import last_resort, timely
 from relgym.model.world_model import WorldModel
 
 SHIP = schema_of(("v", "th"), ("fire",))
@@ -36,6 +41,39 @@ def test_an_engine_that_fires_as_it_likes_is_described_by_what_it_does_on_averag
 
 def test_it_is_only_sought_among_features_that_were_asked_for() -> None:
     assert not fly(300, 0).property_model("self", "v").clusterer.approximate
+
+
+@dataclass
+class Seen:
+    """An example table's target after so many examples, of which the present approximation leaves `sigma`."""
+
+    seen: int
+    sigma: float
+    fly: WorldModel
+
+    @property
+    def scale(self) -> Scale:
+        return Scale(self.sigma, 4.0, 6.0)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.fly.property_model("self", "v").clusterer, name)
+
+    def timely(self, *, again: bool) -> bool:
+        population: Any = self
+        return timely(population, self.fly._parts.tables["self"], again=again)
+
+
+@pytest.mark.parametrize("features", [(), ("trig", "products")])
+def test_it_is_sought_oftener_among_features_unless_noise_is_what_is_left(features: tuple[str, ...]) -> None:
+    model = fly(120, 0, features=features)
+
+    def times(sigma: float, *, again: bool) -> list[int]:
+        return [n for n in range(2_000) if Seen(n, sigma, model).timely(again=again)]
+
+    seldom, often = [256, 1024], [256, 512, 1024, 1536]
+    assert times(0.01, again=True) == (often if features else seldom)
+    assert times(0.1, again=True) == seldom  # the engine changes v by 0.3 in the mean
+    assert times(0.1, again=False) == (often if features else seldom)
 
 
 def test_an_approximation_gives_way_to_a_better_one_only() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from points import formulas, learned, schema_of, transitions
 
+from relgym.model.advice import LAST_RESORT
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
@@ -85,6 +86,17 @@ def test_what_no_library_explains_is_called_that() -> None:
     assert advice.features == ()
     assert "no library of features that was tried explains it" in str(advice)
     assert model.modes("self", "v") == ()
+
+
+@pytest.mark.parametrize(("features", "tried"), [((), True), (LAST_RESORT, False)])
+def test_what_is_switched_on_is_not_recommended(
+    features: tuple[str, ...], tried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    libraries = []
+    monkeypatch.setattr("relgym.model.advice._try", lambda *args: libraries.append(args[-1]))
+    (advice,) = learned(SCHEMA, dice(150), features=features).advice()
+    assert (LAST_RESORT in libraries) is tried
+    assert advice.features == ()
 
 
 def test_too_few_examples_are_no_reason_for_advice() -> None:

@@ -47,6 +47,22 @@ def test_what_finds_the_queue_full_is_dropped_and_counted() -> None:
     env.close()
 
 
+def test_parcels_lose_nothing_and_what_waits_is_bounded() -> None:
+    model = ModelLearner(Slider()).model
+    scene = model.schema.scene({"self": [0.0, 0.0], "action": [0.0]})
+    background = Background(model, None, queue=400)  # parcels of 6
+    for _ in range(20):
+        assert background.put(Transition(scene, scene))
+    assert background.fetch()[0].seen == 20  # the last parcel isn't full
+    background._process.terminate()
+    background._process.join()
+    taken = [background.put(Transition(scene, scene)) for _ in range(420)]
+    assert (background.sent, background.dropped) == (20 + sum(taken), 420 - sum(taken))
+    assert 390 <= sum(taken) <= 400
+    assert taken == sorted(taken, reverse=True)
+    background.close()
+
+
 def test_what_made_learning_fail_is_raised_where_it_is_asked_for() -> None:
     model = ModelLearner(Slider()).model
     bad = model.schema.scene({"self": [0.0, 0.0], "action": [0.0]})

@@ -11,7 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize, unwrap_vec_wrapper
 
 from relgym.config import ModelConfig
-from relgym.envs.arguments import checked_action, checked_count
+from relgym.envs.arguments import checked_actions, checked_count
 from relgym.errors import ConfigError
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.follower import BadObservations
@@ -115,6 +115,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
     def _on_step(self) -> bool:
         dones, infos = self.locals["dones"], self.locals["infos"]
         actions = self.locals.get("clipped_actions", self.locals["actions"])
+        actions = checked_actions(self.training_env.action_space, actions, len(dones))
         seen = self._single(self.locals["new_obs"])
         rewards = self.locals["rewards"]
         if self._normalised is not None:
@@ -132,7 +133,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
         self, k: int, action: Any, observation: Any, reward: float, done: bool, info: dict[str, Any]
     ) -> None:
         observer, follower = self.observer, self.observer.followers[k]
-        before = follower.act(checked_action(self.training_env.action_space, action))
+        before = follower.act(action)
         prediction = observer.expect(before)
         last = self._last(info) if done else observation
         terminated = done and not info.get("TimeLimit.truncated", False)
