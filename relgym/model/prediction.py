@@ -20,7 +20,8 @@ class Outcome(enum.Enum):
 
     Only `PREDICTED` is a mode's word. With every other outcome the value is a stopgap, not a claim: what is unexplained
     is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes; outside experience it is
-    what the mode says that would win the vote; else the property keeps its value.
+    what the mode says that would win the vote; what depends on such a stopgap follows from it; else the property keeps
+    its value.
     """
 
     PREDICTED = "predicted by a mode"

@@ -82,6 +82,28 @@ def test_guesses_come_alone_and_in_batches_with_the_same_bits(model: WorldModel)
         assert model.predict_one(scene).scene.vector.tobytes() == batch.vectors[k].tobytes()
 
 
+def test_what_depends_on_a_guess_follows_from_it() -> None:
+    rng = np.random.default_rng(0)
+
+    def moved(s: list[float], u: list[float]) -> list[float]:
+        v = s[1] + u[0] + rng.normal()
+        return [s[0] + v, v]
+
+    steps = transitions(SCHEMA, moved, rng.normal(size=(420, 2)), rng.normal(size=(420, 1)))
+    model = learned(SCHEMA, steps[:400])
+    assert formulas(model, "x") == ["x' = x + v'"]
+    scenes = [t.before for t in steps[400:]]
+    batch = model.predict_batch(scenes[0].layout, np.stack([s.vector for s in scenes]))
+    for k, scene in enumerate(scenes):
+        said = model.predict_one(scene)
+        x, v = said["self", "x"], said["self", "v"]
+        assert (x.outcome, v.outcome) == (Outcome.DEPENDS, Outcome.UNEXPLAINED)
+        assert v.informed and v.value != scene["self"]["v"]
+        assert x.value == pytest.approx(scene["self"]["x"] + v.value, abs=1e-9)
+        assert said.scene.vector.tobytes() == batch.vectors[k].tobytes()
+    assert not batch.ok.any()
+
+
 def test_a_loaded_model_guesses_the_same(model: WorldModel, tmp_path: Path) -> None:
     model.save(tmp_path / "model.json")
     again, scene = WorldModel.load(tmp_path / "model.json"), drivers(1, seed=3)[0].before
