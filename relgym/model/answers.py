@@ -59,6 +59,9 @@ class Answers(ModeFunctions):
         Which modes are walls at work: they take no part in the vote either.
     guesses
         The best guess, where nothing is explained.
+    leaned_on
+        Whether laws of other properties read this one's next value. Then its modes answer as long as it has any: what a
+        guess leaves would be magnified in those laws.
     """
 
     def __init__(
@@ -76,6 +79,7 @@ class Answers(ModeFunctions):
         self.limits = Limits()
         self.stops = Stops()
         self.guesses = Guesses()
+        self.leaned_on = False
         self._unexplained = False
 
     def bounds(self, mode: int) -> bool:
@@ -101,7 +105,7 @@ class Answers(ModeFunctions):
     @property
     def _lost(self) -> bool:
         """Whether modes aren't asked: nothing is explained, or an approximation errs more than the guess."""
-        return self._unexplained or (self.guess is not None and self.guesses.superior)
+        return self._unexplained or (not self.leaned_on and self.guess is not None and self.guesses.superior)
 
     def guessed(
         self, percept: Percept, index: int, following: NDArray[np.float64]

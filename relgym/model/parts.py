@@ -124,8 +124,9 @@ class Parts:
             )
         if self.open and t.name == TASK:  # worth is a function of what was, what was done and what came of it
             target = replace(target, given=tuple(p for p in self.perception.chained if p[0] != TASK))
-        self.targets = in_order((*self.targets, target)) if self.open else (*self.targets, target)
         self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config, self.schema)
+        targets = (*self.targets, target)
+        self._set_targets(in_order(targets) if self.open else targets)
         self.tables.setdefault(target.type, ExampleTable())
 
     def discover_targets(self, before: Scene, after: Scene) -> None:
@@ -146,7 +147,13 @@ class Parts:
         model = self.models.pop(target)
         model.retarget(other, self.tables[target.type])
         self.models[other] = model
-        self.targets = in_order(other if t == target else t for t in self.targets)
+        self._set_targets(in_order(other if t == target else t for t in self.targets))
+
+    def _set_targets(self, targets: tuple[Target, ...]) -> None:
+        self.targets = targets
+        read = {pair for t in targets if t.type != TASK for pair in t.given}
+        for target, model in self.models.items():
+            model.leaned_on = (target.type, target.property) in read
 
     def lead(self, rate: tuple[str, str], prop: str, step: float) -> None:
         """Take note that a property follows a rate: ``prop' = prop + step * rate'``."""

@@ -104,6 +104,27 @@ def test_what_depends_on_a_guess_follows_from_it() -> None:
     assert not batch.ok.any()
 
 
+def test_a_guess_takes_no_place_of_modes_that_other_laws_read(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+
+    def moved(s: list[float], u: list[float]) -> list[float]:
+        v = s[1] + u[0] + 0.01 * rng.normal()
+        return [s[0] + v, v]
+
+    steps = transitions(SCHEMA, moved, rng.normal(size=(401, 2)), rng.normal(size=(401, 1)))
+    model = learned(SCHEMA, steps[:400])
+    assert formulas(model, "x") == ["x' = x + v'"]
+    part, scene = model.property_model("self", "v"), steps[400].before
+    part.guesses.errors[:] = [[1.0, 1.0], [0.5, 0.5]]
+    assert part.guesses.superior
+    assert part.leaned_on and not model.property_model("self", "x").leaned_on
+    assert model.predict_one(scene).ok
+    model.save(tmp_path / "model.json")
+    assert WorldModel.load(tmp_path / "model.json").predict_one(scene).ok
+    part.leaned_on = False
+    assert model.predict_one(scene)["self", "v"].outcome is Outcome.UNEXPLAINED
+
+
 def test_a_loaded_model_guesses_the_same(model: WorldModel, tmp_path: Path) -> None:
     model.save(tmp_path / "model.json")
     again, scene = WorldModel.load(tmp_path / "model.json"), drivers(1, seed=3)[0].before
