@@ -35,7 +35,8 @@ _EXACT: Final = ModelConfig(frames="world", clustering=ClusteringConfig(min_exam
 
 
 _REMEMBERED: Final = 1_000
-"""Of so many real steps, the latest, it is looked up which modes were right together."""
+"""Of so many real steps that ended an episode, and of as many others, the latest, it is looked up which modes were right
+together: at first the few ends that pay come once in a thousand steps, and must not be forgotten in between."""
 
 _REVIEW: Final = 10
 """Real steps between two such reviews while the modes stay the same ones: a review costs some milliseconds."""
@@ -98,7 +99,7 @@ class LearnedTask:
         ]
         self._action = schema.type(ACTION).properties if ACTION in schema.order else ()
         self.model = WorldModel(self._small_schema(), config or _EXACT)
-        self._lessons: deque[NDArray[np.float64]] = deque(maxlen=_REMEMBERED)
+        self._lessons = {ended: deque[NDArray[np.float64]](maxlen=_REMEMBERED) for ended in (False, True)}
         self._together: set[tuple[int, int]] = set()
         self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
 
@@ -125,7 +126,7 @@ class LearnedTask:
         small = self.model.schema.scene({**values, TASK: [0.0, 0.0]})
         said = {(TASK, "reward"): float(reward), (TASK, "terminated"): float(terminated)}
         self.model.learn_one(Transition(small, small.replace(said)))
-        self._lessons.append(small.replace(said).vector)
+        self._lessons[bool(terminated)].append(small.replace(said).vector)
 
     def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
         """What the modes say; NaN where none does."""
@@ -150,10 +151,11 @@ class LearnedTask:
 
     def _right_together(self) -> set[tuple[int, int]]:
         """Modes of reward and termination that give what was said of some remembered step."""
-        if not self._lessons:
+        lessons = [lesson for each in self._lessons.values() for lesson in each]
+        if not lessons:
             return set()
         small = self.model.schema.layout()
-        said = np.stack(self._lessons)
+        said = np.stack(lessons)
         columns = [small.column(small.index(TASK), prop) for prop in _TOLD]
         asked = said.copy()
         asked[:, columns] = 0.0

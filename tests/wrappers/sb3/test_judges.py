@@ -75,6 +75,21 @@ def test_it_knows_no_verdict_whose_parts_never_went_together(rng: np.random.Gene
     assert (said.terminated[paid]).all()
 
 
+def test_ends_are_not_forgotten_among_many_steps_that_end_nothing(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("relgym.wrappers.sb3.judges._REMEMBERED", 100)
+    steps = [*pushes(200, 0.0, rng), *pushes(400, 0.9, rng)]
+    judge = LearnedTask(steps[0].start.schema, MOVING)
+    others = [step for step in steps if not step.terminated]
+    for step in [*steps, *others[:150]]:
+        judge.learn_step(step.transition, step.reward, terminated=step.terminated)
+    paid = [step for step in steps if step.terminated and step.reward > 1.0]
+    said = verdicts(judge, paid)
+    assert np.isfinite(said.rewards).mean() > 0.9
+    assert said.terminated.mean() > 0.9
+
+
 def test_it_says_nothing_before_it_was_told(rng: np.random.Generator) -> None:
     steps = pushes(5, 0.0, rng)
     judge = LearnedTask(steps[0].start.schema, MOVING)
