@@ -35,8 +35,8 @@ _EXACT: Final = ModelConfig(frames="world", clustering=ClusteringConfig(min_exam
 
 
 _REMEMBERED: Final = 1_000
-"""Of so many real steps that ended an episode, and of as many others, the latest, it is looked up which modes were right
-together: at first the few ends that pay come once in a thousand steps, and must not be forgotten in between."""
+"""Of so many real steps that ended an episode, and of as many others, the latest, it is looked up which modes were
+right together: at first ends that pay come once in a thousand steps, and must not be forgotten in between."""
 
 _REVIEW: Final = 10
 """Real steps between two such reviews while the modes stay the same ones: a review costs some milliseconds."""
