@@ -8,7 +8,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.classification.examples import Example, Vocabulary
+from relgym.classification.examples import Bools, Example, Vocabulary
 from relgym.classification.exemplars import Exemplars
 from relgym.classification.learning import foil_config
 from relgym.classification.roles import Option, Places, RoleDescription, RoleKind, fillings, stances
@@ -126,11 +126,22 @@ class RoleClassifier:
         self.stale = self.stale or self.contradictions > self.errors or grown or self._has_choice(example)
         return wrong
 
+    def recall(self, exemplars: Exemplars, mode: int) -> None:
+        """Take in how players stood in a mode's exemplars, many of which may be known to be its own only now."""
+        rows, roles = self._lessons(exemplars, mode)
+        if not len(rows):
+            return
+        view = View.of_exemplars(exemplars)
+        for description in self.descriptions:
+            who = roles[rows][:, list(description.places)].ravel()
+            where = np.repeat(rows, len(description.places))
+            if description.witness(_stances_of(view, where, view.target[where], who)):
+                self._answers.clear()
+
     def refresh(self, exemplars: Exemplars, mode: int) -> int:
         """Learn the descriptions anew from a mode's exemplars if they are stale; the work spent."""
-        roles = exemplars.columns["roles"][:, : len(self.kinds)]
-        rows = np.flatnonzero((exemplars.assigned == mode) & (roles >= 0).all(axis=1))
-        if not self.stale or not len(rows) or roles.shape[1] < len(self.kinds):
+        rows, roles = self._lessons(exemplars, mode)
+        if not self.stale or not len(rows):
             return 0
         view, weights = View.of_exemplars(exemplars), exemplars.weights()
         work = sum(self._learn(description, view, rows, roles, weights) for description in self.descriptions)
@@ -177,6 +188,12 @@ class RoleClassifier:
 
     # ----- inside -----
 
+    def _lessons(self, exemplars: Exemplars, mode: int) -> tuple[_Rows, _Rows]:
+        """Slots of a mode's exemplars whose players are known, and the players in all slots."""
+        roles = exemplars.columns["roles"][:, : len(self.kinds)]
+        known = (exemplars.assigned == mode) & (roles >= 0).all(axis=1)
+        return np.flatnonzero(known & (roles.shape[1] == len(self.kinds))), roles
+
     def _learn(
         self, description: RoleDescription, view: View, rows: _Rows, roles: _Rows, weights: Any
     ) -> int:
@@ -192,12 +209,7 @@ class RoleClassifier:
                     (positives if each in players else negatives).append((row, target, each))
         for_, against = (np.array(some, dtype=np.int64).reshape(-1, 3) for some in (positives, negatives))
         where, targets, who = for_.T
-        parts = (
-            view.table[where, :, who, targets],
-            view.table[where, :, targets, who],
-            view.unary[where, :, who],
-        )
-        description.witness(np.concatenate(parts, axis=1))
+        description.witness(_stances_of(view, where, targets, who))
         if not negatives:
             description.definition = None
             return 0
@@ -273,3 +285,9 @@ class RoleClassifier:
                 if of_type.sum() > len(description.places):
                     return True
         return False
+
+
+def _stances_of(view: View, where: _Rows, targets: _Rows, who: _Rows) -> Bools:
+    """How some objects stood to the targets, in the order of `stances`: shape ``(n, 2 R + U)``."""
+    towards, back = view.table[where, :, who, targets], view.table[where, :, targets, who]
+    return np.concatenate([towards, back, view.unary[where, :, who]], axis=1)

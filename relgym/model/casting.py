@@ -47,6 +47,11 @@ class Casting:
             if number not in modes or self.classifiers[number].kinds != self._kinds(modes[number]):
                 del self.classifiers[number]
 
+    def recall(self, exemplars: Exemplars) -> None:
+        """Take in how players stood in exemplars that were given to other modes since they were observed."""
+        for number in sorted(self.classifiers):
+            self.classifiers[number].recall(exemplars, number)
+
     def observe(self, mode: Mode, example: Example, roles: Sequence[int]) -> bool:
         """Take in who played the roles of one example; whether that contradicts the descriptions."""
         kinds = self._kinds(mode)

@@ -239,6 +239,7 @@ class PropertyModel(Answers):
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self._recast(table, self.classifier.exemplars)
+        self.casting.recall(self.classifier.exemplars)
 
     def _find_stops(self, table: ExampleTable) -> Stops:
         given = [prop for name, prop in self.conditions.pairs if name == self.target.type]

@@ -164,6 +164,30 @@ def test_who_has_all_that_players_had_in_common_comes_first(
     assert trucks[0][3].assign(item.example, sure=True) is None
 
 
+def test_examples_that_turn_out_to_be_the_modes_own_tell_what_players_have_in_common() -> None:
+    classifier = RoleClassifier(_TOUCH, [RoleKind("ball", (("v", 1.0),))], _CONFIG)
+    exemplars = Exemplars(_TOUCH, _CONFIG)
+    exemplars.set_modes((1, 2), np.empty(0, int), np.empty((0, 2), bool), np.empty((0, 2)))
+    apart, red = _alone(_balls(set(), set())), _alone(_balls({1}, {1}))
+    exemplars.add(apart, 2, np.ones(2, bool), np.zeros(2), roles=(1,))
+    exemplars.add(red, 1, np.ones(2, bool), np.zeros(2), roles=(1,))
+    classifier.observe(red, (1,))
+    classifier.refresh(exemplars, 1)
+    assert classifier.assign(apart, sure=True) is None  # the only player was red, and touched
+    classifier.recall(exemplars, 1)
+    assert classifier.assign(apart, sure=True) is None
+    exemplars.assigned[:] = 1  # the other mode was the same one
+    classifier.recall(exemplars, 1)
+    assert classifier.assign(apart, sure=True) == (1,)
+
+
+def _alone(example: Example) -> Example:
+    """With the target and one other object."""
+    table, unary = example.table[:, :2, :2], example.unary[:, :2]
+    key = table.tobytes() + unary.tobytes()
+    return replace(example, table=table, unary=unary, close=example.close[:2], pair=example.pair[:2], key=key)
+
+
 def test_the_order_of_objects_is_irrelevant(
     trucks: tuple[dict[int, RoleClassifier], Exemplars, int],
 ) -> None:
