@@ -207,7 +207,7 @@ class ModeClusterer(Population):
         search.waiting += 1
         slots = table.signatures[signature]
         dear, more = bool(slots.features), False
-        patience = self._patience(search, dear or bool(slots.chained))
+        patience = self._patience(search, dear, dear or bool(slots.chained))
         if search.waiting <= patience or (dear and not turn.take()):
             return
         for _ in range(1 if dear else MOST_DISCOVERIES):
@@ -225,12 +225,13 @@ class ModeClusterer(Population):
             self._adopt(table, signature, wider)
         search.waiting = search.waiting if more else 0
 
-    def _patience(self, search: Search, doubtful: bool) -> int:
+    def _patience(self, search: Search, dear: bool, doubtful: bool) -> int:
         """News to wait for until the next search: the more, the oftener it was in vain.
 
         It is longer where searches are dear, for features, or may be in vain, since nobody said that there are laws.
+        Where they are cheap it may take many to find the first law of many, and none is given up.
         """
-        lost = self._log.seen >= HOPELESS and 2 * self.noise_examples > self._log.seen
+        lost = dear and self._log.seen >= HOPELESS and 2 * self.noise_examples > self._log.seen
         if self.approximate or lost:  # what an approximation leaves is mostly its own tail
             return search.failures * search.failures
         return search.failures if doubtful else search.failures // 6
