@@ -93,7 +93,8 @@ class Sight:
             self._exact, self._told = np.zeros((2, shape[0]), dtype=np.bool_)
             self._touches = np.zeros(shape, dtype=np.bool_)
             self._solids = plan.geometry.place(self.pose)
-            distance, normal = np.empty(shape), np.empty((len(plan.axes.used), *shape))
+            # Normals of all pairs are multiplied by signs, measured or not: what lies in memory may be no number.
+            distance, normal = np.empty(shape), np.zeros((len(plan.axes.used), *shape))
             self._measured = Measured(distance, normal, *plan.geometry.bounds(self.pose, self._solids))
         else:  # a single scene is compared with the one before, and fcl looks at whole scenes
             self._arrays = None
