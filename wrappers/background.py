@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import queue as queues
+from collections.abc import Iterable, Iterator
+from itertools import groupby
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -17,8 +19,10 @@ from relgym.wrappers.prequential import Prequential, compared
 
 __all__ = ["Background"]
 
-Packed: TypeAlias = tuple[tuple[str, ...], NDArray[np.float64], tuple[str, ...], NDArray[np.float64]]
-"""Objects and vector before, objects and vector after: a transition without its schema."""
+Names: TypeAlias = tuple[str, ...]
+Bundle: TypeAlias = tuple[Names, Names, NDArray[np.float64], NDArray[np.float64]]
+"""Objects before and after, and one row of numbers before and after for each transition of a run of equal ones: an
+array by itself takes longer to send than all its numbers."""
 
 PARCELS = 64
 """Transitions travel in parcels, of which the queue holds about so many: one by one, sending them costs the agent's
@@ -58,7 +62,7 @@ class Background:
         length = checked_count("background", queue, 1, 10**7)
         context = multiprocessing.get_context("spawn")
         self._size = max(1, length // PARCELS)
-        self._parcel: list[Packed | None] = []
+        self._parcel: list[Transition] = []
         # Beside the parcels in the queue one is being packed.
         self._queue: Any = context.Queue((length + 1 - self._size) // self._size)
         self._queue.cancel_join_thread()  # who exits must not wait for a process that may be dead
@@ -75,15 +79,14 @@ class Background:
 
     def put(self, transition: Transition) -> bool:
         """Queue one transition; false, and counted, when the queue is full."""
-        self._parcel.append(_packed(transition))
+        self._parcel.append(transition)
         if len(self._parcel) >= self._size:
-            try:
-                self._queue.put_nowait(self._parcel)
-            except queues.Full:
+            if self._queue.full():
                 self._parcel.pop()
                 self.dropped += 1
                 return False
-            self._parcel = []  # the one that was sent is pickled later, by the queue's thread
+            self._queue.put_nowait(_packed(self._parcel))  # nobody else puts anything in
+            self._parcel = []
         self.sent += 1
         return True
 
@@ -111,7 +114,7 @@ class Background:
     def _ask(self) -> None:
         while self._process.is_alive():
             try:
-                self._queue.put([*self._parcel, None], timeout=1.0)
+                self._queue.put([*_packed(self._parcel), None], timeout=1.0)
             except queues.Full:
                 continue
             self._parcel = []
@@ -133,12 +136,13 @@ def _learn(
     """The process' life: learn what comes; answer every ``None`` with all that was learned so far."""
     trouble: Exception | None = None
     while True:
-        for packed in queue.get():
-            if packed is None:
+        for bundle in queue.get():
+            if bundle is None:
                 answers.send((model, prequential) if trouble is None else trouble)
             elif trouble is None:
                 try:
-                    _take_up(model, prequential, precision, _unpacked(model.schema, packed))
+                    for transition in _unpacked(model.schema, bundle):
+                        _take_up(model, prequential, precision, transition)
                 except Exception as error:
                     trouble = error
 
@@ -152,12 +156,17 @@ def _take_up(
     model.learn_one(transition)
 
 
-def _packed(transition: Transition) -> Packed:
-    before, after = transition.before, transition.after
-    return before.layout.names, before.vector, after.layout.names, after.vector
+def _packed(transitions: Iterable[Transition]) -> list[Bundle]:
+    bundles = []
+    for (before, after), run in groupby(transitions, key=lambda t: (t.before.layout.names, t.after.layout.names)):
+        pairs = [(t.before.vector, t.after.vector) for t in run]
+        bundles.append((before, after, np.stack([b for b, _ in pairs]), np.stack([a for _, a in pairs])))
+    return bundles
 
 
-def _unpacked(schema: SceneSchema, packed: Packed) -> Transition:
-    names, vector, later_names, later = packed
+def _unpacked(schema: SceneSchema, bundle: Bundle) -> Iterator[Transition]:
+    names, later_names, vectors, later = bundle
     before, after = schema.layout(names), schema.layout(later_names)
-    return Transition(Scene(schema, before, vector), Scene(schema, after, later))
+    for vector, following in zip(vectors, later, strict=True):
+        # Copies: a scene is kept long, and must not keep its whole bundle with it.
+        yield Transition(Scene(schema, before, vector.copy()), Scene(schema, after, following.copy()))
