@@ -53,6 +53,10 @@ class Block:
         free = sum(variable >= self.fresh for variable in self.variables)
         return np.array([free + template.fresh for template in self.templates], dtype=np.int64)
 
+    def of_one(self) -> NDArray[np.bool_]:
+        """Return which candidates say what a single object is, rather than how two stand, shape (C,)."""
+        return np.array([self.op is None and len(template.slots) <= 1 for template in self.templates])
+
     @property
     def names(self) -> NDArray[np.str_]:
         """The candidates' relations or functions, shape (C,)."""

@@ -43,11 +43,16 @@ class DescriptionLength:
         return self.literals(clause.literals, clause.arity)
 
     def literals(self, literals: Sequence[Literal], arity: int) -> float:
-        """Return a conjunction's bits: names, signs, arguments and thresholds; the order is free."""
+        """Return a conjunction's bits: names, signs, arguments and thresholds; the order is free.
+
+        What a single thing is costs as much as how two stand. By its arguments alone it would be cheaper, and a
+        clause that speaks of kinds says nothing of other kinds that stand the same way.
+        """
         bits, variables = 0.0, arity
         for literal in literals:
+            arguments = len(literal.args) if literal.op is not None else max(len(literal.args), 2)
             # one argument is any variable so far, a new one or *
-            bits += 1.0 + self._name + len(literal.args) * math.log2(variables + 1.0)
+            bits += 1.0 + self._name + arguments * math.log2(variables + 1.0)
             bits += self.number(literal)
             variables = max(variables, max(literal.variables, default=-1) + 1)
         return bits - math.lgamma(len(literals) + 1.0) / _LOG2

@@ -56,7 +56,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
     Deviation from the thesis: Algorithm 2 is greedy. A beam, and beside it the clauses whose last literal
     *connects* (it introduces a variable), find conjunctions whose first literal gains nothing by itself.
     Among equal scores relations precede numeric literals, positive literals negated ones, fewer new variables
-    more, more positives fewer; then the alphabet decides.
+    more, more positives fewer, how things stand what they are; then the alphabet decides.
     Cost: depth x (beam + lookahead) x tuples x candidates x K^v.
     """
     everything = np.ones(tables.size, dtype=np.bool_)
@@ -145,7 +145,8 @@ class _Candidates:
             names = self._join(lambda _, block: block.names)
             negated = self._join(lambda _, block: np.full(len(block.templates), block.negated))
             numeric = self._join(lambda _, block: np.full(len(block.templates), block.op is not None))
-            self._ties = (names, -self._positives, self._introduced, negated, numeric)
+            of_one = self._join(lambda _, block: block.of_one())
+            self._ties = (names, of_one, -self._positives, self._introduced, negated, numeric)
 
     def _price(self, growing: Growing, block: Block) -> NDArray[np.float64]:
         """Bits of the thresholds: a gain must pay for them, or numbers would stand in for plain relations."""

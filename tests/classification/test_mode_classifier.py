@@ -307,8 +307,10 @@ def test_unseen_layouts_are_not_familiar_where_no_clause_speaks() -> None:
     _taught_truck(classifier, 48)
     known = next(truck_stream(1, rng=np.random.default_rng(0)))
     assert classifier.rank(known.example, known.values.tolist()).seen
-    alone = replace(known.example, table=np.zeros_like(known.example.table))
-    ranking = classifier.rank(alone, known.values.tolist())
+    on_top = TRUCK_VOCABULARY.relations.index("on-top")
+    floating = np.zeros_like(known.example.table)
+    floating[on_top] = ~np.eye(floating.shape[-1], dtype=bool)  # all on top of each other, none higher
+    ranking = classifier.rank(replace(known.example, table=floating), known.values.tolist())
     assert not ranking.seen
     assert not ranking.familiar
 

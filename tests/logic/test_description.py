@@ -22,8 +22,13 @@ def test_a_literal_costs_its_name_its_sign_and_its_arguments() -> None:
     assert LENGTH.clause(Clause((Literal("vx", (0,), op=">"),))) == pytest.approx(3 + 1 + 1 + 1)
     assert DescriptionLength(8, 1023, evidence=3).sign == pytest.approx(3)
     # the second one chooses from three, and the order of the two is free
-    two = Clause((Literal("near", (0, 1)), Literal("red", (1,))))
-    assert LENGTH.clause(two) == pytest.approx(6 + 4 + math.log2(3) - 1)
+    two = Clause((Literal("near", (0, 1)), Literal("above", (0, 1))))
+    assert LENGTH.clause(two) == pytest.approx(6 + 4 + 2 * math.log2(3) - 1)
+
+
+def test_what_a_thing_is_costs_as_much_as_how_two_stand() -> None:
+    standing, being = Clause((Literal("near", (0, 1)),)), Clause((Literal("red", (1,)),))
+    assert LENGTH.clause(being) == LENGTH.clause(standing)
 
 
 def test_exceptions_cost_the_choice_of_a_subset() -> None:
