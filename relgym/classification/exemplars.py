@@ -9,7 +9,7 @@ seen.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -109,6 +109,11 @@ class Exemplars:
         """Mode that the example in each slot was assigned to."""
         return self.columns["assigned"]
 
+    @property
+    def cells(self) -> Iterator[tuple[int, bytes, list[int]]]:
+        """What is remembered of each mode in each relational state: mode, state, slots."""
+        return ((cell.assigned, cell.key, cell.members) for cell in self._cells)
+
     def add(
         self,
         example: Example,
@@ -173,7 +178,7 @@ class Exemplars:
         fits: Bools,
         values: Floats,
         roles: NDArray[np.integer[Any]] | None = None,
-    ) -> None:
+    ) -> NDArray[np.intp]:
         """Re-label all exemplars after the modes changed.
 
         Parameters
@@ -187,6 +192,10 @@ class Exemplars:
         roles
             Object playing each role of the new mode, -1 for none, shape ``(n, most roles)``; default: as
             before.
+
+        Returns
+        -------
+        Which slots are left, by the numbers they had; a state's reservoir can overflow.
         """
         weights, keys = self.weights(), [self._cells[c].key for c in self.columns["cell"].tolist()]
         self.modes = tuple(modes)
@@ -200,8 +209,8 @@ class Exemplars:
             cell.members.append(slot)
             cell.count += float(weights[slot])
             self.columns["cell"][slot] = number
-        self._trim()
         self.version += 1
+        return self._trim()
 
     def key_of(self, slot: int) -> bytes:
         """Relational state of the example in a slot."""
@@ -278,17 +287,19 @@ class Exemplars:
         candidates = soft or list(range(len(cell.members)))
         return candidates[_hash(cell.key, cell.count) % len(candidates)]
 
-    def _trim(self) -> None:
-        """Bring cells that grew by re-labelling (noise that became a mode) back to their bound."""
+    def _trim(self) -> NDArray[np.intp]:
+        """Bring cells that grew by re-labelling (noise that became a mode) back to their bound; the slots left."""
         for cell in self._cells:
             while len(cell.members) > self._cap(cell):
                 cell.members.pop(self._victim(cell))
         kept = sorted(slot for cell in self._cells for slot in cell.members)
+        left = np.array(kept, dtype=np.intp)
         if len(kept) < len(self):
             new = {slot: i for i, slot in enumerate(kept)}
-            self.columns.keep(np.array(kept, dtype=np.intp))
+            self.columns.keep(left)
             for cell in self._cells:
                 cell.members = [new[slot] for slot in cell.members]
+        return left
 
 
 def dyadic(weights: Floats) -> Floats:

@@ -15,7 +15,8 @@ from relgym.classification.examples import NOISE, Bools, Example, ExampleBatch, 
 from relgym.classification.exemplars import Exemplars
 from relgym.classification.familiarity import Familiarity, situations, used_by
 from relgym.classification.learning import Lesson
-from relgym.classification.pairs import PairState, covered_by, lesson_of, pair_labels
+from relgym.classification.owners import Owners
+from relgym.classification.pairs import PairState, covered_by, pair_labels
 from relgym.classification.ranking import Ranking, RankingBatch, Verdict
 from relgym.classification.views import Scope, View
 from relgym.classification.voting import Voting
@@ -57,6 +58,7 @@ class ModeClassifier:
         self._pairs: dict[tuple[int, int], PairState] = {}
         self._view: tuple[int, View, Floats] | None = None
         self._seen: Familiarity | None = None
+        self._owners = Owners({}, ())
         self._reset_caches()
 
     @property
@@ -139,7 +141,7 @@ class ModeClassifier:
         wrong, seen = 0, self._familiarity()  # before anything changes: must not depend on who asked when
         if assigned != NOISE:
             self.counts[assigned] = self.counts.get(assigned, 0.0) + 1.0
-            wrong = self._count(example, assigned, fits, values)
+            wrong = self._count(example, self._owner(example, assigned, fits), fits, values)
         self.exemplars.add(example, assigned, fits, values, hard=hard or wrong > 0, roles=roles)
         seen.add(example, self._voting.key(example))
         return wrong
@@ -171,21 +173,20 @@ class ModeClassifier:
         Only pairs whose examples changed labels, or whose functions moved, are checked; only those that now
         err more than they did become stale.
         """
-        modes, before = tuple(modes), self._labels()
+        modes, before = tuple(modes), self._labels(self._pairs)
         old = dict(zip(self.modes, self.exemplars.columns["values"].T.copy(), strict=True))
         moved = {m for at, m in enumerate(modes) if m in old and not _same(old[m], values[:, at])}
-        keep = self.config.ambiguous == "keep"
-        unchanged = {
-            pair
-            for pair, labels in before.items()
-            if set(pair) <= set(modes)
-            and not set(pair) & moved
-            and np.array_equal(labels, pair_labels(assigned, fits, modes, *pair, keep))
-        }
-        self.exemplars.set_modes(modes, assigned, fits, values, roles)
+        kept = self.exemplars.set_modes(modes, assigned, fits, values, roles)
         weights = self.exemplars.weights()
         self.counts = {m: float(weights[self.exemplars.assigned == m].sum()) for m in modes}
-        self._update_pairs(unchanged)
+        self._owners = Owners.of(self.exemplars, self._covering())
+        lasting = {
+            pair: labels[kept]
+            for pair, labels in before.items()
+            if set(pair) <= set(modes) and not set(pair) & moved
+        }
+        now = self._labels(lasting)
+        self._update_pairs([pair for pair, labels in lasting.items() if np.array_equal(labels, now[pair])])
         self._reset_caches()
 
     def widen(self, vocabulary: Vocabulary, own: Floats) -> None:
@@ -215,7 +216,7 @@ class ModeClassifier:
         spent, changed = 0, False
         for pair in sorted((p for p in self._pairs.values() if p.stale), key=lambda p: p.urgency):
             while pair.stale and spent < budget:
-                spent += pair.refresh(self._lesson(*pair.modes), self.config)
+                spent += pair.refresh(self._lessons([pair.modes])[pair.modes], self.config)
                 changed |= not pair.stale
         if changed:
             self._pairs_changed()
@@ -231,7 +232,8 @@ class ModeClassifier:
             "counts": [[mode, count] for mode, count in sorted(self.counts.items())],
             "pairs": [pair.to_dict() for pair in self._pairs.values()],
             "seen": sorted(self._familiarity().seen),
-            "covered": [list(pair) for pair in sorted(self._covered)],
+            "covered": [list(pair) for pair in sorted(self._owners.covered)],
+            "certain": self._owners.to_list(),
             "exemplars": self.exemplars.to_dict() if exemplars else None,
         }
 
@@ -248,28 +250,29 @@ class ModeClassifier:
             i, j = int(plain["classifier"]["i"]), int(plain["classifier"]["j"])
             self._pairs[i, j] = PairState.from_dict(plain, self._scope(i, j))
         self._reset_caches()
-        self._remember(data["seen"], {(int(k), int(m)) for k, m in data["covered"]})
+        covered = [(int(k), int(m)) for k, m in data["covered"]]
+        self._remember(data["seen"], Owners.from_list(data.get("certain", []), covered))
         return self
 
     def __getstate__(self) -> dict[str, Any]:
         # Caches are rebuilt on demand; leaving them out keeps pickles and copies small.
-        kept = {"vocabulary", "config", "exemplars", "counts", "_pairs", "_covered"}
+        kept = {"vocabulary", "config", "exemplars", "counts", "_pairs", "_owners"}
         state = {name: value for name, value in self.__dict__.items() if name in kept}
         return state | {"_view": None, "_seen": sorted(self._familiarity().seen)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._reset_caches()
-        self._remember(state["_seen"], state["_covered"])
+        self._remember(state["_seen"], state["_owners"])
 
     # ----- inside -----
 
-    def _count(self, example: Example, assigned: int, fits: Bools, values: Floats) -> int:
+    def _count(self, example: Example, owner: int, fits: Bools, values: Floats) -> int:
         outcomes = self._voting.outcomes(example, np.asarray(values).tolist())
         keep, wrong = self.config.ambiguous == "keep", 0
         explained = dict(zip(self.modes, np.asarray(fits).tolist(), strict=True))
         for at, ((i, j), pair) in enumerate(self._pairs.items()):
-            for_i, for_j = (assigned == m or self._covers(m, assigned, explained) for m in (i, j))
+            for_i, for_j = (owner == m or self._covers(m, owner, explained) for m in (i, j))
             other = j if for_i else i
             if for_i == for_j or (explained[other] and not keep):
                 continue
@@ -277,9 +280,17 @@ class ModeClassifier:
             self._voting.recount(at)
         return wrong
 
-    def _covers(self, mode: int, assigned: int, explained: Mapping[int, bool]) -> bool:
-        """Whether a mode explains an example that was assigned to one it covers, see `pair_labels`."""
-        return explained[mode] and (assigned, mode) in self._covered
+    def _covers(self, mode: int, owner: int, explained: Mapping[int, bool]) -> bool:
+        """Whether a mode explains an example that belongs to one it covers, see `pair_labels`."""
+        return explained[mode] and (owner, mode) in self._owners.covered
+
+    def _owner(self, example: Example, assigned: int, fits: Bools) -> int:
+        """The mode that a new example belongs to."""
+        if self.config.ambiguous == "keep":
+            return assigned
+        explaining = [m for m, ok in zip(self.modes, np.asarray(fits).tolist(), strict=True) if ok]
+        self._owners.count(assigned, example.key, explaining)
+        return self._owners.owner(assigned, example.key, explaining)
 
     def _familiarity(self) -> Familiarity:
         if self._seen is None:
@@ -294,25 +305,35 @@ class ModeClassifier:
             self._view = version, View.of_exemplars(self.exemplars), self.exemplars.weights()
         return self._view[1], self._view[2]
 
-    def _lesson(self, i: int, j: int) -> Lesson:
+    def _lessons(self, pairs: Iterable[tuple[int, int]]) -> dict[tuple[int, int], Lesson]:
+        """What each pair is to be learned from."""
         view, weights = self._current_view()
-        return lesson_of(self.exemplars, view, weights, i, j, self.config.ambiguous == "keep")
+        labels = self._labels(pairs)
+        rows = {pair: np.flatnonzero(found) for pair, found in labels.items()}
+        return {pair: Lesson(view, at, labels[pair][at] > 0, weights[at]) for pair, at in rows.items()}
 
-    def _labels(self) -> dict[tuple[int, int], Any]:
-        fits, keep = self.exemplars.columns["fits"], self.config.ambiguous == "keep"
-        return {p: pair_labels(self.exemplars.assigned, fits, self.modes, *p, keep) for p in self._pairs}
+    def _labels(self, pairs: Iterable[tuple[int, int]]) -> dict[tuple[int, int], NDArray[np.int8]]:
+        """Which exemplars teach each pair, and which of its modes they speak for: see `pair_labels`."""
+        assigned, fits, modes = self.exemplars.assigned, self.exemplars.columns["fits"], self.modes
+        if self.config.ambiguous == "keep":  # the thesis' arbitrary labels
+            return {(i, j): (assigned == i).astype(np.int8) - (assigned == j) for i, j in pairs}
+        owners = self._owners.owners(self.exemplars)
+        return {pair: pair_labels(assigned, owners, fits, modes, *pair) for pair in pairs}
 
     def _scope(self, i: int, j: int) -> Scope:
         return Scope.of(self.vocabulary, self.config, (i, j))
 
     def _update_pairs(self, unchanged: Iterable[tuple[int, int]]) -> None:
+        every = list(combinations(sorted(self.modes), 2))
+        kept = set(unchanged)
+        lessons = self._lessons([pair for pair in every if pair not in kept])
         pairs = {}
-        for i, j in combinations(sorted(self.modes), 2):
+        for i, j in every:
             pair = self._pairs.get((i, j))
             if pair is None:
-                pair = PairState.new(i, j, self._scope(i, j), self._lesson(i, j))
-            elif (i, j) not in unchanged:
-                pair.check(self._lesson(i, j))
+                pair = PairState.new(i, j, self._scope(i, j), lessons[i, j])
+            elif (i, j) in lessons:
+                pair.check(lessons[i, j])
             pairs[i, j] = pair
         self._pairs = pairs
 
@@ -321,17 +342,21 @@ class ModeClassifier:
         self._voting = Voting(self.vocabulary, self.modes, votes, runoff=runoff)
         self._pairs_changed()
 
-    def _remember(self, seen: Iterable[int], covered: set[tuple[int, int]]) -> None:
+    def _remember(self, seen: Iterable[int], owners: Owners) -> None:
         """Take over what can't be told from the exemplars, which are but a choice of the examples."""
         self._seen = Familiarity(used_by(self.classifiers, self.vocabulary), seen)
-        self._covered = covered
+        self._owners = owners
 
     def _pairs_changed(self) -> None:
         self._voting.set_pairs(self.classifiers)
         self._seen = None
+        self._owners = self._owners.with_covered(self._covering())
+
+    def _covering(self) -> set[tuple[int, int]]:
+        """Pairs (k, m) of modes of which m covers k."""
         assigned, fits = self.exemplars.assigned, self.exemplars.columns["fits"]
         useful = len(assigned) and self.config.ambiguous != "keep"
-        self._covered = {
+        return {
             (k, m)
             for at, m in enumerate(self.modes if useful else ())
             for k in covered_by(assigned, fits[:, at] | (assigned == m))

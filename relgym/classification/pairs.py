@@ -6,16 +6,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relgym.classification.binary import BinaryClassifier, majority
 from relgym.classification.examples import NOISE
-from relgym.classification.exemplars import Exemplars
 from relgym.classification.learning import SHORT, Draft, Lesson
 from relgym.classification.repair import mend
-from relgym.classification.views import Scope, View
+from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
 
-__all__ = ["PairState", "covered_by", "lesson_of"]
+__all__ = ["PairState", "covered_by", "pair_labels"]
 
 COVERED = 0.95
 """Share of a mode's examples that another mode must explain to cover it."""
@@ -143,30 +143,33 @@ class PairState:
         return cls(classifier, learned=(first, second), draft=draft, **plain)
 
 
-def lesson_of(exemplars: Exemplars, view: View, weights: Any, i: int, j: int, keep: bool) -> Lesson:
-    """The exemplars that teach a pair: those that speak for one of its modes and that the other doesn't explain.
-
-    With `keep`, those assigned to either (the thesis' arbitrary labels).
-    """
-    labels = pair_labels(exemplars.assigned, exemplars.columns["fits"], exemplars.modes, i, j, keep)
-    rows = np.flatnonzero(labels)
-    return Lesson(view, rows, labels[rows] > 0, weights[rows])
-
-
-def pair_labels(assigned: Any, fits: Any, modes: tuple[int, ...], i: int, j: int, keep: bool) -> Any:
+def pair_labels(
+    assigned: Any, owners: Any, fits: Any, modes: tuple[int, ...], i: int, j: int
+) -> NDArray[np.int8]:
     """1 where an example speaks for mode `i`, -1 where it speaks for `j`, 0 where it teaches nothing.
 
-    An example speaks for the mode it was assigned to, and for every mode that *covers* that one. Bouncing covers
-    sliding: a slide must not let a third mode win against bouncing, or votes go round in circles. A mode that explains
-    some of another's examples by chance covers nothing.
+    An example speaks for the mode it belongs to (`Owners`), and for every mode that *covers* that one, against one that
+    doesn't explain it. Bouncing covers sliding: a slide must not let a third mode win against bouncing, or votes go
+    round in circles. A mode that explains some of another's examples by chance covers nothing.
+
+    Parameters
+    ----------
+    assigned, owners
+        Mode that each example was assigned to, and mode that it belongs to, shape ``(n,)``.
+    fits
+        Which of `modes` explain it, shape ``(n, len(modes))``.
+    modes
+        All modes.
+    i, j
+        The pair.
     """
-    for_i, for_j = assigned == i, assigned == j
-    if keep:
-        return for_i.astype(np.int8) - for_j
-    fits_i, fits_j = (fits[:, modes.index(m)] | mine for m, mine in ((i, for_i), (j, for_j)))
-    for_i |= fits_i & np.isin(assigned, covered_by(assigned, fits_i))
-    for_j |= fits_j & np.isin(assigned, covered_by(assigned, fits_j))
-    return (for_i & ~fits_j).astype(np.int8) - (for_j & ~fits_i)
+    fits_i, fits_j = (fits[:, modes.index(m)] | (assigned == m) for m in (i, j))
+    for_i, for_j = (
+        (owners == m) | (explained & np.isin(owners, covered_by(assigned, explained)))
+        for m, explained in ((i, fits_i), (j, fits_j))
+    )
+    labels: NDArray[np.int8] = (for_i & ~fits_j).astype(np.int8) - (for_j & ~fits_i)
+    return labels
 
 
 def covered_by(assigned: Any, explained: Any) -> list[int]:
