@@ -43,9 +43,10 @@ class ClassificationConfig:
         Whether the two modes' predictions and their difference are offered as numbers. Default true.
         Boundaries of friction and halting become one threshold.
     ambiguous
-        What to do with an example that several modes explain. ``"drop"`` (default): it speaks for each of
-        them against all modes that don't explain it, and teaches nothing to a pair of them. ``"keep"``: it
-        counts for the mode it was assigned to, as in the thesis.
+        What to do with an example that several modes explain. ``"drop"`` (default): it teaches nothing to a
+        pair of them. Against all others it speaks for the mode it was assigned to, the simplest; or for another
+        one of them, if only that one was seen beyond doubt in the same relations
+        (`relgym.classification.owners`). ``"keep"``: it counts for the mode it was assigned to, as in the thesis.
     both_polarities
         Whether either mode of a pair may be the positive class (§3.4.5). Default true.
     literal_choice
