@@ -34,9 +34,9 @@ class Args:
     """seed of everything random"""
 
 
-def make_env() -> gym.Env[Any, Any]:
+def make_env(**arguments: Any) -> gym.Env[Any, Any]:
     """Scenes for the model, decisions and short vectors for the agent."""
-    return FlatView(ActionRepeat(TransitionRecorder(gym.make("relgym/BallGoal-v0")), 5))
+    return FlatView(ActionRepeat(TransitionRecorder(gym.make("relgym/BallGoal-v0", **arguments)), 5))
 
 
 def main(args: Args) -> None:
@@ -44,7 +44,8 @@ def main(args: Args) -> None:
     from stable_baselines3 import SAC
     from stable_baselines3.common.logger import Logger
 
-    env = make_env()
+    # Half as long as tests: what would follow can be dreamed, and more beginnings show more rooms.
+    env = make_env(max_episode_steps=250)
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
     # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals and walls stay where they are.

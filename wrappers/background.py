@@ -158,7 +158,9 @@ def _take_up(
 
 def _packed(transitions: Iterable[Transition]) -> list[Bundle]:
     bundles = []
-    for (before, after), run in groupby(transitions, key=lambda t: (t.before.layout.names, t.after.layout.names)):
+    for (before, after), run in groupby(
+        transitions, key=lambda t: (t.before.layout.names, t.after.layout.names)
+    ):
         pairs = [(t.before.vector, t.after.vector) for t in run]
         bundles.append((before, after, np.stack([b for b, _ in pairs]), np.stack([a for _, a in pairs])))
     return bundles

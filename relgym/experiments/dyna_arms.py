@@ -69,6 +69,9 @@ class Course:
         Decisions that an episode lasts at most.
     dreams
         How to dream there, where it isn't as by default: parameters of `DynaConfig`.
+    glimpse
+        Decisions after which real episodes are cut short for agents that dream; 0: never. They need not live through
+        what they can dream, and more beginnings show them more of what there is.
     """
 
     name: str
@@ -79,6 +82,7 @@ class Course:
     repeat: int = 1
     horizon: int = 20
     dreams: Mapping[str, Any] = field(default_factory=dict)
+    glimpse: int = 0
 
 
 @dataclass(frozen=True)
@@ -142,13 +146,23 @@ _BALL_DREAMS: Final[Mapping[str, Any]] = {
     "burst": 0,
 }
 """Episodes are long and their steps short, so dreams branch off anywhere. Goals in mid-air would teach nothing, nor
-would a left wall on the right. At first only a few rooms were seen: a policy trained long in these knows no others."""
+would a left wall on the right. At first only a few rooms were seen: a policy trained long in these knows no others.
+For the same reason real episodes are cut short (`Course.glimpse`): half as long, they show twice as many rooms."""
 
 COURSES: Final = {
     course.name: course
     for course in (
         Course("truck", "TruckPush, task push", "relgym/TruckPush-v0", "truck"),
-        Course("ball", "BallGoal", "relgym/BallGoal-v0", "ball", repeat=5, horizon=100, dreams=_BALL_DREAMS),
+        Course(
+            "ball",
+            "BallGoal",
+            "relgym/BallGoal-v0",
+            "ball",
+            repeat=5,
+            horizon=100,
+            dreams=_BALL_DREAMS,
+            glimpse=50,
+        ),
     )
 }
 
@@ -200,7 +214,12 @@ class ChangingWorld(gym.Wrapper[Any, Any, Any, Any]):
 
 
 def make_env(
-    course: Course, change: Change | None = None, *, spec: FlatSpec | None = None, **arguments: Any
+    course: Course,
+    change: Change | None = None,
+    *,
+    arm: Arm | None = None,
+    spec: FlatSpec | None = None,
+    **arguments: Any,
 ) -> gym.Env[Any, Any]:
     """The course's env as agents see it: flat, relative, with decisions of several steps where it has them.
 
@@ -210,11 +229,15 @@ def make_env(
         Where.
     change
         How the world changes, if it does.
+    arm
+        Who is to train in it; default: it is for tests. Episodes of those that dream may be cut short.
     spec
         What the flat view shows, where it isn't what the env declares.
     arguments
         Of the env, where they differ from the course's.
     """
+    if course.glimpse and arm is not None and arm.model != "none":
+        arguments["max_episode_steps"] = course.glimpse * course.repeat
 
     def made(**own: Any) -> gym.Env[Any, Any]:
         return gym.make(course.env_id, disable_env_checker=True, **{**course.arguments, **arguments, **own})

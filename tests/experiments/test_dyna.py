@@ -71,6 +71,17 @@ def test_runs_outlive_json() -> None:
     assert (done.last, of("sac", 3).last) == (2, 0)
 
 
+@pytest.mark.parametrize(("arm", "decisions"), [("relgym", 50), ("sac", 100)])
+def test_who_dreams_sees_more_beginnings(arm: str, decisions: int) -> None:
+    env = make_env(COURSES["ball"], arm=ARMS[arm])
+    env.reset(seed=0)
+    lasted, over = 0, False
+    while not over:
+        *_, terminated, truncated, _ = env.step(np.zeros(2, np.float32))
+        lasted, over = lasted + 1, terminated or truncated
+    assert lasted == decisions and truncated
+
+
 def test_a_world_changes_with_the_first_episode_after_its_time() -> None:
     change = Change(after=3, arguments={"gravity": 0.0})
     env, plain = make_env(COURSES["truck"], change), make_env(COURSES["truck"])
