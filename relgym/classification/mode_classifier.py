@@ -233,7 +233,7 @@ class ModeClassifier:
             "pairs": [pair.to_dict() for pair in self._pairs.values()],
             "seen": sorted(self._familiarity().seen),
             "covered": [list(pair) for pair in sorted(self._owners.covered)],
-            "certain": self._owners.to_list(),
+            "certain": self._owners.to_list() if exemplars else [],
             "exemplars": self.exemplars.to_dict() if exemplars else None,
         }
 
