@@ -173,6 +173,8 @@ ARMS: Final = {
     arm.name: arm
     for arm in (
         Arm("sac", "SAC", "none"),
+        Arm("sac5", "SAC, 5 updates a step", "none", updates=5),
+        Arm("sac20", "SAC, 20 updates a step", "none", updates=20),
         Arm("sac40", "SAC, 40 updates a step", "none", updates=40),
         Arm("sac-permuted", "SAC, objects permuted", "none", varied=True),
         Arm("ensemble", "Dyna, MLP ensemble", "neural", **_DYNA, learned=True, doubted=False),

@@ -39,6 +39,10 @@ _TURN: Final = 3_000
 _MISLED_STEPS: Final = 6_000
 _BALL_STEPS: Final = 16_000
 
+_TRUCK_ARMS: Final = ("sac", "sac40", "sac-permuted", "ensemble", "relgym", "relgym-given")
+_BALL_RIVALS: Final = ("sac", "sac5", "sac20")
+"""Agents without a model; those who dream update twenty times a decision there."""
+
 
 @dataclass(frozen=True)
 class Shown:
@@ -107,7 +111,7 @@ def _truck(found: Found) -> Shown:
 
 def _ball(found: Found) -> Shown:
     runs = _runs(found)
-    steps = {arm: median(map(reached, own)) for arm in ("sac", "sac40") if (own := _of(runs, arm))}
+    steps = {arm: median(map(reached, own)) for arm in _BALL_RIVALS if (own := _of(runs, arm))}
     best = min(steps, key=lambda arm: steps[arm], default="sac")
     return _compared(runs, _fewer(runs, best, 4.0))
 
@@ -207,7 +211,7 @@ _FEW: Final[Mapping[str, int]] = {"sac40": 5_000, "ensemble": 2_500}
 _CHANGE: Final[Mapping[str, Any]] = {"after": _TURN, "arguments": _LIGHT}
 
 ROWS: Final[Mapping[int, Row]] = {
-    1: Row("TruckPush: real steps to success", _learning("truck", tuple(ARMS), STEPS, _FEW), _truck),
+    1: Row("TruckPush: real steps to success", _learning("truck", _TRUCK_ARMS, STEPS, _FEW), _truck),
     2: Row(
         "TruckPush: trained in the dream alone",
         [_task("asleep", course="truck", seed=seed, real=1_000, updates=20_000) for seed in TRAINING_SEEDS],
@@ -215,7 +219,7 @@ ROWS: Final[Mapping[int, Row]] = {
     ),
     3: Row(
         "BallGoal: real decisions to success",
-        _learning("ball", ("relgym", "relgym-given", "sac", "sac40"), _BALL_STEPS),
+        _learning("ball", ("relgym", "relgym-given", *_BALL_RIVALS), _BALL_STEPS),
         _ball,
     ),
     4: Row(
