@@ -265,8 +265,11 @@ def _unsupported(
             # Not the largest residual: a row far out in the other columns too draws the regression to itself.
             stake = np.abs(left) / np.maximum(1.0 - _leverage(x[kept], fit, column), PIVOT)
             kept[np.flatnonzero(kept)[np.argmax(stake)]] = False
-        remaining = np.abs(weight * _own_part(x[kept], fit, column))
-        if remaining.max(initial=0.0) <= 10.0 * tolerance:
+        remaining = np.square(weight * _own_part(x[kept], fit, column))
+        much = (10.0 * tolerance) ** 2
+        # Through noise, many rows that say little each determine a weight as well as a few that say much.
+        together = remaining.sum() > support * much and remaining.mean() > QUIET * tolerance**2
+        if remaining.max(initial=0.0) <= much and not together:
             return column, kept
     return None, everything
 

@@ -32,6 +32,10 @@ __all__ = ["Consensus", "consensus", "draw_samples", "refine"]
 LOOSE = 100.0
 """A fit to few rows is extrapolated: its inliers are first counted with a tolerance this much wider."""
 
+TIGHT, CLOSE = 4.0, 0.01
+"""... but not so wide, where there is noise, that it tells nothing: no wider than this share of the responses' spread,
+unless a few standard deviations are."""
+
 
 @dataclass(frozen=True, slots=True)
 class Consensus:
@@ -113,13 +117,14 @@ def consensus(
     n = len(y)
     if n < size:
         return None
+    loose = min(LOOSE, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
     columns = varying_columns(x)
     samples = draw_samples(n, size, draws, rng=rng, strata=strata, anchors=anchors)
-    chosen = _forward_batch(x[:, columns][samples], y[samples], terms=terms, sigma=sigma)
+    chosen = _forward_batch(x[:, columns][samples], y[samples], terms=terms, sigma=sigma, loose=loose)
     best: Consensus | None = None
     for sample, picked in _distinct(samples, chosen, limit):
         fit = least_squares(x[sample], y[sample], tuple(int(columns[c]) for c in picked))
-        found = Consensus(fit, np.abs(y - fit.predict(x)) <= LOOSE * tolerance)
+        found = Consensus(fit, np.abs(y - fit.predict(x)) <= loose * tolerance)
         if best is None or (found.size, -found.fit.terms) > (best.size, -best.fit.terms):
             best = refine(x, y, found, sigma=sigma, tolerance=tolerance)
     return best
@@ -143,12 +148,12 @@ def refine(
 
 
 def _forward_batch(
-    a: NDArray[np.float64], y: NDArray[np.float64], *, terms: int, sigma: float
+    a: NDArray[np.float64], y: NDArray[np.float64], *, terms: int, sigma: float, loose: float
 ) -> NDArray[np.intp]:
     """Columns chosen for each sample, ``(draws, terms)``: -1 where none, -2 in front if not verified."""
     a = a - a.mean(axis=1, keepdims=True)
     residual = y - y.mean(axis=1, keepdims=True)
-    enough = a.shape[1] * (LOOSE * sigma) ** 2
+    enough = a.shape[1] * (loose * sigma) ** 2
     choose = _choose_among_many if a.shape[2] > MANY else _choose
     chosen, left = choose(a, residual, terms, sigma, enough)
     chosen[left > enough, 0] = -2

@@ -53,6 +53,18 @@ def test_three_examples_must_back_each_weight(
     assert found.fit.columns == columns
 
 
+def test_through_noise_many_rows_that_say_little_back_a_weight(rng: np.random.Generator) -> None:
+    # No velocity is ten tolerances large, and yet hardly a row would be explained without it.
+    scale = Scale(4e-3, 4.0, 8.0)
+    x = rng.normal(scale=0.03, size=(2_000, 1)).clip(-0.1, 0.1)
+    y = 0.98 * x[:, 0] + rng.normal(scale=4e-3, size=2_000)
+    found = identified(x, y, least_squares(x, y, (0,)), scale=scale, support=3)
+    assert found is not None and found.fit.columns == (0,)
+    # A column whose part is as small as the noise is none.
+    faint = identified(x, 0.1 * x[:, 0], least_squares(x, 0.1 * x[:, 0], (0,)), scale=scale, support=3)
+    assert faint is None or faint.fit.columns == ()
+
+
 def test_constants_of_a_few_scenes_are_no_law(rng: np.random.Generator) -> None:
     # Three scenes, two positions that are constant in each: any three constants are linear in them.
     scene = np.arange(60) % 3

@@ -51,6 +51,16 @@ def test_rows_in_the_same_relational_state_are_found_with_few_draws(seed: int) -
     assert (found.inliers == obey).all()
 
 
+def test_through_noise_a_sample_isnt_content_with_a_column_that_nearly_does(rng: np.random.Generator) -> None:
+    # Balls meet a slope at much the same angle: one velocity tells most of the other.
+    sideways = rng.uniform(-0.06, 0.06, size=80)
+    x = np.column_stack([sideways, 0.6 * sideways + rng.normal(scale=0.01, size=80)])
+    y = -0.82 * x[:, 0] - 0.42 * x[:, 1] + rng.normal(scale=1e-4, size=80)
+    found = consensus(x, y, sigma=1.6e-4, tolerance=6.4e-4, terms=2, size=5, draws=300, rng=rng)
+    assert found is not None
+    assert found.fit.columns == (0, 1) and found.size >= 78
+
+
 def test_rows_that_obey_nothing_verify_nothing(rng: np.random.Generator) -> None:
     x, y, _ = mixture(rng, 60, 0)
     assert search(x, y, rng) is None
