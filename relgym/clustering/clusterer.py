@@ -165,7 +165,11 @@ class ModeClusterer(Population):
             if refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
                 self._spread, self.approximate = estimate, False
                 self._start_over()
-        self.scale = replace(self.scale, sigma=max(floor, self._spread))
+        self._assume(max(floor, self._spread))
+
+    def _assume(self, sigma: float) -> None:
+        """Another noise: the tolerances follow."""
+        self.scale = replace(self.scale, sigma=sigma, misfit=self.approximate)
 
     def _estimate(self, table: ExampleTable, floor: float) -> float:
         """Noise among examples of the newest example's signature."""
@@ -192,7 +196,7 @@ class ModeClusterer(Population):
         """Be given other next values: the examples stay, modes are searched again."""
         self.target = target
         self._spread, self.approximate, self.due = 0.0, False, False
-        self.scale = replace(self.scale, sigma=self.floor)
+        self._assume(self.floor)
         self._start_over()
 
     # ------------------------------------------------------------------ discovery (§3.2.2)
@@ -255,7 +259,7 @@ class ModeClusterer(Population):
         if found is None:
             return
         self._spread, self.approximate = found.sigma, True
-        self.scale = replace(self.scale, sigma=max(self.floor, found.sigma))
+        self._assume(max(self.floor, found.sigma))
         self._start_over()
         self._adopt(table, found.signature, found.fit)
 
@@ -337,7 +341,7 @@ class ModeClusterer(Population):
         self._largest, self._reach = max(self._largest, other._largest), max(self._reach, other._reach)
         self._spread, self.floor = max(self._spread, other._spread), max(self.floor, other.floor)
         self.approximate |= other.approximate
-        self.scale = replace(self.scale, sigma=max(self.scale.sigma, other.scale.sigma))
+        self._assume(max(self.scale.sigma, other.scale.sigma))
         self._rehome(table, np.arange(first, len(self._log)))
         matched = {NOISE: NOISE}
         for i, cluster in sorted(other.clusters.items()):
@@ -379,10 +383,10 @@ class ModeClusterer(Population):
 
     def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         """Take over what `to_json` and `to_arrays` wrote; without arrays there are no examples."""
-        self.scale = replace(self.scale, sigma=float(data["sigma"]))
         self._next_id = int(data["next_id"])
         self._largest, self._reach = float(data["largest"]), float(data["reach"])
         self.approximate, self.due = bool(data["approximate"]), bool(data.get("due", False))
+        self._assume(float(data["sigma"]))
         self._spread, self.floor = float(data["spread"]), float(data["rounding"])
         self._known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}

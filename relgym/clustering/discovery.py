@@ -45,11 +45,23 @@ CHANGES = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """Noise of a target and the tolerances that follow from it, in units of the target."""
+    """Noise of a target and the tolerances that follow from it, in units of the target.
+
+    Attributes
+    ----------
+    sigma
+        Standard deviation.
+    inlier_stds, tail_stds
+        Tolerances, in standard deviations.
+    misfit
+        Whether it is what an approximation leaves rather than noise: then neighbours err alike, and that many rows say
+        a little each proves nothing.
+    """
 
     sigma: float
     inlier_stds: float
     tail_stds: float
+    misfit: bool = False
 
     @property
     def tolerance(self) -> float:
@@ -135,6 +147,7 @@ def find_mode(
             strata=strata[rows],
             anchors=np.flatnonzero(rows >= len(y) - fresh),
             limit=48 if columns <= WIDE else 6,
+            misfit=scale.misfit,
         )
         if found is None or found.size < min(needed, 6):
             continue
@@ -243,7 +256,7 @@ def identified(
         rows = np.flatnonzero(found.inliers)
         if len(rows) < 4:
             return None
-        weak, kept = _unsupported(x[rows], found.fit, scale.tolerance, support)
+        weak, kept = _unsupported(x[rows], found.fit, scale, support)
         if weak is None:
             return found if _enough_combinations(x[rows], y[rows], found.fit, scale.tolerance) else None
         columns = tuple(c for c in found.fit.columns if c != weak)
@@ -252,7 +265,7 @@ def identified(
 
 
 def _unsupported(
-    x: NDArray[np.float64], fit: LinearFit, tolerance: float, support: int
+    x: NDArray[np.float64], fit: LinearFit, scale: Scale, support: int
 ) -> tuple[int | None, NDArray[np.bool_]]:
     """A column that fewer than `support` rows determine, and the rows without those; (None, all) if none."""
     everything = np.ones(len(x), dtype=bool)
@@ -266,10 +279,10 @@ def _unsupported(
             stake = np.abs(left) / np.maximum(1.0 - _leverage(x[kept], fit, column), PIVOT)
             kept[np.flatnonzero(kept)[np.argmax(stake)]] = False
         remaining = np.square(weight * _own_part(x[kept], fit, column))
-        much = (10.0 * tolerance) ** 2
+        much = (10.0 * scale.tolerance) ** 2
         # Through noise, many rows that say little each determine a weight as well as a few that say much.
-        together = remaining.sum() > support * much and remaining.mean() > QUIET * tolerance**2
-        if remaining.max(initial=0.0) <= much and not together:
+        together = remaining.sum() > support * much and remaining.mean() > QUIET * scale.tolerance**2
+        if remaining.max(initial=0.0) <= much and (scale.misfit or not together):
             return column, kept
     return None, everything
 

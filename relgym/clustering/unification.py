@@ -163,6 +163,7 @@ def unified_family(
                 draws=2 * config.draws,
                 rng=rng,
                 anchors=np.array([len(usable) - 1]),
+                misfit=scale.misfit,
             )
             if found is None or found.size < found.fit.terms + 3:
                 continue

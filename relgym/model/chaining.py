@@ -110,7 +110,15 @@ def _search(parts: Parts, target: Target) -> _Found | None:
     for scale, (terms, sample, draws) in itertools.product(scales, PLANS):
         rng = np.random.default_rng([parts.config.seed, len(y)])
         found = consensus(
-            x, y, sigma=scale.sigma, tolerance=scale.tolerance, terms=terms, size=sample, draws=draws, rng=rng
+            x,
+            y,
+            sigma=scale.sigma,
+            tolerance=scale.tolerance,
+            terms=terms,
+            size=sample,
+            draws=draws,
+            rng=rng,
+            misfit=scale.misfit,
         )
         if found is not None:
             found = identified(x, y, found.fit, scale=scale, support=parts.config.clustering.support)

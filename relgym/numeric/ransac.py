@@ -90,6 +90,7 @@ def consensus(
     strata: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
     limit: int = 48,
+    misfit: bool = False,
 ) -> Consensus | None:
     """The function with the largest consensus among random samples; None if no sample verified itself.
 
@@ -109,6 +110,8 @@ def consensus(
         See `draw_samples`.
     limit
         Most samples that are tried on all rows.
+    misfit
+        Whether sigma is what an approximation leaves rather than noise.
 
     Notes
     -----
@@ -117,7 +120,7 @@ def consensus(
     n = len(y)
     if n < size:
         return None
-    loose = min(LOOSE, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
+    loose = LOOSE if misfit else min(LOOSE, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
     columns = varying_columns(x)
     samples = draw_samples(n, size, draws, rng=rng, strata=strata, anchors=anchors)
     chosen = _forward_batch(x[:, columns][samples], y[samples], terms=terms, sigma=sigma, loose=loose)
