@@ -3,7 +3,9 @@
 Where a target is better described with another one's *next* value, it is given that (`Target.given`) and comes after
 it: ``x' = x + k v'``. Of two properties each follows from the other (``v' = (x' - x) / k`` is as true), so something
 must decide which one goes first: what keeps what it was. A law of change builds on the property's own present value;
-a law without it is taken only where none of the former kind contradicts it. What is never given away is a circle.
+a law without it is taken only where none of the former kind contradicts it. Through noise a difference such as
+``(x' - x) / k`` is never taken: it says of v' what x' says of it, k times less exactly. What is never given away is a
+circle.
 """
 
 from __future__ import annotations
@@ -42,6 +44,9 @@ GAIN = 0.1
 PLANS = ((2, 5, 256), (4, 10, 128))
 """Terms, sample size and draws of the searches for such a law."""
 
+ALIKE = 0.1
+"""Weights of x' and of x that cancel out but for this share make a difference of the two."""
+
 _Pair = tuple[str, str]
 
 Look = tuple[str, str, bool]
@@ -50,10 +55,23 @@ Look = tuple[str, str, bool]
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A law with next values: which ones it uses, and, for pure kinematics, the rate and its coefficient."""
+    """A law with next values.
+
+    Attributes
+    ----------
+    given
+        Whose next values it uses.
+    inert
+        Whether it builds on the property's own present value.
+    difference
+        Whether it is the change of another property.
+    lead
+        For pure kinematics: the rate and its coefficient.
+    """
 
     given: tuple[_Pair, ...]
     inert: bool
+    difference: bool
     lead: tuple[str, float] | None
 
 
@@ -125,8 +143,11 @@ def _search(parts: Parts, target: Target) -> _Found | None:
         if found is None or found.size < SHARE * len(y) or not is_law(x, y, found, x.shape[1], scale):
             continue
         gain = found.size / len(y) - share
-        if gain > GAIN or (gain > -GAIN and found.fit.terms < size):
-            return _read(slots, order, found.fit)
+        if gain <= GAIN and (gain <= -GAIN or found.fit.terms >= size):
+            continue
+        law = _read(slots, order, found.fit)
+        if law is None or not law.difference or scale.sigma <= clusterer.floor:
+            return law
     return None
 
 
@@ -149,13 +170,17 @@ def _columns(slots: SlotSignature, target: Target) -> NDArray[np.intp]:
 
 def _read(slots: SlotSignature, order: NDArray[np.intp], fit: LinearFit) -> _Found | None:
     columns = [slots.at(int(order[c])) for c in fit.columns]
-    primes = [c for c in columns if c.property.endswith(PRIME)]
-    if not primes:
+    weights = {(c.slot, c.property): w for c, w in zip(columns, fit.weights, strict=True)}
+    nexts = {key: w for key, w in weights.items() if key[1].endswith(PRIME)}
+    if not nexts:
         return None
-    given = tuple(dict.fromkeys((slots.types[c.slot].name, c.property.rstrip(PRIME)) for c in primes))
+    now = {key: weights.get((key[0], key[1].rstrip(PRIME)), 0.0) for key in nexts}
+    given = tuple(dict.fromkeys((slots.types[slot].name, prop.rstrip(PRIME)) for slot, prop in nexts))
     inert = 0 in fit.columns
+    cancel = any(abs(w + now[key]) < ALIKE * abs(w) for key, w in nexts.items())
     lead = None
-    weights = dict(zip(fit.columns, fit.weights, strict=True))
-    if inert and len(columns) == 2 and fit.intercept == 0.0 and abs(weights[0] - 1.0) < 1e-6:
-        lead = (primes[0].property.rstrip(PRIME), next(w for c, w in weights.items() if c))
-    return _Found(given, inert, lead)
+    if inert and len(columns) == 2 and fit.intercept == 0.0:
+        (((_, rate), coefficient),) = nexts.items()
+        own = sum(fit.weights) - coefficient
+        lead = (rate.rstrip(PRIME), coefficient) if abs(own - 1.0) < 1e-6 else None
+    return _Found(given, inert, cancel and not inert, lead)
