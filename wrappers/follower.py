@@ -126,7 +126,7 @@ class Follower:
 
     def _expected(self, prediction: ScenePrediction | None) -> Scene | None:
         """Where things should be now: as far on as in the last step, or where modes predict or guess them."""
-        if self._scene is None:
+        if self._scene is None or not self.view.matches:
             return None
         scene = self._scene if self._earlier is None else extrapolated(self._earlier, self._scene)
         if prediction is None:

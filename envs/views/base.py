@@ -27,6 +27,11 @@ class View(Protocol):
     schema: SceneSchema
 
     @property
+    def matches(self) -> bool:
+        """Whether `scene` heeds what was expected: without it, nobody works that out."""
+        ...
+
+    @property
     def precision(self) -> float:
         """Relative precision of the numbers that it shows: 0 for float64, 4 roundings for float32."""
         ...

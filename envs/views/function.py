@@ -60,6 +60,8 @@ class FunctionView:
     2.0
     """
 
+    matches = False
+
     def __init__(
         self,
         schema: SceneSchema,

@@ -63,6 +63,8 @@ class NumbersView:
     array([1., 2.])
     """
 
+    matches = False
+
     def __init__(
         self,
         observation_space: spaces.Space[Any],
@@ -137,8 +139,10 @@ class NumbersView:
         numbers, how = self._numbers.read(observation), self._how
         if not np.isfinite(numbers).all():
             self._complain(numbers)
-        angles = [self._decoded(pair, numbers) for pair in how.pairs]
-        return Scene(self.schema, how.layout, np.concatenate([numbers, angles, how.constants])[how.gather])
+        if how.pairs or len(how.constants):
+            angles = [self._decoded(pair, numbers) for pair in how.pairs]
+            numbers = np.concatenate([numbers, angles, how.constants])
+        return Scene(self.schema, how.layout, numbers[how.gather])
 
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action's properties: see `Acts`."""

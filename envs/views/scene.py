@@ -34,6 +34,8 @@ class SceneView:
         The spaces don't fit the schema.
     """
 
+    matches = False
+
     def __init__(
         self, schema: SceneSchema, observation_space: spaces.Space[Any], action_space: spaces.Space[Any]
     ) -> None:

@@ -138,6 +138,11 @@ class TableView:
 
     # ------------------------------------------------------------------ scenes
     @property
+    def matches(self) -> bool:
+        """Whether `scene` heeds what was expected: see `View`."""
+        return self._match is not None
+
+    @property
     def precision(self) -> float:
         """Relative precision of the numbers that it shows: see `View`."""
         return precision_of(self._space.dtype in (np.float16, np.float32))

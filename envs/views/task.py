@@ -57,6 +57,11 @@ class TaskView:
         )
 
     @property
+    def matches(self) -> bool:
+        """Whether `scene` heeds what was expected: see `View`."""
+        return self.view.matches
+
+    @property
     def precision(self) -> float:
         """Relative precision of the numbers that it shows: see `View`."""
         return self.view.precision

@@ -135,7 +135,10 @@ class SceneSchema:
 
     def layout(self, names: Iterable[str] | None = None) -> SceneLayout:
         """Layout of a scene with these objects (default: all), in schema order; cached."""
-        present = frozenset(self.order if names is None else names)
+        given = self.order if names is None else tuple(names)
+        if (known := self._layouts.get(given)) is not None:
+            return known
+        present = frozenset(given)
         key = tuple(name for name in self.order if name in present)
         if len(key) != len(present):
             raise ObservationError(
@@ -143,6 +146,7 @@ class SceneSchema:
             )
         if (layout := self._layouts.get(key)) is None:
             layout = self._layouts[key] = SceneLayout(key, tuple(self.type_of(name) for name in key))
+        self._layouts[given] = layout
         return layout
 
     def scene(self, values: Mapping[str, Any]) -> Scene:
