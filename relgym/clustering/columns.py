@@ -219,9 +219,9 @@ class SlotSignature:
 
     def _open(self, column: Column, target: Target) -> bool:
         name = self.types[column.slot].name
-        if name == TASK:
-            return False  # the world goes on whatever it is worth
-        return not column.property.endswith(PRIME) or (name, column.property.rstrip(PRIME)) in target.given
+        if column.property.endswith(PRIME):
+            return (name, column.property.rstrip(PRIME)) in target.given
+        return name != TASK  # the world goes on whatever it is worth
 
     def gather(self, layout: SceneLayout, order: tuple[int, ...]) -> NDArray[np.intp]:
         """Where each column lies in the concatenation of a scene's vector and its next vector.

@@ -5,6 +5,10 @@ how the bounce depends on it. The mode that they found is right where it was fou
 vertical velocity comes, and no mode explains it; the next such hit confirms the weight that the first one asks for.
 Too few to found a mode of their own that could be unified with the first (§3.2.5), they still identify its missing
 term, if the data are exact: that two examples ask for the same weight to many digits is no coincidence.
+
+So it is with a *flag*, a column of 0 and 1: thousands of steps that end nothing say nothing of what an end is paid for,
+and the first few ends do. Since a flag has no third value, its examples need not differ in it; and a weight that it has
+in one mode is confirmed by a single example of another.
 """
 
 from __future__ import annotations
@@ -16,7 +20,6 @@ from numpy.typing import NDArray
 
 from relgym.clustering.discovery import EXACT, SEARCH, verifying_bits
 from relgym.clustering.merging import Known
-from relgym.clustering.mode import Mode
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
@@ -33,7 +36,7 @@ APART: Final = 1e-3
 
 
 def extended(known: Known, signature: int, pool: NDArray[np.intp], *, fresh: int) -> LinearFit | None:
-    """A known mode's function with one more term, which explains a new example and another unexplained one.
+    """A known mode's function with one more term, which explains a new example and other unexplained ones.
 
     Parameters
     ----------
@@ -52,40 +55,56 @@ def extended(known: Known, signature: int, pool: NDArray[np.intp], *, fresh: int
 
     Notes
     -----
-    Only for modes of the target's own properties, and where each example verifies a function by `EXACT` bits.
-    Cost O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCH`, fresh at most `NEWEST`.
+    Where each example verifies a function by `EXACT` bits; where by half of them, only by flags. Flags may extend all
+    modes whose roles have but one object to play them, other columns only those of the target's own properties. Cost
+    O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCH`, fresh at most `NEWEST`.
     """
-    if len(pool) < 2 or verifying_bits(known.y, known.scale) < EXACT:
+    bits = verifying_bits(known.y, known.scale)
+    if not len(pool) or bits < EXACT / 2:
         return None
-    pool = pool[-SEARCH:]
+    pool, exact = pool[-SEARCH:], bits >= EXACT
     for i in sorted(known.clusters, key=lambda k: (-known.clusters[k].fitted, k)):
-        mode = known.clusters[i].mode
-        if not any(role.terms for role in mode.open_roles):
-            members = known.members(i)
-            members = members[known.table.signature_ids[known.rows[members]] == signature]
-            found = _extended(known, signature, mode, members[-SEARCH:], pool, min(fresh, NEWEST))
-            if found is not None:
-                return found
+        members = known.members(i)
+        members = members[known.table.signature_ids[known.rows[members]] == signature]
+        found = _extended(known, signature, i, members[-SEARCH:], pool, min(fresh, NEWEST), exact=exact)
+        if found is not None:
+            return found
     return None
 
 
 def _extended(
-    known: Known, signature: int, mode: Mode, members: NDArray[np.intp], pool: NDArray[np.intp], fresh: int
+    known: Known,
+    signature: int,
+    mode: int,
+    members: NDArray[np.intp],
+    pool: NDArray[np.intp],
+    fresh: int,
+    *,
+    exact: bool,
 ) -> LinearFit | None:
-    slots, tolerance = known.table.signatures[signature], known.scale.tolerance
-    weights = {slots.column(0, name): weight for name, weight in mode.roles[0].terms}
+    cluster, slots, tolerance = known.clusters[mode], known.table.signatures[signature], known.scale.tolerance
+    binding = cluster.binding(known.table, signature)
     order, stages = slots.preference(known.target)
-    if len(members) < len(weights) + 2 or not stages:
+    if binding is None or binding.open or not stages:
+        return None
+    weights = dict(binding.fixed)
+    had = [at for at in range(stages[0]) if int(order[at]) in weights]
+    if len(members) < len(weights) + 2 or len(had) < len(weights):
         return None
     both = np.concatenate([members, pool])
     table, y = known.table.x[known.rows[both]], known.y[both]
-    left = y - mode.intercept - sum(weight * slots.values(table, c) for c, weight in weights.items())
+    left = y - cluster.mode.intercept - sum(weight * slots.values(table, c) for c, weight in weights.items())
     x = slots.matrix(table, order[: stages[0]])
-    had = [at for at in range(x.shape[1]) if int(order[at]) in weights]
+    flags = ((x == 0.0) | (x == 1.0)).all(axis=0)
+    own = exact and not any(role.terms for role in cluster.mode.open_roles)
     for at in range(x.shape[1]):
-        if at in had:
+        if at in had or not (flags[at] or own):
             continue
-        tried = (_agreeing(x[:, at], left, len(members), len(both) - 1 - k, tolerance) for k in range(fresh))
+        told = _told(known, signature, int(order[at])) if flags[at] else None
+        leads = range(len(both) - 1, max(len(both) - 1 - fresh, len(members) - 1), -1)
+        tried = (
+            _agreeing(x[:, at], left, len(members), k, tolerance, told, 1 if exact else 2) for k in leads
+        )
         agree = next((rows for rows in tried if rows is not None), None)
         if agree is None:
             continue
@@ -97,24 +116,43 @@ def _extended(
     return None
 
 
+def _told(known: Known, signature: int, column: int) -> list[float]:
+    """Weights that a column has in known modes."""
+    bindings = [cluster.binding(known.table, signature) for cluster in known.clusters.values()]
+    return [weight for b in bindings if b is not None for c, weight in b.fixed if c == column]
+
+
 def _agreeing(
-    column: NDArray[np.float64], left: NDArray[np.float64], members: int, lead: int, tolerance: float
+    column: NDArray[np.float64],
+    left: NDArray[np.float64],
+    members: int,
+    lead: int,
+    tolerance: float,
+    told: list[float] | None,
+    verifiers: int,
 ) -> NDArray[np.intp] | None:
-    """Rows that one weight of a column explains, `lead` among them; none unless another one verifies it.
+    """Rows that one weight of a column explains, `lead` among them; none unless it is verified.
 
     Parameters
     ----------
     column, left
         Values of the column, and what the mode leaves, in its `members` examples and then in the unexplained ones.
+    told
+        Of a flag: weights that it has in other modes. None of any other column.
+    verifiers
+        How many further examples have to ask for the same weight.
     """
     usual = float(np.median(column[:members]))
     off = column - usual
     start = float(off[lead])
-    if lead < members or start == 0.0 or np.abs(off[:members]).max() > CONSTANT * abs(start):
+    if start == 0.0 or np.abs(off[:members]).max() > CONSTANT * abs(start):
         return None
     weight = float(left[lead]) / start
     fits = np.abs(left - weight * off) <= tolerance
     fits[:members] = False
     fits &= np.abs(off) > APART * abs(start)
-    verify = fits & (np.abs(off - start) > APART * abs(start))
-    return np.flatnonzero(fits) if verify.any() else None
+    verify = fits & (np.arange(len(fits)) != lead)
+    if told is None:
+        verify &= np.abs(off - start) > APART * abs(start)
+    confirmed = any(abs(float(left[lead]) - w * start) <= tolerance for w in told or ())
+    return np.flatnonzero(fits) if confirmed or verify.sum() >= verifiers else None
