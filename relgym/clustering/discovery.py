@@ -212,10 +212,10 @@ def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, 
     found = []
     most = config.max_terms
     for width in stages[:1] if config.own_only else stages:
-        if (
-            width > WIDE
-        ):  # among so many columns a small sample finds some that fit it by chance; no constant does
-            found += [(width, 0, 4), *((width, min(t, most), 4 * min(t, most) + 8) for t in (3, most))]
+        if width > WIDE:
+            # Among so many columns a small sample finds some that fit it by chance; no constant does.
+            found += [(width, 0, 4)] if width == stages[0] else []
+            found += [(width, min(t, most), 4 * min(t, most) + 8) for t in (3, most)]
             continue
         if width <= 6:  # few enough to fit them all and drop what is needless
             found.append((width, min(width, most), min(width, most) + 3))

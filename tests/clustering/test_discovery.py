@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.clustering.discovery import Scale, counts, find_mode, identified, least_examples, plans
+from relgym.clustering.discovery import WIDE, Scale, counts, find_mode, identified, least_examples, plans
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, least_squares
@@ -146,3 +146,19 @@ def test_of_what_counts_a_few_small_numbers_add_up_to_another_by_chance(rng: np.
     ]
     assert found[0] is not None
     assert found[1] is None
+
+
+def test_among_many_columns_a_few_examples_show_a_constant(rng: np.random.Generator) -> None:
+    x = rng.normal(size=(5, WIDE + 20))
+    found = find_mode(
+        x,
+        np.ones(5),
+        np.zeros(5, dtype=int),
+        stages=(WIDE + 20,),
+        fresh=1,
+        scale=Scale(1e-12, 4.0, 6.0),
+        config=ClusteringConfig(min_examples=4),
+        rng=rng,
+    )
+    assert found is not None
+    assert (found.fit.columns, found.fit.intercept, found.size) == ((), 1.0, 5)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from streams import Stream
+from streams import BALL, Stream
 
+from relgym.clustering.columns import SlotSignature
 from relgym.config import ClusteringConfig
+from relgym.scene.objects import ObjectType
 
 SLOPE = "v' = 0.5 v - 0.7 w"
 
@@ -73,3 +75,49 @@ def test_noisy_data_need_more_than_two(rng: np.random.Generator) -> None:
     stream.feed([(0.3, 4.0), (-0.2, 9.0)], [0.5 * 0.3 - 0.7 * 4.0, 0.5 * -0.2 - 0.7 * 9.0])
     (mode,) = stream.clusterer.modes
     assert [name for name, _ in mode.roles[0].terms] == ["v"]
+
+
+def test_a_flag_has_no_third_value_to_differ_in(rng: np.random.Generator) -> None:
+    stream = Stream()
+    grounded(stream, rng)
+    stream.feed([(0.3, 1.0)], [0.5 * 0.3 + 2.0])
+    assert stream.formulas == ["v' = 0.5 v"]
+    stream.feed([(-0.2, 1.0)], [0.5 * -0.2 + 2.0])
+    assert stream.counts() == {"v' = 0.5 v + 2 w": 22}
+
+
+def test_what_a_flag_adds_in_one_mode_an_example_of_another_confirms(rng: np.random.Generator) -> None:
+    stream = Stream()
+    v = rng.normal(size=40)
+    stream.feed(np.column_stack([v, np.zeros(40)]), np.where(v > 0, 0.5, -0.3) * v)
+    stream.feed([(0.3, 1.0), (0.7, 1.0)], [0.5 * 0.3 + 2.0, 0.5 * 0.7 + 2.0])
+    assert stream.formulas == ["v' = -0.3 v", "v' = 0.5 v + 2 w"]
+    stream.feed([(-0.9, 1.0)], [-0.3 * -0.9 + 2.0])
+    assert stream.formulas == ["v' = -0.3 v + 2 w", "v' = 0.5 v + 2 w"]
+
+
+def test_another_mode_confirms_nothing_but_the_same_weight(rng: np.random.Generator) -> None:
+    stream = Stream()
+    v = rng.normal(size=40)
+    stream.feed(np.column_stack([v, np.zeros(40)]), np.where(v > 0, 0.5, -0.3) * v)
+    stream.feed([(0.3, 1.0), (0.7, 1.0)], [0.5 * 0.3 + 2.0, 0.5 * 0.7 + 2.0])
+    stream.feed([(-0.9, 1.0)], [-0.3 * -0.9 + 2.5])
+    assert stream.formulas == ["v' = -0.3 v", "v' = 0.5 v + 2 w"]
+
+
+def test_where_numbers_are_coarser_a_flag_needs_three(rng: np.random.Generator) -> None:
+    stream = Stream(config=ClusteringConfig(noise_std=1e-7))
+    grounded(stream, rng)
+    for count, v in enumerate((0.3, -0.2, 0.9), start=1):
+        stream.feed([(v, 1.0)], [0.5 * v + 2.0])
+        assert (len(stream.clusterer.modes[0].roles[0].terms) == 2) == (count == 3)
+
+
+def test_a_flag_extends_a_mode_of_what_another_object_does(rng: np.random.Generator) -> None:
+    signature = SlotSignature((BALL, ObjectType("action", ("a",))))
+    stream = Stream(signature)
+    rows = np.column_stack([rng.normal(size=20), np.zeros(20), rng.normal(size=20)])
+    stream.feed(rows, 0.5 * rows[:, 2])
+    assert stream.formulas == ["v' = 0.5 action.a"]
+    stream.feed([(0.1, 1.0, 0.3), (0.4, 1.0, -0.2)], [0.15 + 2.0, -0.1 + 2.0])
+    assert stream.formulas == ["v' = 2 w + 0.5 action.a"]

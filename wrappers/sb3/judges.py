@@ -78,9 +78,11 @@ class LearnedTask:
     -----
     What depends on one among several objects of a type can't be learned so.
 
-    Policies seek out what a judge is wrong about. Reward and termination are learned apart, and the thresholds of
-    their clauses differ by a hair: in between, a bonus for an end would be paid without one, again and again. So
-    where the two modes never were right of one and the same real step, the judge doesn't know.
+    The reward may depend on whether the step ends the episode, as a bonus for success does: it is learned given that.
+
+    Policies seek out what a judge is wrong about. Where the bonus is a mode of its own, its clauses' thresholds and
+    those of termination differ by a hair: in between, it would be paid without an end, again and again. So where the
+    two modes never were right of one and the same real step, the judge doesn't know.
     """
 
     learned: Final = True

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import relgym
-from relgym.envs.scripted import push_knowing
+from relgym.envs.scripted import ball_home, push_knowing
 from relgym.wrappers.sb3.judges import LearnedTask
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
+from relgym.wrappers.sb3.stock import changing
 
 MOVING = {("truck", "vx"), ("truck", "px"), ("goal", "ahead"), ("box", "px")}
 
@@ -96,6 +97,41 @@ def test_it_says_nothing_before_it_was_told(rng: np.random.Generator) -> None:
     said = verdicts(judge, steps)
     assert np.isnan(said.rewards).all()
     assert not said.terminated.any()
+
+
+def homecomings(seeds: range) -> list[list[Experience]]:
+    """Episodes of a ball that is steered home."""
+    env = TransitionRecorder(gym.make("relgym/BallGoal-v0", disable_env_checker=True))
+    found = []
+    for seed in seeds:
+        env.reset(seed=seed)
+        over, action = False, None
+        for step in range(500):
+            if step % 5 == 0:
+                action = ball_home(env.get_wrapper_attr("scene"))
+            *_, terminated, truncated, _ = env.step(action)
+            if over := terminated or truncated:
+                break
+        steps = env.take()
+        if over and steps[-1].terminated:
+            found.append(steps)
+    return found
+
+
+def test_a_few_ends_show_what_an_end_is_paid_for() -> None:
+    # Dozens of numbers might say when; the law of progress is the same as ever, and the bonus comes on top.
+    taught, fresh = homecomings(range(7)), homecomings(range(100, 106))
+    judge = LearnedTask(taught[0][0].start.schema, changing(relgym.WorldModel(taught[0][0].start.schema)))
+    for episode in taught:
+        for step in episode:
+            judge.learn_step(step.transition, step.reward, terminated=step.terminated)
+    assert "2 terminated'" in judge.model.describe()
+    assert "terminated' = 1" in judge.model.describe()
+    said = [verdicts(judge, episode) for episode in fresh]
+    right = [abs(v.rewards[-1] - e[-1].reward) < 1e-6 for v, e in zip(said, fresh, strict=True)]
+    assert len(fresh) >= 5
+    assert np.mean(right) > 0.5
+    assert not any(v.terminated[:-1].any() for v in said)
 
 
 @pytest.mark.sb3
