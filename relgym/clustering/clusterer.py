@@ -213,6 +213,7 @@ class ModeClusterer(Population):
         dear, more = bool(slots.features), False
         patience = self._patience(search, dear, dear or bool(slots.chained))
         if search.waiting <= patience or (dear and not turn.take()):
+            self._extend(table, signature, fresh=1, flags=True)  # costs little
             return
         for _ in range(1 if dear else MOST_DISCOVERIES):
             pool = self._pool(table, signature)
@@ -223,11 +224,19 @@ class ModeClusterer(Population):
                 break
             search.failures = 0
         else:
-            pool = self._pool(table, signature)  # the last search left fewer
             more = dear  # there may be further modes, but one search is enough for one step
-        if (wider := extended(self._known(table), signature, pool, fresh=search.waiting)) is not None:
-            self._adopt(table, signature, wider)
+        self._extend(table, signature, fresh=search.waiting)
         search.waiting = search.waiting if more else 0
+
+    def _extend(self, table: ExampleTable, signature: int, *, fresh: int, flags: bool = False) -> None:
+        """Extend modes by terms that new examples show; what one mode tells, older examples of others confirm."""
+        pool = self._pool(table, signature)
+        while (wider := extended(self._known(table), signature, pool, fresh=fresh, flags=flags)) is not None:
+            self._adopt(table, signature, wider)
+            left = self._pool(table, signature)
+            if len(left) >= len(pool):
+                return
+            pool, fresh = left, len(left)
 
     def _patience(self, search: Search, dear: bool, doubtful: bool) -> int:
         """News to wait for until the next search: the more, the oftener it was in vain.

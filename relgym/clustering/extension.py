@@ -6,9 +6,10 @@ vertical velocity comes, and no mode explains it; the next such hit confirms the
 Too few to found a mode of their own that could be unified with the first (§3.2.5), they still identify its missing
 term, if the data are exact: that two examples ask for the same weight to many digits is no coincidence.
 
-So it is with a *flag*, a column of 0 and 1: thousands of steps that end nothing say nothing of what an end is paid for,
-and the first few ends do. Since a flag has no third value, its examples need not differ in it; and a weight that it has
-in one mode is confirmed by a single example of another.
+So it is with a *flag*, which is 0 or 1: thousands of steps that end nothing say nothing of what an end is paid for, and
+the first few ends do. Since a flag has no third value, its examples need not differ in it; and a weight that it has in
+one mode is confirmed by a single example of another. Of a target that is a flag itself, unexplained examples are those
+of its other value, and half as many as found a mode are enough.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import EXACT, SEARCH, verifying_bits
+from relgym.clustering.discovery import EXACT, SEARCH, least_examples, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
@@ -31,11 +32,16 @@ CONSTANT: Final = 1e-9
 NEWEST: Final = 32
 """At most so many new examples are tried."""
 
+FLAGGED: Final = 20.0
+"""Flags ask for fewer bits than `EXACT`: few examples are flagged, so that few pairs could agree by chance."""
+
 APART: Final = 1e-3
 """Examples whose values differ by less, relative to what they differ from the constant, verify nothing."""
 
 
-def extended(known: Known, signature: int, pool: NDArray[np.intp], *, fresh: int) -> LinearFit | None:
+def extended(
+    known: Known, signature: int, pool: NDArray[np.intp], *, fresh: int, flags: bool = False
+) -> LinearFit | None:
     """A known mode's function with one more term, which explains a new example and other unexplained ones.
 
     Parameters
@@ -48,6 +54,8 @@ def extended(known: Known, signature: int, pool: NDArray[np.intp], *, fresh: int
         Numbers of unexplained examples of this signature, oldest first.
     fresh
         How many of the last ones are new; others were tried with one another before.
+    flags
+        Whether only flags are tried.
 
     Returns
     -------
@@ -55,14 +63,17 @@ def extended(known: Known, signature: int, pool: NDArray[np.intp], *, fresh: int
 
     Notes
     -----
-    Where each example verifies a function by `EXACT` bits; where by half of them, only by flags. Flags may extend all
+    Where each example verifies a function by `EXACT` bits; where by `FLAGGED`, only by flags. Flags may extend all
     modes whose roles have but one object to play them, other columns only those of the target's own properties. Cost
     O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCH`, fresh at most `NEWEST`.
     """
     bits = verifying_bits(known.y, known.scale)
-    if not len(pool) or bits < EXACT / 2:
+    if not len(pool) or bits < FLAGGED:
         return None
-    pool, exact = pool[-SEARCH:], bits >= EXACT
+    half = least_examples(known.y, known.scale, known.config) / 2
+    if len(pool) >= max(2, half) and bool(_flags(known.y)):
+        return LinearFit((), (), float(known.y[pool[-1]]), 0.0)
+    pool, exact = pool[-SEARCH:], bits >= EXACT and not flags
     for i in sorted(known.clusters, key=lambda k: (-known.clusters[k].fitted, k)):
         members = known.members(i)
         members = members[known.table.signature_ids[known.rows[members]] == signature]
@@ -95,16 +106,14 @@ def _extended(
     table, y = known.table.x[known.rows[both]], known.y[both]
     left = y - cluster.mode.intercept - sum(weight * slots.values(table, c) for c, weight in weights.items())
     x = slots.matrix(table, order[: stages[0]])
-    flags = ((x == 0.0) | (x == 1.0)).all(axis=0)
+    flags = _flags(x)
     own = exact and not any(role.terms for role in cluster.mode.open_roles)
     for at in range(x.shape[1]):
         if at in had or not (flags[at] or own):
             continue
         told = _told(known, signature, int(order[at])) if flags[at] else None
         leads = range(len(both) - 1, max(len(both) - 1 - fresh, len(members) - 1), -1)
-        tried = (
-            _agreeing(x[:, at], left, len(members), k, tolerance, told, 1 if exact else 2) for k in leads
-        )
+        tried = (_agreeing(x[:, at], left, len(members), k, tolerance, told) for k in leads)
         agree = next((rows for rows in tried if rows is not None), None)
         if agree is None:
             continue
@@ -114,6 +123,12 @@ def _extended(
         if at in fit.columns and np.abs(y[rows] - fit.predict(x[rows])).max() <= tolerance:
             return reordered(fit, order)
     return None
+
+
+def _flags(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which columns hold nothing but 0 and 1."""
+    found: NDArray[np.bool_] = ((values == 0.0) | (values == 1.0)).all(axis=0)
+    return found
 
 
 def _told(known: Known, signature: int, column: int) -> list[float]:
@@ -129,7 +144,6 @@ def _agreeing(
     lead: int,
     tolerance: float,
     told: list[float] | None,
-    verifiers: int,
 ) -> NDArray[np.intp] | None:
     """Rows that one weight of a column explains, `lead` among them; none unless it is verified.
 
@@ -139,8 +153,6 @@ def _agreeing(
         Values of the column, and what the mode leaves, in its `members` examples and then in the unexplained ones.
     told
         Of a flag: weights that it has in other modes. None of any other column.
-    verifiers
-        How many further examples have to ask for the same weight.
     """
     usual = float(np.median(column[:members]))
     off = column - usual
@@ -155,4 +167,4 @@ def _agreeing(
     if told is None:
         verify &= np.abs(off - start) > APART * abs(start)
     confirmed = any(abs(float(left[lead]) - w * start) <= tolerance for w in told or ())
-    return np.flatnonzero(fits) if confirmed or verify.sum() >= verifiers else None
+    return np.flatnonzero(fits) if confirmed or verify.any() else None

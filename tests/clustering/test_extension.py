@@ -105,12 +105,27 @@ def test_another_mode_confirms_nothing_but_the_same_weight(rng: np.random.Genera
     assert stream.formulas == ["v' = -0.3 v", "v' = 0.5 v + 2 w"]
 
 
-def test_where_numbers_are_coarser_a_flag_needs_three(rng: np.random.Generator) -> None:
+def test_where_numbers_are_coarser_only_flags_extend(rng: np.random.Generator) -> None:
     stream = Stream(config=ClusteringConfig(noise_std=1e-7))
     grounded(stream, rng)
-    for count, v in enumerate((0.3, -0.2, 0.9), start=1):
-        stream.feed([(v, 1.0)], [0.5 * v + 2.0])
-        assert (len(stream.clusterer.modes[0].roles[0].terms) == 2) == (count == 3)
+    stream.feed([(0.3, 0.4), (-0.2, 0.9)], [0.5 * 0.3 - 0.7 * 0.4, 0.5 * -0.2 - 0.7 * 0.9])
+    assert stream.formulas == ["v' = 0.5 v"]
+    coarse = Stream(config=ClusteringConfig(noise_std=1e-7))
+    grounded(coarse, rng)
+    coarse.feed([(0.3, 1.0), (-0.2, 1.0)], [0.5 * 0.3 + 2.0, 0.5 * -0.2 + 2.0])
+    assert coarse.counts() == {"v' = 0.5 v + 2 w": 22}
+
+
+def test_half_as_many_examples_show_the_other_value_of_a_target_that_is_a_flag(
+    rng: np.random.Generator,
+) -> None:
+    stream = Stream(config=ClusteringConfig(min_examples=4))
+    stream.feed(rng.normal(size=(60, 2)), np.zeros(60))
+    assert stream.formulas == ["v' = 0"]
+    stream.feed([(0.3, 0.4)], [1.0])
+    assert stream.counts() == {"v' = 0": 60, "noise": 1}
+    stream.feed([(0.9, -0.4)], [1.0])
+    assert stream.counts() == {"v' = 0": 60, "v' = 1": 2}
 
 
 def test_a_flag_extends_a_mode_of_what_another_object_does(rng: np.random.Generator) -> None:

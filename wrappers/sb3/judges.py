@@ -8,7 +8,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config import ClusteringConfig, ModelConfig
+from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
 from relgym.envs.tasks import Judgement
 from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
@@ -30,9 +30,13 @@ _NOW, _NEXT = "now", "next"
 _TOLD: Final = ("reward", "terminated")
 _RIGHT: Final = 1e-6  # how far a right verdict may be off
 
-_EXACT: Final = ModelConfig(frames="world", clustering=ClusteringConfig(min_examples=4))
-"""What a task says is free of noise, and success is rare at first: four examples found a mode."""
-
+_EXACT: Final = ModelConfig(
+    frames="world",
+    clustering=ClusteringConfig(min_examples=4),
+    classification=ClassificationConfig(exemplars_per_state=100),
+)
+"""What a task says is free of noise, and success is rare at first: four examples found a mode. Without bodies there is
+but one relational state, in which a few examples of each mode would leave thresholds blunt."""
 
 _REMEMBERED: Final = 1_000
 """Of so many real steps that ended an episode, and of as many others, the latest, it is looked up which modes were
