@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from plain_envs import Birds
 
-from relgym.envs.views import Rows, Static, TableView, view_from_json
+from relgym.envs.views import Rows, Static, TableView, TaskView, view_from_json
 from relgym.envs.views.matching import matched
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.shapes import Box, Sphere
@@ -73,6 +73,13 @@ def test_rows_are_matched_with_where_they_were_expected() -> None:
     expected = first.replace({("row1", "x"): 1.0, ("row2", "x"): 0.0})
     assert view.scene(crossed, last=first)["row1"]["d"] == -1.0  # nearest to where it was: wrong
     assert view.scene(crossed, last=first, expected=expected)["row1"]["d"] == 1.0
+
+
+def test_only_views_that_match_rows_ask_where_things_were_expected() -> None:
+    assert birds(match={"x": 4.0}).matches
+    assert not birds().matches
+    assert TaskView(birds(match={"x": 4.0})).matches
+    assert not TaskView(birds()).matches
 
 
 def test_what_comes_while_another_goes_gets_a_name_of_its_own() -> None:
