@@ -31,7 +31,6 @@ __all__ = [
     "Change",
     "ChangingWorld",
     "Course",
-    "Glimpses",
     "make_agent",
     "make_dyna",
     "make_env",
@@ -71,8 +70,9 @@ class Course:
     dreams
         How to dream there, where it isn't as by default: parameters of `DynaConfig`.
     glimpse
-        Decisions after which real episodes are cut short for agents that dream (`Glimpses`); 0: never. They need not
-        live through what they can dream, and more beginnings show them more of what there is.
+        Decisions after which real episodes are cut short for agents that dream and are given the reward; 0: never.
+        They need not live through what they can dream, and more beginnings show them more of what there is. Who learns
+        the reward as well must see episodes end well now and then.
     """
 
     name: str
@@ -167,9 +167,6 @@ COURSES: Final = {
     )
 }
 
-_TELLING: Final = 2
-"""Episodes that have to end before a reward that isn't given can be known."""
-
 _DYNA: Final[Mapping[str, Any]] = {"updates": 40, "burst": 10_000}
 """Of all arms with a model: 10,000 and 40 per real step make 36 for each of the first 1,000 real steps."""
 
@@ -219,38 +216,6 @@ class ChangingWorld(gym.Wrapper[Any, Any, Any, Any]):
         return super().step(action)
 
 
-class Glimpses(gym.Wrapper[Any, Any, Any, Any]):
-    """Cuts episodes short, once some have ended by themselves: from these alone one learns what an end is worth.
-
-    Parameters
-    ----------
-    env
-        The env.
-    steps
-        Env steps that an episode lasts at most from then on.
-    ends
-        How many have to end (terminate) first.
-    """
-
-    def __init__(self, env: gym.Env[Any, Any], steps: int, ends: int) -> None:
-        super().__init__(env)
-        self._most, self._wanted = steps, ends
-        self._steps = 0
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Begin an episode."""
-        self._steps = 0
-        return self.env.reset(seed=seed, options=options)
-
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Step; too long an episode is truncated."""
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        self._steps += 1
-        self._wanted -= int(terminated)
-        short = self._wanted <= 0 and self._steps >= self._most
-        return observation, reward, terminated, truncated or (short and not terminated), info
-
-
 def make_env(
     course: Course,
     change: Change | None = None,
@@ -268,12 +233,14 @@ def make_env(
     change
         How the world changes, if it does.
     arm
-        Who is to train in it; default: it is for tests. Episodes of those that dream may be cut short.
+        Who is to train in it; default: it is for tests. Episodes of some may be cut short (`Course.glimpse`).
     spec
         What the flat view shows, where it isn't what the env declares.
     arguments
         Of the env, where they differ from the course's.
     """
+    if course.glimpse and arm is not None and arm.model != "none" and not arm.learned:
+        arguments["max_episode_steps"] = course.glimpse * course.repeat
 
     def made(**own: Any) -> gym.Env[Any, Any]:
         return gym.make(course.env_id, disable_env_checker=True, **{**course.arguments, **arguments, **own})
@@ -281,8 +248,6 @@ def make_env(
     env = made()
     if change is not None:
         env = ChangingWorld(env, made(**change.arguments), change.after)
-    if course.glimpse and arm is not None and arm.model != "none":
-        env = Glimpses(env, course.glimpse * course.repeat, _TELLING if arm.learned else 0)
     env = TransitionRecorder(env)
     return FlatView(ActionRepeat(env, course.repeat) if course.repeat > 1 else env, spec)
 

@@ -6,15 +6,13 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
 from relgym.errors import ConfigError
 from relgym.experiments.dyna import Examination, Run, run, solved_at
-from relgym.experiments.dyna_arms import ARMS, COURSES, Change, Glimpses, make_env
+from relgym.experiments.dyna_arms import ARMS, COURSES, Change, make_env
 from relgym.experiments.dyna_report import curves, draw_runs, interquartile_mean, interval, summary
 
 
@@ -82,34 +80,6 @@ def test_who_dreams_sees_more_beginnings(arm: str, decisions: int) -> None:
         *_, terminated, truncated, _ = env.step(np.zeros(2, np.float32))
         lasted, over = lasted + 1, terminated or truncated
     assert lasted == decisions and truncated
-
-
-class Counting(gym.Env[int, int]):
-    """Ends with action 1; shows how many steps the episode has lasted."""
-
-    observation_space = gym.spaces.Discrete(100)
-    action_space = gym.spaces.Discrete(2)
-
-    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[int, dict[str, Any]]:
-        super().reset(seed=seed)
-        self.steps = 0
-        return 0, {}
-
-    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
-        self.steps += 1
-        return self.steps, 0.0, action == 1, False, {}
-
-
-@pytest.mark.parametrize(("ends", "first"), [(0, 3), (1, None), (2, None)])
-def test_episodes_are_cut_once_enough_have_ended_by_themselves(ends: int, first: int | None) -> None:
-    env = Glimpses(Counting(), 3, ends)
-    for number in range(3):
-        env.reset()
-        cut = next((k for k in range(1, 9) if env.step(0)[3]), None)
-        assert cut == (3 if number >= ends else first)
-        env.reset()
-        *_, terminated, truncated, _ = env.step(1)
-        assert (terminated, truncated) == (True, False)
 
 
 def test_a_world_changes_with_the_first_episode_after_its_time() -> None:
