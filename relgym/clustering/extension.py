@@ -70,9 +70,10 @@ def extended(
     bits = verifying_bits(known.y, known.scale)
     if not len(pool) or bits < FLAGGED:
         return None
+    value = float(known.y[pool[-1]])
     half = least_examples(known.y, known.scale, known.config) / 2
-    if len(pool) >= max(2, half) and bool(_flags(known.y)):
-        return LinearFit((), (), float(known.y[pool[-1]]), 0.0)
+    if int((known.y[pool] == value).sum()) >= max(2, half) and bool(_flags(known.y)):
+        return LinearFit((), (), value, 0.0)
     pool, exact = pool[-SEARCH:], bits >= EXACT and not flags
     for i in sorted(known.clusters, key=lambda k: (-known.clusters[k].fitted, k)):
         members = known.members(i)
