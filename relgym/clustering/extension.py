@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import EXACT, SEARCH, least_examples, verifying_bits
+from relgym.clustering.discovery import EXACT, SEARCH, counts, least_examples, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
@@ -63,7 +63,8 @@ def extended(
 
     Notes
     -----
-    Where each example verifies a function by `EXACT` bits; where by `FLAGGED`, only by flags. Flags may extend all
+    Where each example verifies a function by `EXACT` bits; where by `FLAGGED`, only by flags, and never by flags where
+    the target counts something. Flags may extend all
     modes whose roles have but one object to play them, other columns only those of the target's own properties. Cost
     O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCH`, fresh at most `NEWEST`.
     """
@@ -75,10 +76,22 @@ def extended(
     if int((known.y[pool] == value).sum()) >= max(2, half) and bool(_flags(known.y)):
         return LinearFit((), (), value, 0.0)
     pool, exact = pool[-SEARCH:], bits >= EXACT and not flags
+    counting = counts(known.y, known.scale)  # where whole numbers agree, they often do so by chance
+    if counting and not exact:
+        return None
     for i in sorted(known.clusters, key=lambda k: (-known.clusters[k].fitted, k)):
         members = known.members(i)
         members = members[known.table.signature_ids[known.rows[members]] == signature]
-        found = _extended(known, signature, i, members[-SEARCH:], pool, min(fresh, NEWEST), exact=exact)
+        found = _extended(
+            known,
+            signature,
+            i,
+            members[-SEARCH:],
+            pool,
+            min(fresh, NEWEST),
+            exact=exact,
+            flagged=not counting,
+        )
         if found is not None:
             return found
     return None
@@ -93,6 +106,7 @@ def _extended(
     fresh: int,
     *,
     exact: bool,
+    flagged: bool,
 ) -> LinearFit | None:
     cluster, slots, tolerance = known.clusters[mode], known.table.signatures[signature], known.scale.tolerance
     binding = cluster.binding(known.table, signature)
@@ -107,7 +121,7 @@ def _extended(
     table, y = known.table.x[known.rows[both]], known.y[both]
     left = y - cluster.mode.intercept - sum(weight * slots.values(table, c) for c, weight in weights.items())
     x = slots.matrix(table, order[: stages[0]])
-    flags = _flags(x)
+    flags = _flags(x) & flagged
     own = exact and not any(role.terms for role in cluster.mode.open_roles)
     for at in range(x.shape[1]):
         if at in had or not (flags[at] or own):

@@ -136,3 +136,11 @@ def test_a_flag_extends_a_mode_of_what_another_object_does(rng: np.random.Genera
     assert stream.formulas == ["v' = 0.5 action.a"]
     stream.feed([(0.1, 1.0, 0.3), (0.4, 1.0, -0.2)], [0.15 + 2.0, -0.1 + 2.0])
     assert stream.formulas == ["v' = 2 w + 0.5 action.a"]
+
+
+def test_where_a_target_counts_flags_that_agree_say_nothing(rng: np.random.Generator) -> None:
+    stream = Stream()
+    v = rng.integers(-9, 10, size=60).astype(float)
+    stream.feed(np.column_stack([v, np.zeros(60)]), v)
+    stream.feed([(3.0, 1.0), (-2.0, 1.0)], [5.0, 0.0])
+    assert stream.counts() == {"v' = v": 60, "noise": 2}
