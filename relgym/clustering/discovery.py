@@ -88,10 +88,10 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
     return math.log2(max(spread / scale.tolerance, 2.0))
 
 
-def counts(y: NDArray[np.float64], scale: Scale) -> bool:
-    """Whether a target's latest values are few whole multiples of one step, so that another that fits says little."""
+def counts(y: NDArray[np.float64], scale: Scale, most: int = COUNTED) -> bool:
+    """Whether a target's latest values are at most so many whole multiples of one step: then one that fits says little."""
     values = np.unique(y[-RECENT:])
-    if not 3 <= len(values) <= COUNTED:
+    if not 3 <= len(values) <= most:
         return False
     steps = np.diff(values)
     ratio = steps / steps.min()

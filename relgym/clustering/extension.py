@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import EXACT, SEARCH, counts, least_examples, verifying_bits
+from relgym.clustering.discovery import EXACT, RECENT, SEARCH, counts, least_examples, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
@@ -76,7 +76,7 @@ def extended(
     if int((known.y[pool] == value).sum()) >= max(2, half) and bool(_flags(known.y)):
         return LinearFit((), (), value, 0.0)
     pool, exact = pool[-SEARCH:], bits >= EXACT and not flags
-    counting = counts(known.y, known.scale)  # where whole numbers agree, they often do so by chance
+    counting = counts(known.y, known.scale, RECENT)  # where whole numbers agree, they often do so by chance
     if counting and not exact:
         return None
     for i in sorted(known.clusters, key=lambda k: (-known.clusters[k].fitted, k)):
