@@ -89,7 +89,7 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
 
 
 def counts(y: NDArray[np.float64], scale: Scale, most: int = COUNTED) -> bool:
-    """Whether a target's latest values are at most so many whole multiples of one step: then one that fits says little."""
+    """Whether a target's latest values are at most so many whole multiples of one step: one that fits says little."""
     values = np.unique(y[-RECENT:])
     if not 3 <= len(values) <= most:
         return False
