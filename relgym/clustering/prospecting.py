@@ -1,0 +1,167 @@
+"""Modes looked for among what none explains: when, in which examples, and what becomes of what is found (§3.2.2)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.discovery import counts, find_mode, least_examples
+from relgym.clustering.em import Cluster
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.extension import extended
+from relgym.clustering.merging import Known, generalise
+from relgym.clustering.mode import NOISE
+from relgym.clustering.population import Population
+from relgym.clustering.turn import Search, Turn
+from relgym.clustering.unification import reordered
+from relgym.config import ClusteringConfig
+from relgym.numeric.stepwise import LinearFit
+from relgym.scene.objects import Target
+
+__all__ = ["Prospector"]
+
+HOPELESS = 200
+"""Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
+
+MOST_DISCOVERIES = 4
+"""New modes per example at most; what is left in the noise waits for the next one."""
+
+
+class Prospector(Population):
+    """Examples and modes, and the search for further modes; when there is reason to is the clusterer's business.
+
+    Parameters
+    ----------
+    target, config
+        As of `Population`.
+    seed
+        Seed of the random draws.
+
+    Attributes
+    ----------
+    approximate
+        Whether the noise assumed is what an approximation leaves, for want of an exact law.
+    """
+
+    def __init__(self, target: Target, config: ClusteringConfig, *, seed: int) -> None:
+        super().__init__(target, config)
+        self.approximate = False
+        self._rng = np.random.default_rng(seed)
+        self._searches: dict[int, Search] = {}
+
+    @property
+    def _needed(self) -> int:
+        """Examples that found a mode: each verifies it by as many bits as tell it from all values seen."""
+        return least_examples(self.y, self.scale, self.config)
+
+    def _discover(self, table: ExampleTable, example: int, turn: Turn) -> None:
+        signature = int(table.signature_ids[self.rows[example]])
+        search = self._searches.setdefault(signature, Search())
+        search.waiting += 1
+        slots = table.signatures[signature]
+        dear, more = bool(slots.features), False
+        patience = self._patience(search, dear, dear or bool(slots.chained))
+        if search.waiting <= patience or (dear and not turn.take()):
+            self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)  # costs little
+            return
+        for _ in range(1 if dear else MOST_DISCOVERIES):
+            pool = self._pool(table, signature)
+            if len(pool) < self._needed:
+                break  # not a failure: nothing was searched
+            if not self._search_once(table, signature, pool, fresh=search.waiting):
+                search.failures += 1
+                break
+            search.failures = 0
+        else:
+            pool = self._pool(table, signature)  # the last search left fewer
+            more = dear  # there may be further modes, but one search is enough for one step
+        self._extend(table, signature, pool, fresh=search.waiting)
+        search.waiting = search.waiting if more else 0
+
+    def _extend(
+        self,
+        table: ExampleTable,
+        signature: int,
+        pool: NDArray[np.intp],
+        *,
+        fresh: int,
+        flags: bool = False,
+    ) -> None:
+        """Extend modes by terms that new examples show; what one mode tells, older examples of others confirm."""
+        while (wider := extended(self._known(table), signature, pool, fresh=fresh, flags=flags)) is not None:
+            self._adopt(table, signature, wider)
+            left = self._pool(table, signature)
+            if len(left) >= len(pool):
+                return
+            pool, fresh = left, len(left)
+
+    def _patience(self, search: Search, dear: bool, doubtful: bool) -> int:
+        """News to wait for until the next search: the more, the oftener it was in vain.
+
+        It is longer where searches are dear, for features, or may be in vain, since nobody said that there are laws.
+        Where they are cheap it may take many to find the first law of many, and none is given up.
+        """
+        lost = dear and self._log.seen >= HOPELESS and 2 * self.noise_examples > self._log.seen
+        if self.approximate or lost:  # what an approximation leaves is mostly its own tail
+            return search.failures * search.failures
+        return search.failures if doubtful else search.failures // 6
+
+    def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
+        """Noise examples of one signature that aren't some mode's tail, oldest first."""
+        pool: NDArray[np.intp] = np.flatnonzero(self.labels == NOISE)
+        pool = pool[table.signature_ids[self.rows[pool]] == signature]
+        if len(pool) and self.clusters:
+            near = np.full(len(pool), np.inf)
+            for cluster in self.clusters.values():
+                near = np.minimum(near, cluster.errors(table, self.rows[pool], self.y[pool], self.scale)[0])
+            pool = pool[near > self.scale.tail]
+        return pool
+
+    def _search_once(
+        self, table: ExampleTable, signature: int, pool: NDArray[np.intp], *, fresh: int
+    ) -> bool:
+        slots = table.signatures[signature]
+        order, stages = slots.preference(self.target)
+        rows = self.rows[pool]
+        found = find_mode(
+            slots.matrix(table.x[rows], order),
+            self.y[pool],
+            table.strata[rows],
+            stages=stages,
+            fresh=fresh,
+            scale=self.scale,
+            config=self.config,
+            rng=self._rng,
+            needed=self._needed,
+            counting=counts(self.y, self.scale),
+        )
+        if found is None:
+            return False
+        self._adopt(table, signature, reordered(found.fit, order))
+        return True
+
+    def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit) -> None:
+        """Make a mode of a function: unify it with the known ones (§3.2.5), reassign examples (§3.2.4)."""
+        known = self._known(table)
+        self._admit(table, known, known.cluster(fit, signature))
+
+    def _known(self, table: ExampleTable) -> Known:
+        return Known(
+            table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
+        )
+
+    def _admit(self, table: ExampleTable, known: Known, cluster: Cluster) -> int:
+        """Take up a mode that has no id yet; the id that it gets."""
+        members = self._explained(table, cluster, self._noise())
+        cluster, absorbed = generalise(known, cluster, members, rng=self._rng)
+        inherited = sum(self._log.forgotten.pop(i, 0) for i in absorbed)
+        for i in absorbed:
+            self._remove(i)
+        new = self._next_id
+        self._next_id += 1
+        self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
+        self._log.forgotten[new] += inherited
+        self._reassign(table, new)
+        return new
