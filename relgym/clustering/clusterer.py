@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import least_examples
-from relgym.clustering.em import Cluster, preferred, refit
+from relgym.clustering.em import Cluster, refit
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.last_resort import last_resort, timely
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport
 from relgym.clustering.prospecting import Prospector
+from relgym.clustering.suspects import review_due
 from relgym.clustering.turn import Search, Turn
 from relgym.config import ClusteringConfig
 from relgym.scene.objects import Target
@@ -81,22 +82,24 @@ class ModeClusterer(Prospector):
         before = set(self.clusters)
         example = self._append(table, row, y)
         errors = self._errors_of(table, example)
-        fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
-        if fitting:
-            mode = preferred(fitting, errors, self.clusters, self.scale, self.config)
+        if (mode := self._choose(table, example, errors)) != NOISE:
             self.labels[example] = mode
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
             self._discover(table, example, turn)
+        reassigned = review_due(self._log.seen) and self._review(table)
         self.due |= self._hopeless(table)
         if self.due and (not self._dear(table) or turn.take()):
             self.approximate_now(table)
         after = set(self.clusters)
-        if after != set(errors):
+        fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
+        if reassigned or after != set(errors):
             ids, fits = self.fits(table, np.array([example]))
             fitting = [i for i, ok in zip(ids, fits[0], strict=True) if ok]
         created, removed = tuple(sorted(after - before)), tuple(sorted(before - after))
-        return ClusterReport(int(self.labels[example]), tuple(sorted(fitting)), created, removed)
+        return ClusterReport(
+            int(self.labels[example]), tuple(sorted(fitting)), created, removed, reassigned=reassigned
+        )
 
     def _append(self, table: ExampleTable, row: int, y: float) -> int:
         example = self._log.append(row, y)
@@ -156,6 +159,15 @@ class ModeClusterer(Prospector):
     def _assume(self, sigma: float) -> None:
         """Another noise: the tolerances follow."""
         self.scale = replace(self.scale, sigma=sigma, misfit=self.approximate)
+
+    def _review(self, table: ExampleTable) -> bool:
+        """The same with the noise that the modes known so far leave, which tells more than a first estimate did."""
+        if self._chancy and self.config.noise_std == "auto":
+            left = self._residual_spread(table)
+            if left > self.floor:
+                self._spread = left
+                self._assume(left)
+        return super()._review(table)
 
     def _estimate(self, table: ExampleTable, floor: float) -> float:
         """Noise among examples of the newest example's signature."""
@@ -258,6 +270,7 @@ class ModeClusterer(Prospector):
             "rounding": self.floor,
             "approximate": self.approximate,
             **({"due": True} if self.due else {}),
+            **({"chancy": True} if self._chancy else {}),
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
@@ -274,6 +287,7 @@ class ModeClusterer(Prospector):
         self._next_id = int(data["next_id"])
         self._largest, self._reach = float(data["largest"]), float(data["reach"])
         self.approximate, self.due = bool(data["approximate"]), bool(data.get("due", False))
+        self._chancy = bool(data.get("chancy", False))
         self._assume(float(data["sigma"]))
         self._spread, self.floor = float(data["spread"]), float(data["rounding"])
         self._known_noise = int(data["noise"])

@@ -18,6 +18,13 @@ from relgym.scene.objects import Target
 __all__ = ["ClusterReport", "Population"]
 
 
+MEDIAN = 0.6745
+"""Median of a standard normal variable's absolute value."""
+
+ROUNDS = 3
+"""Expectation steps of one reassignment of all examples."""
+
+
 @dataclass(frozen=True, slots=True)
 class ClusterReport:
     """What one example changed.
@@ -30,17 +37,20 @@ class ClusterReport:
         Ids of all modes that explain it.
     created, removed
         Ids of modes that came and went.
+    reassigned
+        Whether older examples were assigned anew.
     """
 
     mode: int
     fits: tuple[int, ...]
     created: tuple[int, ...] = ()
     removed: tuple[int, ...] = ()
+    reassigned: bool = False
 
     @property
     def changed(self) -> bool:
-        """Whether the set of modes is another than before."""
-        return bool(self.created or self.removed)
+        """Whether the set of modes is another than before, or its examples are."""
+        return bool(self.created or self.removed or self.reassigned)
 
 
 class Population:
@@ -69,6 +79,7 @@ class Population:
         self._log = AssignmentLog()
         self._next_id = 1
         self._known_noise = 0  # of a model that was loaded without its examples
+        self._chancy = False  # whether noise is so large that modes explain others' examples by chance
 
     @property
     def y(self) -> NDArray[np.float64]:
@@ -127,6 +138,72 @@ class Population:
         rows, y = self.rows[example : example + 1], self.y[example : example + 1]
         return {i: float(c.errors(table, rows, y, self.scale)[0][0]) for i, c in self.clusters.items()}
 
+    def _choose(self, table: ExampleTable, example: int, errors: dict[int, float]) -> int:
+        """E-step for one example: the mode that it is assigned to, of those that explain it; `NOISE` if none does."""
+        fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
+        if not fitting:
+            return NOISE
+        if not self._chancy or len(fitting) == 1:
+            return preferred(fitting, errors, self.clusters, self.scale, self.config)
+        there = np.flatnonzero(table.strata[self.rows] == table.strata[self.rows[example]])
+        ids = np.array(sorted(fitting))
+        error = np.array([[errors[i] for i in ids.tolist()]])
+        held = np.array([np.count_nonzero(self.labels[there] == i) for i in ids], dtype=float)
+        held -= self.labels[example] == ids
+        return int(ids[self._cost(ids, error, held[None])[0].argmin()])
+
+    def _cost(
+        self, ids: NDArray[np.intp], errors: NDArray[np.float64], held: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """What speaks against each mode where noise is large, in nats, shape ``(n, modes)``.
+
+        Its error; that it holds few examples in the same relational state; and each parameter.
+
+        Parameters
+        ----------
+        ids
+            Modes, shape ``(modes,)``.
+        errors
+            Of each example by each mode, ``(n, modes)``.
+        held
+            How many other examples of its state are assigned to each mode, likewise.
+        """
+        surprise = np.where(
+            errors <= self.scale.tolerance, 0.5 * np.square(errors / self.scale.sigma), np.inf
+        )
+        size = np.array([self.clusters[i].fitted + self.clusters[i].unfitted for i in ids.tolist()])
+        parameters = np.array([self.clusters[i].mode.parameters for i in ids.tolist()])
+        cost: NDArray[np.float64] = surprise - np.log(held + size / size.sum()) + parameters
+        return cost
+
+    def _reassign_all(self, table: ExampleTable) -> None:
+        """E-step for all examples where noise is large, and M-step for all modes."""
+        ids = np.array(sorted(self.clusters), dtype=np.intp)
+        if not len(ids):
+            return
+        errors = np.stack(
+            [self.clusters[i].errors(table, self.rows, self.y, self.scale)[0] for i in ids.tolist()], axis=1
+        )
+        explained = (errors <= self.scale.tolerance).any(axis=1)
+        _, state = np.unique(table.strata[self.rows], return_inverse=True)
+        for _ in range(ROUNDS):
+            own = self.labels[:, None] == ids
+            held = np.stack([np.bincount(state, weights=column) for column in own.T], axis=1)
+            cost = self._cost(ids, errors, held[state] - own)
+            self.labels[:] = np.where(explained, ids[cost.argmin(axis=1)], NOISE)
+        for i in ids.tolist():
+            members = np.flatnonzero(self.labels == i)
+            self.clusters[i] = refit(self.clusters[i], table, self.rows[members], self.y[members], self.scale)
+
+    def _residual_spread(self, table: ExampleTable) -> float:
+        """Standard deviation of what modes leave of their examples, by the median, which no tail moves; 0 if none."""
+        left = [np.zeros(0)]
+        for i, cluster in self.clusters.items():
+            members = np.flatnonzero(self.labels == i)
+            left.append(cluster.errors(table, self.rows[members], self.y[members], self.scale)[0])
+        errors = np.concatenate(left)
+        return float(np.median(errors)) / MEDIAN if len(errors) else 0.0
+
     def _noise(self) -> NDArray[np.intp]:
         return np.flatnonzero(self.labels == NOISE)
 
@@ -165,12 +242,9 @@ class Population:
             self._rehome(table, orphans)
 
     def _rehome(self, table: ExampleTable, examples: NDArray[np.intp]) -> None:
-        ids, fits = self.fits(table, examples)
-        for example, row in zip(examples, fits, strict=True):
-            fitting = [i for i, ok in zip(ids, row, strict=True) if ok]
-            if fitting:
-                errors = self._errors_of(table, int(example))
-                self.labels[example] = preferred(fitting, errors, self.clusters, self.scale, self.config)
+        _, fits = self.fits(table, examples)
+        for example in examples[fits.any(axis=1)].tolist():
+            self.labels[example] = self._choose(table, example, self._errors_of(table, example))
 
 
 def _simpler(mode: Mode, rival: Mode) -> bool:

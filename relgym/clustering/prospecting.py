@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import counts, find_mode, least_examples
+from relgym.clustering.discovery import EXACT, counts, find_mode, least_examples, verifying_bits
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.extension import extended
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
+from relgym.clustering.suspects import Evidence, likeliest, suspects
 from relgym.clustering.turn import Search, Turn
 from relgym.clustering.unification import reordered
 from relgym.config import ClusteringConfig
@@ -24,6 +26,12 @@ __all__ = ["Prospector"]
 
 HOPELESS = 200
 """Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
+
+CHANCY = 0.5
+"""Where an example verifies a function by less than so much of `EXACT`, others' examples fit it by chance."""
+
+SURPRISING = 2.0
+"""A new mode takes over examples that the known ones miss by so many standard deviations."""
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
@@ -113,10 +121,7 @@ class Prospector(Population):
         pool: NDArray[np.intp] = np.flatnonzero(self.labels == NOISE)
         pool = pool[table.signature_ids[self.rows[pool]] == signature]
         if len(pool) and self.clusters:
-            near = np.full(len(pool), np.inf)
-            for cluster in self.clusters.values():
-                near = np.minimum(near, cluster.errors(table, self.rows[pool], self.y[pool], self.scale)[0])
-            pool = pool[near > self.scale.tail]
+            pool = pool[self._least_errors(table, pool) > self.scale.tail]
         return pool
 
     def _search_once(
@@ -142,6 +147,76 @@ class Prospector(Population):
         self._adopt(table, signature, reordered(found.fit, order))
         return True
 
+    def _review(self, table: ExampleTable) -> bool:
+        """Where noise is large, look for modes whose examples others explain by chance, and assign all anew."""
+        self._chancy = not self.scale.misfit and verifying_bits(self.y, self.scale) <= CHANCY * EXACT
+        if not self._chancy:
+            return False
+        ids = table.signature_ids[self.rows]
+        for signature in np.unique(ids).tolist():
+            there = np.flatnonzero(ids == signature)
+            for _ in range(MOST_DISCOVERIES):
+                found = self._among_suspects(table, signature, there)
+                if found is None or not self._take_over(table, signature, *found):
+                    break
+        self._reassign_all(table)
+        self._prune(table)
+        return True
+
+    def _among_suspects(
+        self, table: ExampleTable, signature: int, examples: NDArray[np.intp]
+    ) -> tuple[LinearFit, NDArray[np.intp]] | None:
+        """A function of the object's own state that explains suspects well enough, and those that it takes over."""
+        slots = table.signatures[signature]
+        order, stages = slots.preference(self.target)
+        order = order[: stages[0]]
+        known = self._least_errors(table, examples)
+        strata = table.strata[self.rows[examples]]
+        part = suspects(strata, known, self.scale)
+        rows = self.rows[examples[part]]
+        evidence = Evidence(
+            slots.matrix(table.x[rows], order),
+            self.y[examples[part]],
+            known[part],
+            scale=self.scale,
+            spread=float(np.ptp(self.y)),
+        )
+        found = likeliest(evidence, strata[part], rng=self._rng, most=self.config.max_terms)
+        if found is None:
+            return None
+        taken = examples[part[evidence.close(found) & (known[part] > SURPRISING * self.scale.sigma)]]
+        if 2 * len(taken) < self._needed:
+            return None
+        return reordered(found, order), taken
+
+    def _take_over(
+        self, table: ExampleTable, signature: int, fit: LinearFit, taken: NDArray[np.intp]
+    ) -> bool:
+        """Make a mode of suspects' function; whether that leaves more modes, and none worse explained for it."""
+        known = self._known(table)
+        cluster, absorbed = generalise(known, known.cluster(fit, signature), taken, rng=self._rng)
+        kept = [c for i, c in self.clusters.items() if i not in absorbed]
+        if absorbed and self._misfit(table, [*kept, cluster]) > self._misfit(table, self.clusters.values()):
+            return False  # another of the same, that suits these better and all others worse
+        self.labels[taken] = NOISE
+        self._install(table, cluster, absorbed)
+        return not absorbed
+
+    def _misfit(self, table: ExampleTable, clusters: Iterable[Cluster]) -> float:
+        """Sum of all examples' squared errors by the mode that explains each best, in squares of the tail."""
+        least = self._least_errors(table, np.arange(len(self._log)), clusters)
+        return float(np.square(np.minimum(least / self.scale.tail, 1.0)).sum())
+
+    def _least_errors(
+        self, table: ExampleTable, examples: NDArray[np.intp], clusters: Iterable[Cluster] | None = None
+    ) -> NDArray[np.float64]:
+        """Error of the mode that explains each example best, infinite where none applies; default: of all modes."""
+        least = np.full(len(examples), np.inf)
+        for cluster in self.clusters.values() if clusters is None else clusters:
+            errors, _ = cluster.errors(table, self.rows[examples], self.y[examples], self.scale)
+            least = np.minimum(least, errors)
+        return least
+
     def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit) -> None:
         """Make a mode of a function: unify it with the known ones (§3.2.5), reassign examples (§3.2.4)."""
         known = self._known(table)
@@ -155,7 +230,10 @@ class Prospector(Population):
     def _admit(self, table: ExampleTable, known: Known, cluster: Cluster) -> int:
         """Take up a mode that has no id yet; the id that it gets."""
         members = self._explained(table, cluster, self._noise())
-        cluster, absorbed = generalise(known, cluster, members, rng=self._rng)
+        return self._install(table, *generalise(known, cluster, members, rng=self._rng))
+
+    def _install(self, table: ExampleTable, cluster: Cluster, absorbed: tuple[int, ...]) -> int:
+        """Put a mode in the place of those it absorbed; its id."""
         inherited = sum(self._log.forgotten.pop(i, 0) for i in absorbed)
         for i in absorbed:
             self._remove(i)
