@@ -203,6 +203,11 @@ class ClusteringConfig:
     stickiness
         Whether, of the modes that explain an example equally well, those with fewest parameters win
         ("simple", default) or, as in the original program, whichever is nearest ("nearest").
+    review
+        Whether, where noise is so large that modes explain each other's examples by chance (an example verifies a
+        function by 12 bits at most), all are assigned anew as they become more, by their errors and by what each mode
+        has in their relational state; and modes are sought among those that are explained badly
+        (`relgym.clustering.suspects`). Default true; the thesis knew noise as what no mode explains.
     """
 
     noise_std: float | Literal["auto"] = "auto"
@@ -217,6 +222,7 @@ class ClusteringConfig:
     refit_growth: float = 2.0
     approximate: bool = True
     stickiness: Literal["simple", "nearest"] = "simple"
+    review: bool = True
 
     def __post_init__(self) -> None:
         _one_of(self, stickiness=("simple", "nearest"))
@@ -299,7 +305,7 @@ class ModelConfig:
         relational state, weighted; σ is estimated unless it is given.
         """
         clustering = ClusteringConfig(
-            min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9, approximate=False
+            min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9, approximate=False, review=False
         )
         return cls._world(clustering, ClassificationConfig.thesis(), **changes)
 
@@ -320,6 +326,7 @@ class ModelConfig:
             unify_ratio=0.9,
             approximate=False,
             stickiness="nearest",
+            review=False,
         )
         return cls._world(clustering, ClassificationConfig.original(), **changes)
 

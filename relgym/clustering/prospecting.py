@@ -149,7 +149,8 @@ class Prospector(Population):
 
     def _review(self, table: ExampleTable) -> bool:
         """Where noise is large, look for modes whose examples others explain by chance, and assign all anew."""
-        self._chancy = not self.scale.misfit and verifying_bits(self.y, self.scale) <= CHANCY * EXACT
+        by_chance = not self.scale.misfit and verifying_bits(self.y, self.scale) <= CHANCY * EXACT
+        self._chancy = self.config.review and by_chance
         if not self._chancy:
             return False
         ids = table.signature_ids[self.rows]

@@ -12,7 +12,7 @@ from streams import Stream
 
 from relgym.clustering.discovery import Scale
 from relgym.clustering.suspects import FIRST, Evidence, likeliest, review_due, suspects
-from relgym.config import ClusteringConfig
+from relgym.config import ClusteringConfig, ModelConfig
 from relgym.numeric.stepwise import LinearFit
 
 SIGMA = 0.1
@@ -130,6 +130,17 @@ def test_reviews_say_that_examples_were_assigned_anew(rng: np.random.Generator) 
     x, y, _ = bouncing(4e-3, rng, n=640)
     reports = Stream(config=ClusteringConfig(noise_std=4e-3)).feed(x, y)
     assert [k + 1 for k, r in enumerate(reports) if r.reassigned] == [512, 640]
+
+
+def test_a_review_can_be_switched_off(rng: np.random.Generator) -> None:
+    x, y, _ = bouncing(4e-3, rng, n=640)
+    reports = Stream(config=ClusteringConfig(noise_std=4e-3, review=False)).feed(x, y)
+    assert not any(r.reassigned for r in reports)
+
+
+@pytest.mark.parametrize("preset", [ModelConfig.thesis(), ModelConfig.original()])
+def test_the_thesis_knew_no_reviews(preset: ModelConfig) -> None:
+    assert not preset.clustering.review
 
 
 def test_exact_data_are_never_reviewed(rng: np.random.Generator) -> None:
