@@ -21,6 +21,9 @@ __all__ = ["ClusterReport", "Population"]
 MEDIAN = 0.6745
 """Median of a standard normal variable's absolute value."""
 
+LATEST = 16_384
+"""So many of the latest examples tell a mode's share in a relational state, while examples come one by one."""
+
 ROUNDS = 3
 """Expectation steps of one reassignment of all examples."""
 
@@ -139,17 +142,17 @@ class Population:
         return {i: float(c.errors(table, rows, y, self.scale)[0][0]) for i, c in self.clusters.items()}
 
     def _choose(self, table: ExampleTable, example: int, errors: dict[int, float]) -> int:
-        """E-step for one example: the mode that it is assigned to, of those that explain it; `NOISE` if none does."""
+        """E-step for one example that no mode has: the one of those that explain it; `NOISE` if none does."""
         fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
         if not fitting:
             return NOISE
         if not self._chancy or len(fitting) == 1:
             return preferred(fitting, errors, self.clusters, self.scale, self.config)
-        there = np.flatnonzero(table.strata[self.rows] == table.strata[self.rows[example]])
+        labels = self.labels[-LATEST:]
+        labels = labels[table.strata[self.rows[-LATEST:]] == table.strata[self.rows[example]]]
         ids = np.array(sorted(fitting))
         error = np.array([[errors[i] for i in ids.tolist()]])
-        held = np.array([np.count_nonzero(self.labels[there] == i) for i in ids], dtype=float)
-        held -= self.labels[example] == ids
+        held = np.array([np.count_nonzero(labels == i) for i in ids], dtype=float)
         return int(ids[self._cost(ids, error, held[None])[0].argmin()])
 
     def _cost(
