@@ -18,9 +18,6 @@ from relgym.scene.objects import Target
 __all__ = ["ClusterReport", "Population"]
 
 
-MEDIAN = 0.6745
-"""Median of a standard normal variable's absolute value."""
-
 LATEST = 16_384
 """So many of the latest examples tell a mode's share in a relational state, while examples come one by one."""
 
@@ -199,13 +196,16 @@ class Population:
             self.clusters[i] = refit(self.clusters[i], table, self.rows[members], self.y[members], self.scale)
 
     def _residual_spread(self, table: ExampleTable) -> float:
-        """Standard deviation of what modes leave of their examples, by the median, which no tail moves; 0 if none."""
-        left = [np.zeros(0)]
+        """Root mean square of what modes leave of their examples; 0 if there are none.
+
+        Not a median: where noise depends on the state, tolerances must suit the examples where it is large.
+        """
+        total, count = 0.0, 0
         for i, cluster in self.clusters.items():
             members = np.flatnonzero(self.labels == i)
-            left.append(cluster.errors(table, self.rows[members], self.y[members], self.scale)[0])
-        errors = np.concatenate(left)
-        return float(np.median(errors)) / MEDIAN if len(errors) else 0.0
+            errors, _ = cluster.errors(table, self.rows[members], self.y[members], self.scale)
+            total, count = total + float(np.square(errors).sum()), count + len(members)
+        return float(np.sqrt(total / max(count, 1)))
 
     def _noise(self) -> NDArray[np.intp]:
         return np.flatnonzero(self.labels == NOISE)
