@@ -12,15 +12,12 @@ import numpy as np
 from relgym.envs.views.base import View
 from relgym.envs.views.numeric import NumbersView
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import TASK, ObjectType, Scene
+from relgym.scene.objects import TASK, TERMINATED, ObjectType, Scene
 
 __all__ = ["REWARD", "TERMINATED", "TaskView"]
 
 REWARD = "reward"
 """Property of `task`: the reward of the step, in the env's units."""
-
-TERMINATED = "terminated"
-"""Property of `task`: 1 where the step ended the episode (terminated, not truncated), else 0."""
 
 
 class TaskView:

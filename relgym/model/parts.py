@@ -18,7 +18,7 @@ from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch
-from relgym.scene.objects import ACTION, TASK, Scene, SceneLayout, SceneSchema, Target
+from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, SceneSchema, Target
 
 __all__ = ["Parts"]
 
@@ -122,12 +122,22 @@ class Parts:
             raise ConfigError(
                 f"target {target} can't be learned: it comes from outside the world; leave it out"
             )
-        if self.open and t.name == TASK:  # worth is a function of what was, what was done and what came of it
-            target = replace(target, given=tuple(p for p in self.perception.chained if p[0] != TASK))
+        if self.open and t.name == TASK:
+            target = replace(target, given=self._bearing_on(target))
         self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config, self.schema)
         targets = (*self.targets, target)
         self._set_targets(in_order(targets) if self.open else targets)
         self.tables.setdefault(target.type, ExampleTable())
+
+    def _bearing_on(self, target: Target) -> tuple[tuple[str, str], ...]:
+        """Next values that a property of the task is given: worth is a function of what was, was done and came of it.
+
+        Of the task itself, that the episode ends is given to what a step is paid: it is what pays most often.
+        """
+        end = (TASK, TERMINATED)
+        return tuple(
+            p for p in self.perception.chained if p[0] != TASK or (p == end and target.property != TERMINATED)
+        )
 
     def discover_targets(self, before: Scene, after: Scene) -> None:
         """Every property that changes becomes a target; it sees all transitions from its first change on."""

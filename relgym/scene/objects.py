@@ -18,12 +18,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ObservationError, QueryError, SchemaError
-from relgym.scene.types import ACTION, POSE, TASK, Float1D, Float2D, Kinematics, ObjectType, Target
+from relgym.scene.types import (
+    ACTION,
+    POSE,
+    TASK,
+    TERMINATED,
+    Float1D,
+    Float2D,
+    Kinematics,
+    ObjectType,
+    Target,
+)
 
 __all__ = [
     "ACTION",
     "POSE",
     "TASK",
+    "TERMINATED",
     "Float1D",
     "Float2D",
     "Kinematics",

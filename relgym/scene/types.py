@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 from relgym.errors import SchemaError
 from relgym.scene.shapes import Shape
 
-__all__ = ["ACTION", "POSE", "TASK", "Float1D", "Float2D", "Kinematics", "ObjectType", "Target"]
+__all__ = [
+    "ACTION",
+    "POSE",
+    "TASK",
+    "TERMINATED",
+    "Float1D",
+    "Float2D",
+    "Kinematics",
+    "ObjectType",
+    "Target",
+]
 
 Float1D: TypeAlias = NDArray[np.float64]
 """A float64 array with one axis."""
@@ -27,6 +37,9 @@ ACTION = "action"
 
 TASK = "task"
 """Name of the bodiless object whose properties are reward and termination."""
+
+TERMINATED = "terminated"
+"""Property of `task`: 1 where the step ended the episode (terminated, not truncated), else 0."""
 
 
 @dataclass(frozen=True, slots=True)
