@@ -35,8 +35,27 @@ def walker() -> WorldModel:
 
 
 def test_the_task_comes_last_and_is_given_all_that_follows(walker: WorldModel) -> None:
-    assert [t.type for t in walker.targets][-2:] == [TASK, TASK]
-    assert set(walker.targets[-1].given) == {("self", "x"), ("self", "v")}
+    ended, paid = walker.targets[-2:]
+    assert (ended.type, ended.property) == (TASK, "terminated")
+    assert set(ended.given) == {("self", "x"), ("self", "v")}
+    assert (paid.type, paid.property) == (TASK, "reward")
+    assert set(paid.given) == {*ended.given, (TASK, "terminated")}
+
+
+def test_what_the_end_is_paid_joins_the_law_of_all_other_steps() -> None:
+    # A bonus on top of progress: apart, a handful of ends would need a law of their own.
+    rng = np.random.default_rng(3)
+
+    def worth(s: np.ndarray, u: np.ndarray, after: np.ndarray) -> list[float]:
+        done = float(after[0] > 1.0)
+        return [0.5 * after[0] - 0.1 + 5.0 * done, done]
+
+    schema = schema_of(("x",), ("a",), task=("reward", "terminated"))
+    starts = np.concatenate([rng.uniform(-1.0, 0.7, (200, 1)), rng.uniform(0.9, 1.0, (12, 1))])
+    actions = rng.uniform(-0.3, 0.3, (212, 1))
+    model = learned(schema, transitions(schema, lambda s, u: [s[0] + u[0]], starts, actions, worth))
+    (law,) = model.modes(TASK, "reward")
+    assert law.formula(4) == "reward' = 5 terminated' + 0.5 self.x' - 0.1"
 
 
 def test_effort_is_a_square_and_the_end_a_threshold_on_what_follows(walker: WorldModel) -> None:
