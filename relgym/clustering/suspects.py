@@ -34,6 +34,9 @@ MEDIAN = 0.4549
 CONVINCING = 12.0
 """Bits by which the examples must speak for a function beyond what it takes to state it."""
 
+MOST = 1_000
+"""At most so many suspects are looked at, the newest."""
+
 CAPPED, CLOSE = 6.0, 3.0
 """Errors of more standard deviations count as these; examples that fit a function within these determine it."""
 
@@ -53,7 +56,9 @@ def review_due(seen: int) -> bool:
 
 
 def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Scale) -> NDArray[np.intp]:
-    """Examples of relational states in which the known modes' errors are larger than the noise explains, ascending.
+    """Examples of relational states in which the known modes' errors are larger than the noise explains, oldest first.
+
+    They are at most `MOST`, the newest.
 
     Parameters
     ----------
@@ -68,7 +73,7 @@ def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Sc
     _, state, count = np.unique(strata, return_inverse=True, return_counts=True)
     usual = max(1.0, float(np.median(square)) / MEDIAN) if len(square) else 1.0
     badly = np.bincount(state, weights=square) >= BADLY * usual * count
-    found: NDArray[np.intp] = np.flatnonzero(badly[state])
+    found: NDArray[np.intp] = np.flatnonzero(badly[state])[-MOST:]
     return found
 
 
@@ -76,7 +81,7 @@ class Evidence:
     """How much likelier a further mode makes examples, in bits, each being as likely its as another's.
 
     Were the examples none of its, the odds against a gain of k bits would be at least 2^k to 1, whatever the known
-    modes' distribution: the mixture's likelihood over theirs is an e-value (Grunwald, de Heide and Koolen 2024). What
+    modes' distribution: the mixture's likelihood over theirs is an e-value (Grünwald, de Heide and Koolen 2024). What
     it takes to state a function comes off: half the logarithm of the number of examples and the choice of a column for
     each weight, and as many examples as it has weights, which it would fit anyhow.
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from streams import Stream
 
 from relgym.clustering.discovery import Scale
-from relgym.clustering.suspects import FIRST, Evidence, likeliest, review_due, suspects
+from relgym.clustering.suspects import FIRST, MOST, Evidence, likeliest, review_due, suspects
 from relgym.config import ClusteringConfig, ModelConfig
 from relgym.numeric.stepwise import LinearFit
 
@@ -40,6 +40,12 @@ def test_noise_that_was_underrated_makes_nobody_a_suspect() -> None:
 def test_examples_where_no_mode_applies_are_suspects() -> None:
     strata = np.array([1] * 50 + [2])
     assert suspects(strata, np.array([0.0] * 50 + [math.inf]), SCALE).tolist() == [50]
+
+
+def test_of_many_suspects_the_newest_are_looked_at() -> None:
+    strata = np.array([1] * 3_000 + [2] * 2_000)
+    errors = np.where(strata == 2, 5.0 * SIGMA, 0.0)
+    assert suspects(strata, errors, SCALE).tolist() == list(range(5_000 - MOST, 5_000))
 
 
 # ---------------------------------------------------------------------- evidence
