@@ -185,6 +185,7 @@ class ModeClusterer(Prospector):
         """Another noise scale: forget the modes, all examples become noise and are searched again."""
         self.clusters.clear()
         self._searches.clear()
+        self._chancy = False  # the next review tells, of the scale then assumed
         total = self._log.forgotten.total()
         self._log.forgotten.clear()
         self._log.forgotten[NOISE] = total
