@@ -15,6 +15,7 @@ from relgym.model.world_model import WorldModel
 from relgym.scene.objects import (
     ACTION,
     TASK,
+    Float1D,
     Float2D,
     ObjectType,
     SceneLayout,
@@ -38,9 +39,10 @@ _EXACT: Final = ModelConfig(
 """What a task says is free of noise, and success is rare at first: four examples found a mode. Without bodies there is
 but one relational state, in which a few examples of each mode would leave thresholds blunt."""
 
-_REMEMBERED: Final = 1_000
-"""Of so many real steps that ended an episode, and of as many others, the latest, it is looked up which modes were
-right together: at first ends that pay come once in a thousand steps, and must not be forgotten in between."""
+_REMEMBERED: Final = 500
+"""It is looked up which modes were right together: of so many of the latest real steps, of as many of those before, and
+of so many that ended an episode. What is paid for in one place may not be seen again for many episodes, and ends that
+pay come once in a thousand steps at first: neither must be forgotten in between."""
 
 _REVIEW: Final = 10
 """Real steps between two such reviews while the modes stay the same ones: a review costs some milliseconds."""
@@ -105,7 +107,10 @@ class LearnedTask:
         ]
         self._action = schema.type(ACTION).properties if ACTION in schema.order else ()
         self.model = WorldModel(self._small_schema(), config or _EXACT)
-        self._lessons = {ended: deque[NDArray[np.float64]](maxlen=_REMEMBERED) for ended in (False, True)}
+        self._ends, self._latest = deque[Float1D](maxlen=_REMEMBERED), deque[Float1D]()
+        self._earlier: list[Float1D] = []
+        self._passed = 0
+        self._rng = np.random.default_rng(0)
         self._together: set[tuple[int, int]] = set()
         self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
 
@@ -134,7 +139,23 @@ class LearnedTask:
         small = self.model.schema.scene({**values, TASK: [0.0, 0.0]})
         said = {(TASK, "reward"): float(reward), (TASK, "terminated"): float(terminated)}
         self.model.learn_one(Transition(small, small.replace(said)))
-        self._lessons[bool(terminated)].append(small.replace(said).vector)
+        self._remember(small.replace(said).vector, ended=terminated)
+
+    def _remember(self, lesson: Float1D, *, ended: bool) -> None:
+        """Keep the latest; of those before, each is as likely to be kept as any other (Vitter 1985)."""
+        if ended:
+            self._ends.append(lesson)
+            return
+        self._latest.append(lesson)
+        if len(self._latest) <= _REMEMBERED:
+            return
+        oldest = self._latest.popleft()
+        self._passed += 1
+        place = int(self._rng.integers(self._passed))
+        if len(self._earlier) < _REMEMBERED:
+            self._earlier.append(oldest)
+        elif place < _REMEMBERED:
+            self._earlier[place] = oldest
 
     def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
         """What the modes say; NaN where none does."""
@@ -159,7 +180,7 @@ class LearnedTask:
 
     def _right_together(self) -> set[tuple[int, int]]:
         """Modes of reward and termination that give what was said of some remembered step."""
-        lessons = [lesson for each in self._lessons.values() for lesson in each]
+        lessons = [*self._ends, *self._latest, *self._earlier]
         if not lessons:
             return set()
         small = self.model.schema.layout()

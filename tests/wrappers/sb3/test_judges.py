@@ -10,6 +10,7 @@ import pytest
 
 import relgym
 from relgym.envs.scripted import ball_home, push_knowing
+from relgym.scene.objects import ObjectType, SceneSchema, Target, Transition
 from relgym.wrappers.sb3.judges import LearnedTask
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
 from relgym.wrappers.sb3.stock import changing
@@ -89,6 +90,24 @@ def test_ends_are_not_forgotten_among_many_steps_that_end_nothing(
     said = verdicts(judge, paid)
     assert np.isfinite(said.rewards).mean() > 0.9
     assert said.terminated.mean() > 0.9
+
+
+def test_what_is_paid_for_elsewhere_is_not_forgotten(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("relgym.wrappers.sb3.judges._REMEMBERED", 50)
+    car = ObjectType("car", ("x",))
+    schema = SceneSchema((car,), (("car", "car"),), targets=(Target("car", "x"),))
+    judge = LearnedTask(schema, {("car", "x")})
+
+    def step(x: float) -> Transition:
+        return Transition(schema.scene({"car": [x - 0.1]}), schema.scene({"car": [x]}))
+
+    for x in [*rng.uniform(-1.0, 1.0, 200), *rng.uniform(0.0, 1.0, 300)]:  # it lives on one side in the end
+        judge.learn_step(step(x), abs(x), terminated=False)
+    there = np.linspace(-0.9, -0.1, 9)[:, None]
+    said = judge.judge(schema.layout(), there - 0.1, np.zeros((9, 0)), there)
+    assert said.rewards == pytest.approx(-there[:, 0])
 
 
 def test_it_says_nothing_before_it_was_told(rng: np.random.Generator) -> None:
