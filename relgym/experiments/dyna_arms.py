@@ -138,17 +138,20 @@ class Arm:
 
 _BALL_DREAMS: Final[Mapping[str, Any]] = {
     "horizon": 30,
-    "dreams": 32,
-    "every": 20,
+    "dreams": 128,
+    "every": 10,
+    "capacity": 40_000,
     "from_start": 0.3,
     "redraw": False,
     "permute": False,
-    "updates": 20,
+    "kick": 0.5,
+    "updates": 40,
     "burst": 0,
 }
 """Episodes are long and their steps short, so dreams branch off anywhere. Goals in mid-air would teach nothing, nor
-would a left wall on the right. At first only a few rooms were seen: a policy trained long in these knows no others.
-For the same reason real episodes are cut short (`Course.glimpse`): half as long, they show twice as many rooms."""
+would a left wall on the right; other speeds do, for a ball gets over a box or a ramp only after many bounces that pay
+nothing. At first only a few rooms were seen: a policy trained long in these knows no others. For the same reason real
+episodes are cut short (`Course.glimpse`): half as long, they show twice as many rooms."""
 
 COURSES: Final = {
     course.name: course

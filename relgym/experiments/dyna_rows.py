@@ -41,7 +41,7 @@ _BALL_STEPS: Final = 16_000
 
 _TRUCK_ARMS: Final = ("sac", "sac40", "sac-permuted", "ensemble", "relgym", "relgym-given")
 _BALL_RIVALS: Final = ("sac", "sac5", "sac20")
-"""Agents without a model; those who dream update twenty times a decision there."""
+"""Agents without a model; those who dream update forty times a decision there."""
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,10 @@ class DynaConfig:
     redraw
         Whether dreams redraw properties of bodiless objects that no law of motion mentions, between the
         smallest and the largest value seen at the start of episodes. The model licenses that too.
+    kick
+        Share of the dreams in which moving bodies begin with velocities redrawn, up to twice as fast as they were ever
+        seen. So dreams get where no real step has led yet: exploring starts (Sutton & Barto 2018, §5.3), which the
+        world doesn't offer and a model does. Helps where a goal lies behind what only a fast body gets over.
     shuffle
         The model learns transitions in random order, out of a stock of so many. What stays the same
         throughout an episode would otherwise pass for a law; 0: as they come.
@@ -66,6 +70,7 @@ class DynaConfig:
     burst: int = 0
     permute: bool = True
     redraw: bool = True
+    kick: float = 0.0
     shuffle: int = 150
     open_at: float = 0.1
     shut_at: float = 0.2
@@ -74,7 +79,7 @@ class DynaConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("real_ratio", "from_start"):
+        for name in ("real_ratio", "from_start", "kick"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ConfigError(f"{name}={getattr(self, name)!r}: expected a share from 0 to 1")
         for name, low in _LEAST.items():

@@ -16,7 +16,6 @@ from relgym.wrappers.sb3.apprentice import Apprentice, check_model
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.imagination import Imagination
 from relgym.wrappers.sb3.lens import Lens, Observations, picked
-from relgym.wrappers.sb3.stock import permuted
 
 __all__ = ["DreamCheckup", "DreamVecEnv", "explore"]
 
@@ -147,13 +146,8 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
 
     # ------------------------------------------------------------------ helpers
     def _starts(self, n: int) -> NDArray[np.float64]:
-        model, config, stock = self._apprentice.model, self._config, self._apprentice.stock
-        _, vectors = stock.draw(n, from_start=config.from_start, rng=self._rng, layout=self._layout)
-        if config.permute:
-            vectors = permuted(self._layout, vectors, model, rng=self._rng)
-        if config.redraw:
-            vectors = stock.redrawn(self._layout, vectors, model, rng=self._rng)
-        return vectors
+        stock, model = self._apprentice.stock, self._apprentice.model
+        return stock.starts(n, model, self._config, rng=self._rng, layout=self._layout)[1]
 
     def _seen(self) -> Observations:
         return self._lens.observations(self._layout, self._vectors)

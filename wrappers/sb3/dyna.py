@@ -20,7 +20,7 @@ from relgym.wrappers.sb3.imagination import Imagination, Imagined
 from relgym.wrappers.sb3.judges import Judge, LearnedTask, NeuralModel, NeuralTask
 from relgym.wrappers.sb3.lens import Lens, Observations
 from relgym.wrappers.sb3.replay import Mixing
-from relgym.wrappers.sb3.stock import DreamModel, changing, permuted
+from relgym.wrappers.sb3.stock import DreamModel, changing
 
 __all__ = ["Dyna", "check_algorithm", "judge_of", "lens_of"]
 
@@ -164,12 +164,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
 
     def _dream(self) -> None:
         started = perf_counter()
-        config, stock = self.config, self.apprentice.stock
-        layout, vectors = stock.draw(config.dreams, from_start=config.from_start, rng=self._rng)
-        if config.permute:
-            vectors = permuted(layout, vectors, self.world, rng=self._rng)
-        if config.redraw:
-            vectors = stock.redrawn(layout, vectors, self.world, rng=self._rng)
+        config = self.config
+        layout, vectors = self.apprentice.stock.starts(config.dreams, self.world, config, rng=self._rng)
         assert self._imagination is not None, "made when training begins"
         found = self._imagination.dream(layout, vectors, self._act, horizon=config.horizon)
         self._keep(found)

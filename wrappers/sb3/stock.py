@@ -20,6 +20,7 @@ from relgym.scene.objects import (
     Target,
     Transition,
 )
+from relgym.wrappers.sb3.config import DynaConfig
 
 __all__ = ["DreamModel", "SceneStock", "changing", "free_properties", "permuted"]
 
@@ -97,6 +98,62 @@ class SceneStock:
             for pool in (firsts if firsts and u < from_start else scenes for u in rng.random(n))
         ]
         return layout, np.stack(chosen)
+
+    def starts(
+        self,
+        n: int,
+        model: DreamModel,
+        config: DynaConfig,
+        *,
+        rng: np.random.Generator,
+        layout: SceneLayout | None = None,
+    ) -> tuple[SceneLayout, NDArray[np.float64]]:
+        """Draw n scenes for dreams to begin in, varied as far as `config` says.
+
+        Parameters
+        ----------
+        n
+            How many.
+        model
+            Says what may be varied.
+        config
+            Share of first scenes, and what is varied.
+        rng
+            Draws all of it.
+        layout
+            Which objects they show; default: drawn.
+        """
+        layout, vectors = self.draw(n, from_start=config.from_start, rng=rng, layout=layout)
+        if config.permute:
+            vectors = permuted(layout, vectors, model, rng=rng)
+        if config.redraw:
+            vectors = self.redrawn(layout, vectors, model, rng=rng)
+        if config.kick:
+            fast = rng.random(n) < config.kick
+            vectors[fast] = self.kicked(layout, vectors[fast], model, rng=rng)
+        return layout, vectors
+
+    def kicked(
+        self, layout: SceneLayout, vectors: Float2D, model: DreamModel, *, rng: np.random.Generator
+    ) -> NDArray[np.float64]:
+        """The scenes with other velocities of the bodies that move.
+
+        Drawn from an interval twice as wide as that of the velocities seen, about the same middle.
+        """
+        varied, moving = vectors.copy(), changing(model)
+        columns = [
+            layout.offsets[index] + column
+            for index in layout.bodies
+            for t in (layout.types[index],)
+            for column in t.velocity_columns()
+            if column >= 0 and (t.name, t.properties[column]) in moving
+        ]
+        seen = np.array([scene[columns] for scene in self._all.get(layout, ())])
+        if len(seen) and columns:
+            low, high = seen.min(axis=0), seen.max(axis=0)
+            half = (high - low) / 2.0
+            varied[:, columns] = rng.uniform(low - half, high + half, (len(varied), len(columns)))
+        return varied
 
     def redrawn(
         self, layout: SceneLayout, vectors: Float2D, model: DreamModel, *, rng: np.random.Generator

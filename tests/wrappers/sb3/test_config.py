@@ -15,6 +15,7 @@ from relgym.wrappers.sb3.config import DynaConfig
     [
         ({"real_ratio": 1.5}, "real_ratio=1.5: expected a share from 0 to 1"),
         ({"from_start": -0.1}, "from_start=-0.1: expected a share"),
+        ({"kick": 1.5}, "kick=1.5: expected a share"),
         ({"horizon": 0}, "horizon=0: expected a whole number, at least 1"),
         ({"horizon": 2.5}, "horizon=2.5: expected a whole number"),
         ({"dreams": True}, "dreams=True: expected a whole number"),

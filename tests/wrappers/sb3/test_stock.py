@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from dyna_worlds import SCHEMA, LineModel
@@ -10,6 +12,7 @@ from relgym.errors import ConfigError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
 from relgym.scene.shapes import Box
+from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.stock import SceneStock, free_properties, permuted
 
 POSE = ("px", "py", "pz", "rx", "ry", "rz", "sx", "sy", "sz")
@@ -107,3 +110,49 @@ def test_only_what_no_law_mentions_is_redrawn(rng: np.random.Generator) -> None:
     assert ((varied[:, 4] >= 1.0) & (varied[:, 4] <= 3.0)).all()
     assert len(set(varied[:, 4])) == 40
     np.testing.assert_array_equal(stock.redrawn(layout, vectors, minding, rng=rng), vectors)
+
+
+def blocks(speed: float) -> Scene:
+    return BLOCKS.scene({f"block{k}": [*np.arange(9.0), speed + k, 5.0] for k in range(3)})
+
+
+def test_kicked_bodies_have_up_to_twice_the_speed_ever_seen_and_are_where_they_were(
+    rng: np.random.Generator,
+) -> None:
+    stock = SceneStock()
+    for speed in (-1.0, 1.0, 3.0):
+        stock.add(blocks(speed), first=True)
+    layout, vectors = stock.draw(400, from_start=1.0, rng=rng)
+    kept = vectors.copy()
+    kicked = stock.kicked(layout, vectors, WorldModel(BLOCKS), rng=rng)
+    np.testing.assert_array_equal(vectors, kept)
+    speeds = [layout.column(k, "vx") for k in range(3)]
+    np.testing.assert_array_equal(np.delete(kicked, speeds, axis=1), np.delete(kept, speeds, axis=1))
+    for k, column in enumerate(speeds):  # seen: -1 to 3, and k more
+        drawn = kicked[:, column] - k
+        assert drawn.min() >= -3.0 and drawn.max() <= 5.0
+        assert drawn.min() < -2.0 and drawn.max() > 4.0
+
+
+def test_what_no_law_moves_gets_no_kick(rng: np.random.Generator) -> None:
+    still = WorldModel(BLOCKS, targets=(Target("block", "weight"),))
+    stock = SceneStock()
+    stock.add(blocks(1.0), first=True)
+    stock.add(blocks(2.0), first=True)
+    layout, vectors = stock.draw(20, from_start=1.0, rng=rng)
+    np.testing.assert_array_equal(stock.kicked(layout, vectors, still, rng=rng), vectors)
+
+
+def test_so_many_starts_are_kicked_as_was_asked_for(rng: np.random.Generator) -> None:
+    stock = SceneStock()
+    for speed in (-1.0, 1.0, 3.0):
+        stock.add(blocks(speed), first=True)
+    model = WorldModel(BLOCKS)
+    plain = DynaConfig(permute=False, redraw=False)
+    same = stock.starts(1_000, model, plain, rng=np.random.default_rng(5))[1]
+    np.testing.assert_array_equal(
+        same, stock.draw(1_000, from_start=plain.from_start, rng=np.random.default_rng(5))[1]
+    )
+    varied = stock.starts(1_000, model, replace(plain, kick=0.25), rng=rng)[1]
+    whole = np.isin(varied[:, stock.draw(1, from_start=1.0, rng=rng)[0].column(0, "vx")], (-1.0, 1.0, 3.0))
+    assert 0.2 < (~whole).mean() < 0.3
