@@ -26,7 +26,7 @@ class Args:
     """real decisions, of five steps each"""
     warm_up: int = 250
     """of them random, at first"""
-    updates: int = 20
+    updates: int = 40
     """gradient steps per decision, once the model is trusted"""
     episodes: int = 20
     """test episodes"""
@@ -48,12 +48,13 @@ def main(args: Args) -> None:
     env = make_env(max_episode_steps=250)
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
-    # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals and walls stay where they are.
+    # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals and walls stay where they are;
+    # but half of the dreams begin with another speed, and so get over what stands in the way.
     config = DynaConfig(
         horizon=30,
-        dreams=32,
-        every=20,
+        capacity=40_000,
         from_start=0.3,
+        kick=0.5,
         redraw=False,
         permute=False,
         updates=args.updates,
