@@ -15,6 +15,7 @@ import gymnasium as gym
 import relgym
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.flat import FlatView
+from relgym.wrappers.glimpses import Glimpses
 from relgym.wrappers.sb3 import Dyna, DynaConfig, TransitionRecorder, replay_options
 
 
@@ -34,9 +35,12 @@ class Args:
     """seed of everything random"""
 
 
-def make_env(**arguments: Any) -> gym.Env[Any, Any]:
+def make_env(*, glimpses: bool = False) -> gym.Env[Any, Any]:
     """Scenes for the model, decisions and short vectors for the agent."""
-    return FlatView(ActionRepeat(TransitionRecorder(gym.make("relgym/BallGoal-v0", **arguments)), 5))
+    env: gym.Env[Any, Any] = gym.make("relgym/BallGoal-v0")
+    if glimpses:  # four episodes of five last 10 decisions: what would follow can be dreamed, other rooms can't
+        env = Glimpses(env, 50)
+    return FlatView(ActionRepeat(TransitionRecorder(env), 5))
 
 
 def main(args: Args) -> None:
@@ -44,8 +48,7 @@ def main(args: Args) -> None:
     from stable_baselines3 import SAC
     from stable_baselines3.common.logger import Logger
 
-    # Half as long as tests: what would follow can be dreamed, and more beginnings show more rooms.
-    env = make_env(max_episode_steps=250)
+    env = make_env(glimpses=True)
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
     # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals and walls stay where they are;
@@ -66,6 +69,7 @@ def main(args: Args) -> None:
         env,
         learning_rate=1e-3,
         tau=0.01,
+        ent_coef="auto_0.01",  # decisions pay a few hundredths: begun at 1, entropy would outweigh them for long
         learning_starts=args.warm_up,
         policy_kwargs={"net_arch": [64, 64]},
         seed=args.seed,

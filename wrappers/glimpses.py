@@ -1,0 +1,57 @@
+"""Most episodes are cut short: who can dream the rest would rather see more beginnings."""
+
+from __future__ import annotations
+
+from typing import Any, SupportsFloat
+
+import gymnasium as gym
+from gymnasium.utils import RecordConstructorArgs
+
+from relgym.envs.arguments import checked_count, refuse_vector_env
+
+__all__ = ["Glimpses"]
+
+
+class Glimpses(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """Truncates most episodes after a few steps; now and then one lasts as long as it will.
+
+    What follows on a beginning, a model can dream; other beginnings (other rooms, other objects) it can't. So real
+    steps that are to show an agent what there is are better spent on many short episodes. Whole ones remain, for
+    nobody dreams of what pays, or of an end, who never met it.
+
+    Parameters
+    ----------
+    env
+        Any env. Inside an `ActionRepeat` steps are the env's own, not decisions.
+    steps
+        Steps after which an episode counts as truncated, >= 1.
+    whole
+        One of so many episodes isn't cut short, the first to begin with; >= 1, and with 1 none is.
+
+    Notes
+    -----
+    An episode counts from its reset on. Where resets are dear, this isn't for you.
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], steps: int, whole: int = 5) -> None:
+        refuse_vector_env(env)
+        self.steps = checked_count("steps", steps, 1, 10**9)
+        self.whole = checked_count("whole", whole, 1, 10**9)
+        self._episode, self._taken = -1, 0
+        RecordConstructorArgs.__init__(self, steps=self.steps, whole=self.whole)
+        gym.Wrapper.__init__(self, env)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        begun = self.env.reset(seed=seed, options=options)
+        self._episode, self._taken = self._episode + 1, 0
+        return begun
+
+    def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Take a step; of a glimpse, the last one says that it is truncated."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        self._taken += 1
+        late = bool(self._episode % self.whole) and self._taken >= self.steps
+        return observation, reward, terminated, truncated or (late and not terminated), info
