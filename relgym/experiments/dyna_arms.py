@@ -157,7 +157,7 @@ nothing. At first only a few rooms were seen, and a policy trained long in these
 
 _BALL_AGENT: Final[Mapping[str, Any]] = {"ent_coef": "auto_0.01"}
 """What a decision pays is a few hundredths, and the weight of entropy settles at some thousandths. Begun at 1, it left
-the critic with values of 4 where dreams brought none (seed 100, after 500 decisions); so much to come, an end would lose."""
+the critic with values of 4 where dreams brought none (seed 100, after 500 decisions): an end would lose so much."""
 
 COURSES: Final = {
     course.name: course
