@@ -38,9 +38,7 @@ class Args:
 def make_env(*, glimpses: bool = False) -> gym.Env[Any, Any]:
     """Scenes for the model, decisions and short vectors for the agent."""
     env: gym.Env[Any, Any] = gym.make("relgym/BallGoal-v0")
-    if (
-        glimpses
-    ):  # four episodes of five last 10 decisions: what would follow can be dreamed, other rooms can't
+    if glimpses:  # four episodes of five last 10 decisions: what follows can be dreamed, other rooms can't
         env = Glimpses(env, 50)
     return FlatView(ActionRepeat(TransitionRecorder(env), 5))
 
