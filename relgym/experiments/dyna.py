@@ -153,7 +153,7 @@ def run(
         How the world changes while the agent learns; tests are in the world as it is by then.
     """
     env: gym.Env[Any, Any] = make_env(course, change, arm=arm)
-    settings = {**course.agent, **(agent or {})}
+    settings = {**(course.agent if arm.dreams else {}), **(agent or {})}
     algorithm = make_agent(arm, env, seed=seed, **settings)  # says so where the extra is missing
     import torch
     from stable_baselines3.common.callbacks import BaseCallback, CallbackList

@@ -134,12 +134,27 @@ def test_every_arm_runs(arm: str) -> None:
         testing=Examination(COURSES["truck"], episodes=3),
         heard=lambda at, good: heard.append((at, good)),
         agent={"learning_starts": 245, "batch_size": 16},
-        dyna={} if ARMS[arm].model == "none" else {"dreams": 8, "updates": 1, "burst": 2},
+        dyna={"dreams": 8, "updates": 1, "burst": 2} if ARMS[arm].dreams else {},
     )
     assert found.curve == tuple(heard)
     assert [at for at, _ in heard] == [250]
     assert found.solved_at is None
     assert ("truck.vx" in found.laws) == (ARMS[arm].model == "relational")
+
+
+@pytest.mark.sb3
+@pytest.mark.parametrize(("arm", "entropy"), [("sac5", 1.0), ("relgym", 0.01)])
+def test_what_suits_dreams_is_not_asked_of_rivals(arm: str, entropy: float) -> None:
+    weights: list[float] = []
+    run(
+        COURSES["ball"],
+        ARMS[arm],
+        seed=100,
+        steps=1,
+        testing=Examination(COURSES["ball"], episodes=1),
+        met=lambda agent, _: weights.append(float(agent.log_ent_coef.detach().exp())),
+    )
+    assert weights == [pytest.approx(entropy)]
 
 
 @pytest.mark.sb3
