@@ -161,7 +161,9 @@ class RoleClassifier:
         return {
             **{name: getattr(self, name) for name in names},
             "kinds": [[kind.type, [list(term) for term in kind.weights]] for kind in self.kinds],
-            "definitions": [d.definition and d.definition.to_dict() for d in self.descriptions],
+            "definitions": [
+                None if d.definition is None else d.definition.to_dict() for d in self.descriptions
+            ],
             "common": [
                 None if d.common is None else np.flatnonzero(d.common).tolist() for d in self.descriptions
             ],
@@ -177,7 +179,7 @@ class RoleClassifier:
         stance = np.arange(2 * len(vocabulary.relations) + len(vocabulary.unary))
         known = zip(self.descriptions, data["definitions"], data["common"], strict=True)
         for description, definition, common in known:
-            description.definition = definition and Definition.from_dict(definition)
+            description.definition = None if definition is None else Definition.from_dict(definition)
             description.common = None if common is None else np.isin(stance, common)
         for name in ("seen", "learned", "errors", "contradictions", "stale"):
             setattr(self, name, data[name])
