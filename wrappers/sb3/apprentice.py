@@ -4,21 +4,31 @@ from __future__ import annotations
 
 import math
 from time import perf_counter
-from typing import Any
+from typing import Any, Literal, cast
 
 import numpy as np
 
+from relgym.envs.learned_model_setting import check_knowledge
 from relgym.errors import ConfigError
+from relgym.model.motion import possible_targets
 from relgym.model.scenes import mismatch
-from relgym.scene.objects import TASK, Scene
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import TASK, Scene, SceneSchema
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.gate import Key, TrustGate, Verdict
-from relgym.wrappers.sb3.judges import Judge
+from relgym.wrappers.sb3.judges import (
+    Acting,
+    Judge,
+    LearnedTask,
+    NeuralModel,
+    NeuralTask,
+    check_rewards,
+)
 from relgym.wrappers.sb3.lens import Lens
 from relgym.wrappers.sb3.recorder import Experience
 from relgym.wrappers.sb3.stock import DreamModel, SceneStock, changing
 
-__all__ = ["Apprentice", "check_model"]
+__all__ = ["Apprentice", "check_model", "checked_judge"]
 
 
 class Apprentice:
@@ -29,9 +39,15 @@ class Apprentice:
     model
         The model; one that is frozen (``model.frozen``) is judged all the same, but doesn't learn.
     judge
-        Reward and termination; one that learns (`LearnedTask`) learns from every step as it comes.
+        Reward and termination; one that learns (`LearnedTask`) learns from every step as it comes. ``"learned"``: as
+        for `Dyna`.
     config
         Free parameters.
+
+    Raises
+    ------
+    ConfigError
+        The judge can't judge; or when a step is taken up, a given judge's reward is NaN or infinite.
 
     Attributes
     ----------
@@ -43,9 +59,12 @@ class Apprentice:
         Time spent on foretelling and learning.
     """
 
-    def __init__(self, model: DreamModel, judge: Judge, config: DynaConfig) -> None:
+    def __init__(
+        self, model: DreamModel, judge: Judge | Literal["learned"], config: DynaConfig | None = None
+    ) -> None:
+        config = config or DynaConfig()
         self.model = model
-        self.judge = judge
+        self.judge = checked_judge(judge, model, model.schema)
         self.gate = TrustGate(
             open_at=config.open_at, shut_at=config.shut_at, window=config.window, least=config.least
         )
@@ -66,6 +85,14 @@ class Apprentice:
             self.judge.learn_step(real.transition, real.reward, terminated=real.terminated)
         if self._learns:
             self._learn(real)
+        self.seconds += perf_counter() - started
+
+    def catch_up(self) -> None:
+        """Learn what is still waiting for its turn; there may be no more steps to wait for."""
+        started = perf_counter()
+        for k in self._rng.permutation(len(self._waiting)).tolist():
+            self._teach(self._waiting[k])
+        self._waiting.clear()
         self.seconds += perf_counter() - started
 
     def _learn(self, real: Experience) -> None:
@@ -108,14 +135,66 @@ class Apprentice:
         judged = self.judge.judge(
             layout, real.start.vector[None], np.asarray(real.action)[None], following[None]
         )
+        if not getattr(self.judge, "learned", False):  # of one that learns NaN says that it doesn't know
+            check_rewards(judged.rewards, self.judge)
         return {
             (TASK, "reward"): real.reward - float(judged.rewards[0]),
             (TASK, "terminated"): float(real.terminated) - float(judged.terminated[0]),
         }
 
 
-def check_model(model: Any, lens: Lens) -> None:
-    """Raise `ConfigError` unless a model can speak of the env's scenes."""
+def checked_judge(judge: Any, model: DreamModel, schema: SceneSchema, acting: Acting | None = None) -> Judge:
+    """A judge, made where it is to be ``"learned"``.
+
+    Parameters
+    ----------
+    judge
+        What the user passed.
+    model
+        Whose dreams are judged.
+    schema, acting
+        Of the scenes, as `LearnedTask` takes them.
+
+    Raises
+    ------
+    ConfigError
+        It can't judge.
+    """
+    if isinstance(judge, str) and judge == "learned":
+        if hasattr(model, "judge_all"):
+            return NeuralTask(cast(NeuralModel, model), acting=acting)
+        moving = changing(model)
+        if schema.targets is None:  # anything may turn out to change
+            moving |= {(t.type, t.property) for t in possible_targets(schema)}
+        return LearnedTask(schema, moving, acting=acting)
+    if not callable(getattr(judge, "judge", None)):
+        raise ConfigError(
+            f"judge={judge!r}: expected 'learned', or an object with judge(layout, before, actions, after) for arrays "
+            "of steps, as a relgym.envs.tasks.Task has"
+        )
+    found: Judge = judge
+    return found
+
+
+def check_model(model: Any, lens: Lens, *, at_once: bool = False) -> None:
+    """Raise an error unless a model can speak of the env's scenes.
+
+    Parameters
+    ----------
+    model
+        The model.
+    lens
+        What it is to speak of.
+    at_once
+        Whether dreams begin before it has learned any more.
+
+    Raises
+    ------
+    ConfigError
+        It isn't a model, or one of other scenes.
+    QueryError
+        It knows none of its targets, and can't learn or is to be dreamed in at once.
+    """
     missing = [
         name for name in ("schema", "targets", "predict_one", "predict_batch") if not hasattr(model, name)
     ]
@@ -127,7 +206,10 @@ def check_model(model: Any, lens: Lens) -> None:
             f"the model was made for other scenes than the env shows: {difference}; make it with the env's schema "
             "(env.get_wrapper_attr('schema'))"
         )
-    if getattr(model, "frozen", False) and not model.targets:
+    frozen = getattr(model, "frozen", False)
+    if isinstance(model, WorldModel) and (frozen or at_once):
+        check_knowledge(model)
+    if frozen and not model.targets:
         raise ConfigError(
             "the model knows none of the targets and can't learn (it was loaded without its history): load one that "
             "was taught, or save with history=True"

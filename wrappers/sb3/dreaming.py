@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -33,9 +34,15 @@ def explore(apprentice: Apprentice, env: gym.Env[Any, Any], steps: int, *, seed:
         Decisions, at least 1.
     seed
         Of env and actions.
+
+    Raises
+    ------
+    ConfigError
+        Less than one step, or an env without a recorder.
     """
     if steps < 1:
         raise ConfigError(f"steps={steps!r}: expected at least 1")
+    _check_recorded(env)
     env.action_space.seed(seed)
     env.reset(seed=seed)
     for _ in range(steps):
@@ -67,6 +74,8 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
     ------
     ConfigError
         No scenes, or a model that doesn't fit the env.
+    QueryError
+        A model that knows none of its targets.
     """
 
     def __init__(
@@ -80,7 +89,7 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
         if num_envs < 1:
             raise ConfigError(f"num_envs={num_envs!r}: expected at least 1")
         self._lens = Lens(like)
-        check_model(apprentice.model, self._lens)
+        check_model(apprentice.model, self._lens, at_once=True)
         self._apprentice, self._config = apprentice, config or DynaConfig()
         self._imagination = Imagination(apprentice.model, self._lens, apprentice.judge)
         self._rng = np.random.default_rng([self._config.seed, 3])
@@ -157,7 +166,7 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
     """Lets an agent that trains in its dream act in the real world now and then.
 
     The model foretells every real step, is judged by it and learns from it. Once it is trusted no more,
-    training stops: what an agent learns in a dream gone wrong is worth nothing.
+    training stops, with a warning: what an agent learns in a dream gone wrong is worth nothing.
 
     Parameters
     ----------
@@ -177,6 +186,11 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
     history : list of (int, int, float, float)
         Of every check-up: dreamed steps, real steps so far, share of successes, the gate's error.
 
+    Raises
+    ------
+    ConfigError
+        A count below 1, an env without a recorder; or when training begins, a model that isn't trusted.
+
     Notes
     -----
     Logged: ``relgym/real_success``, ``relgym/real_return``, ``relgym/real_steps``, ``relgym/error``.
@@ -195,10 +209,20 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
         for name, value in {"every": every, "episodes": episodes}.items():
             if value < 1:
                 raise ConfigError(f"{name}={value!r}: expected at least 1")
+        _check_recorded(env)
         self.apprentice, self.env = apprentice, env
         self.every, self.episodes = every, episodes
         self.history: list[tuple[int, int, float, float]] = []
         self._seed, self._real_steps, self._next = seed, 0, 0
+
+    def _on_training_start(self) -> None:
+        gate = self.apprentice.gate
+        if not gate.open:
+            raise ConfigError(
+                f"the model isn't trusted: its error is {gate.error:.3g}, it is trusted at {gate.open_at:g}, and it "
+                f"spoke of {gate.known:.0%} of the latest real steps: let it watch more of them (explore) before an "
+                "agent trains in its dreams"
+            )
 
     def _on_step(self) -> bool:
         if self.num_timesteps < self._next:
@@ -212,6 +236,12 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
         self.logger.record("relgym/real_return", returned)
         self.logger.record("relgym/real_steps", self._real_steps)
         self.logger.record("relgym/error", gate.error)
+        if not gate.open:
+            warnings.warn(
+                f"training stops after {self.num_timesteps} dreamed steps: the model's error in the real world is "
+                f"{gate.error:.3g}, and it is trusted no more from {gate.shut_at:g} on",
+                stacklevel=2,
+            )
         return gate.open
 
     def _play(self) -> tuple[bool, float]:
@@ -220,11 +250,21 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
         self._seed += 1
         total, over = 0.0, False
         info: dict[str, Any] = {}
+        normalise = self.model.get_vec_normalize_env()
         while not over:
-            action, _ = self.model.predict(seen, deterministic=True)
+            shown = seen if normalise is None else normalise.normalize_obs(seen)
+            action, _ = self.model.predict(shown, deterministic=True)
             seen, reward, terminated, truncated, info = self.env.step(action)
             total, over = total + float(reward), terminated or truncated
             for real in self.env.get_wrapper_attr("take")():
                 self.apprentice.take_up(real)
                 self._real_steps += 1
         return bool(info.get("is_success", False)), total
+
+
+def _check_recorded(env: gym.Env[Any, Any]) -> None:
+    if not env.has_wrapper_attr("take"):
+        raise ConfigError(
+            f"{env} has no TransitionRecorder: put one directly round the bare env, inside all wrappers that change "
+            "observations or actions"
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from time import perf_counter
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -14,13 +14,13 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.apprentice import Apprentice, check_model
+from relgym.wrappers.sb3.apprentice import Apprentice, check_model, checked_judge
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.imagination import Imagination, Imagined
-from relgym.wrappers.sb3.judges import Judge, LearnedTask, NeuralModel, NeuralTask
+from relgym.wrappers.sb3.judges import Judge
 from relgym.wrappers.sb3.lens import Lens, Observations
-from relgym.wrappers.sb3.replay import Mixing
-from relgym.wrappers.sb3.stock import DreamModel, changing
+from relgym.wrappers.sb3.replay import MixedNStepReplayBuffer, Mixing
+from relgym.wrappers.sb3.stock import DreamModel
 
 __all__ = ["Dyna", "check_algorithm", "judge_of", "lens_of"]
 
@@ -36,12 +36,12 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     Parameters
     ----------
     model
-        What to learn and dream in: a `WorldModel`, an `MLPEnsemble`, anything with their methods.
+        What to learn and dream in: a `WorldModel`, a `NeuralWorldModel`, anything with their methods.
     config
         Free parameters.
     judge
-        Reward and termination of dreams; default: the env's own ``task``. ``"learned"``: by what the model learns of
-        them, or if it leaves them out, by a `LearnedTask` beside it.
+        Reward and termination of dreams; default: the env's own ``task``. ``"learned"``: by what a neural model learns
+        of them with the rest, or beside any other by a `LearnedTask`.
     like
         An env in the same wrappers as those that the agent acts in; needed where these run in other
         processes.
@@ -51,8 +51,11 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     Raises
     ------
     ConfigError
-        When training begins: an algorithm that isn't off-policy, a replay buffer that can't mix, an env
-        without a `TransitionRecorder`, spaces or schemas that don't match, no reward function.
+        When training begins: an algorithm that isn't off-policy, a replay buffer that can't mix or discounts otherwise,
+        an env without a `TransitionRecorder`, spaces or schemas that don't match, no reward function. While it goes on:
+        a reward function that returns NaN.
+    QueryError
+        A frozen model that knows none of its targets.
 
     Notes
     -----
@@ -90,6 +93,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self._dreamed_at = 0
         self._made_up = False
         self._known = 0.0
+        self._mixed: Any = None
         self._apprentice: Apprentice | None = None
         self._imagination: Imagination | None = None
 
@@ -109,9 +113,11 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         judge = judge_of(lens, self._judge, self.world)
         if self._apprentice is None:  # a second learn() goes on with what is known
             self._apprentice = Apprentice(self.world, judge, self.config)
+        if self._mixed is not self.buffer:  # another agent's, or one that was loaded
             self.buffer.hold(self.config.capacity)
+            self._mixed = self.buffer
         self.buffer.real_ratio = self.config.real_ratio
-        self._imagination = Imagination(self.world, lens, judge)
+        self._imagination = Imagination(self.world, lens, self._apprentice.judge)
         self._usual = int(self.model.gradient_steps)
         self._dreamed_at = min(self._dreamed_at, int(self.model.num_timesteps))
 
@@ -131,6 +137,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         return True
 
     def _on_training_end(self) -> None:
+        self.apprentice.catch_up()
         self.model.gradient_steps = self._usual
 
     # ------------------------------------------------------------------ dreams
@@ -228,12 +235,8 @@ def lens_of(training_env: Any, like: gym.Env[Any, Any] | None) -> Lens:
 
 def judge_of(lens: Lens, judge: Judge | Literal["learned"] | None, model: DreamModel) -> Judge:
     """Reward and termination of dreams: those given, learned ones, or else the env's own."""
-    if judge == "learned":
-        if hasattr(model, "judge_all"):
-            return NeuralTask(cast(NeuralModel, model))
-        return LearnedTask(lens.recorder.view.schema, changing(model))
     if judge is not None:
-        return judge
+        return checked_judge(judge, model, lens.recorder.view.schema, lens.acting)
     recorder = lens.recorder
     task = recorder.get_wrapper_attr("task") if recorder.has_wrapper_attr("task") else None
     if task is None:
@@ -241,8 +244,7 @@ def judge_of(lens: Lens, judge: Judge | Literal["learned"] | None, model: DreamM
             "nothing says what a dream is worth: pass judge='learned', or judge= an object with judge(layout, before, "
             "actions, after), or give the env a task"
         )
-    found: Judge = task
-    return found
+    return checked_judge(task, model, recorder.view.schema)
 
 
 def check_algorithm(algorithm: Any) -> None:
@@ -256,6 +258,12 @@ def check_algorithm(algorithm: Any) -> None:
         raise ConfigError(
             f"a {type(algorithm.replay_buffer).__name__} can't mix in what was imagined: make the algorithm with "
             f"{type(algorithm).__name__}(..., **replay_options(env.observation_space))"
+        )
+    buffer = algorithm.replay_buffer
+    if isinstance(buffer, MixedNStepReplayBuffer) and buffer.gamma != algorithm.gamma:
+        raise ConfigError(
+            f"the buffer's n-step returns discount by {buffer.gamma}, the algorithm by {algorithm.gamma}: make it with "
+            f"replay_options(..., n_steps={buffer.n_steps}, gamma={algorithm.gamma})"
         )
     if algorithm.train_freq.unit.value != "step":
         raise ConfigError(

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
-from relgym.wrappers.sb3.acting import acting_all
-from relgym.wrappers.sb3.judges import Judge
+from relgym.wrappers.sb3.judges import Judge, check_rewards
 from relgym.wrappers.sb3.lens import Lens, Observations, picked
 from relgym.wrappers.sb3.stock import DreamModel
 
@@ -175,7 +174,7 @@ class Imagination:
             judged = self.judge.judge(layout, before, done, following)
             if getattr(self.judge, "learned", False):
                 spoke &= np.isfinite(judged.rewards)
-            _check(judged.rewards[spoke], self.judge)
+            check_rewards(judged.rewards[spoke], self.judge)
             after[going] = np.where(spoke[:, None], following, before)
             rewards[going] += np.where(spoke, judged.rewards, 0.0)
             ended[going], known[going] = judged.terminated & spoke, spoke
@@ -184,20 +183,12 @@ class Imagination:
     def _foretell(
         self, layout: SceneLayout, vectors: Float2D, actions: NDArray[Any]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        whole, joined = acting_all(self.model.schema, layout, vectors, actions)
+        whole, joined = self.lens.acting(layout, vectors, actions)
         found = self.model.predict_batch(whole, joined)
         after = found.vectors
         if whole is not layout:
             after = np.delete(after, whole.slice(whole.index(ACTION)), axis=1)
         return after, found.ok & self.lens.inside(layout, after)
-
-
-def _check(rewards: NDArray[np.float64], judge: Judge) -> None:
-    if not np.isfinite(rewards).all():
-        bad = rewards[~np.isfinite(rewards)][0]
-        raise ConfigError(
-            f"{type(judge).__name__} gave a reward of {bad}: expected finite numbers; mend the reward function"
-        )
 
 
 def _collected(steps: list[_Step], asked: int) -> Imagined | None:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from typing import Any, Final, Protocol
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
 from relgym.envs.tasks import Judgement
+from relgym.errors import ConfigError
 from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import (
@@ -25,7 +28,10 @@ from relgym.scene.objects import (
 )
 from relgym.wrappers.sb3.acting import acting_all
 
-__all__ = ["Judge", "LearnedTask", "NeuralModel", "NeuralTask"]
+__all__ = ["Acting", "Judge", "LearnedTask", "NeuralModel", "NeuralTask", "check_rewards"]
+
+Acting: TypeAlias = Callable[[SceneLayout, Float2D, Any], tuple[SceneLayout, NDArray[np.float64]]]
+"""From layout, state vectors and actions of the bare env to layout and state vectors with the actions in them."""
 
 _NOW, _NEXT = "now", "next"
 _TOLD: Final = ("reward", "terminated")
@@ -59,6 +65,15 @@ class Judge(Protocol):
         """Judge n steps; scenes without actions, actions in the units of the bare env's space."""
 
 
+def check_rewards(rewards: NDArray[np.float64], judge: Judge) -> None:
+    """Raise `ConfigError` unless all rewards that a judge gave are finite."""
+    if not np.isfinite(rewards).all():
+        bad = rewards[~np.isfinite(rewards)][0]
+        raise ConfigError(
+            f"{type(judge).__name__} gave a reward of {bad}: expected finite numbers; mend the reward function"
+        )
+
+
 class LearnedTask:
     """Learns reward and termination as properties of the bodiless object `task`, with modes and clauses.
 
@@ -74,6 +89,8 @@ class LearnedTask:
         (type, property) pairs that change.
     config
         Free parameters of the model; laws of motion have nothing to say here.
+    acting
+        Puts actions into scenes; default: by the schema's affine maps.
 
     Attributes
     ----------
@@ -94,9 +111,15 @@ class LearnedTask:
     learned: Final = True
 
     def __init__(
-        self, schema: SceneSchema, changing: set[tuple[str, str]], config: ModelConfig | None = None
+        self,
+        schema: SceneSchema,
+        changing: set[tuple[str, str]],
+        config: ModelConfig | None = None,
+        *,
+        acting: Acting | None = None,
     ) -> None:
         self.schema = schema
+        self._acting = partial(acting_all, schema) if acting is None else acting
         counts = Counter(name for _, name in schema.objects)
         single = [
             (name, schema.type(t)) for name, t in schema.objects if counts[t] == 1 and t not in (ACTION, TASK)
@@ -199,7 +222,7 @@ class LearnedTask:
         if name == TASK:
             return np.zeros((len(before), 2))
         if name == ACTION:
-            whole, joined = acting_all(self.schema, layout, before, actions)
+            whole, joined = self._acting(layout, before, actions)
             return joined[:, whole.slice(whole.index(ACTION))]
         pairs, vectors = (self._now, before) if name == _NOW else (self._next, after)
         found: NDArray[np.float64] = vectors[:, [layout.column(layout.index(o), prop) for o, prop in pairs]]
@@ -230,14 +253,17 @@ class NeuralTask:
     ----------
     model
         The model; it learns the task together with the scenes.
+    acting
+        Puts actions into scenes; default: by the affine maps of the model's schema.
     """
 
     learned: Final = True
 
-    def __init__(self, model: NeuralModel) -> None:
+    def __init__(self, model: NeuralModel, *, acting: Acting | None = None) -> None:
         self.model = model
+        self._acting = partial(acting_all, model.schema) if acting is None else acting
 
     def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
         """What the model says; the next scene doesn't matter to it."""
-        rewards, ended = self.model.judge_all(*acting_all(self.model.schema, layout, before, actions))
+        rewards, ended = self.model.judge_all(*self._acting(layout, before, actions))
         return Judgement(rewards, ended, np.zeros(len(before), dtype=bool))

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, TypeAlias
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Final, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from relgym.envs.learned_model_shown import ViewDeeds, is_plain
 from relgym.errors import ConfigError
-from relgym.scene.objects import Float2D, SceneLayout
+from relgym.scene.objects import Float2D, Scene, SceneLayout
+from relgym.wrappers.sb3.acting import acting_all
 from relgym.wrappers.sb3.recorder import TransitionRecorder
 
 __all__ = ["Lens", "Observations", "picked"]
 
 Observations: TypeAlias = NDArray[Any] | dict[str, NDArray[Any]]
 """n observations: an array, or for Dict spaces one per key, each with n rows."""
+
+_REWARDING: Final = (gym.RewardWrapper, gym.wrappers.NormalizeReward)
 
 
 class Lens:
@@ -41,7 +46,7 @@ class Lens:
     Raises
     ------
     ConfigError
-        No recorder, or a wrapper that changes a space in a way that nobody can follow.
+        No recorder, or outside it a wrapper that changes rewards, or a space in a way that nobody can follow.
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
@@ -60,13 +65,22 @@ class Lens:
             layer = layer.env
         self.recorder = layer
         self._show.reverse()
-        base: Any = layer.observation_space  # a Dict of Boxes, as the recorder's view has checked
+        self._view, self._base = layer.view, layer.observation_space
+        self._plain = is_plain(self._view)
+        base: Any = (
+            self._base if self._plain else spaces.Dict()
+        )  # if plain, of Boxes, as the view has checked
         self._dtypes = {name: part.dtype for name, part in base.spaces.items()}
         self._low = {name: part.low for name, part in base.spaces.items()}
         self._high = {name: part.high for name, part in base.spaces.items()}
 
     def _take_up(self, layer: gym.Wrapper[Any, Any, Any, Any]) -> None:
         own = vars(layer).get("repeat")
+        if isinstance(layer, _REWARDING):
+            raise ConfigError(
+                f"{type(layer).__name__} changes rewards outside the TransitionRecorder, where dreams would be paid "
+                "otherwise: put it inside, and pass judge='learned' or a judge that pays as it does"
+            )
         if isinstance(own, int):
             self.repeat *= own
         elif isinstance(layer, gym.ObservationWrapper):
@@ -84,15 +98,21 @@ class Lens:
 
     def observations(self, layout: SceneLayout, vectors: Float2D) -> Observations:
         """What the agent sees of n scenes, with the dtypes of its observation space."""
-        if self._show and hasattr(self._show[0], "flattener"):
-            seen = self._show[0].flattener(layout, vectors)
-            for layer in self._show[1:]:
-                seen = _stacked([layer.observation(picked(seen, k)) for k in range(len(vectors))])
-        else:
-            seen = self._raw(layout, vectors)
-            for layer in self._show:
+        batched = self._plain and self._show and hasattr(self._show[0], "flattener")
+        seen = self._show[0].flattener(layout, vectors) if batched else self._raw(layout, vectors)
+        with _still(self._show):
+            for layer in self._show[1:] if batched else self._show:
                 seen = _stacked([layer.observation(picked(seen, k)) for k in range(len(vectors))])
         return self._cast(seen)
+
+    def acting(
+        self, layout: SceneLayout, vectors: Float2D, actions: NDArray[Any]
+    ) -> tuple[SceneLayout, NDArray[np.float64]]:
+        """Layout and state vectors of n scenes with actions of the bare env in them, as that env understands these."""
+        if self._plain:
+            return acting_all(self._view.schema, layout, vectors, actions)
+        deeds = ViewDeeds(self._view, layout, self.recorder.action_space)
+        return deeds.layout, deeds.joined(vectors, actions)
 
     def actions(self, actions: NDArray[Any]) -> NDArray[Any]:
         """Actions of the bare env for n actions of the agent."""
@@ -102,13 +122,21 @@ class Lens:
 
     def inside(self, layout: SceneLayout, vectors: Float2D) -> NDArray[np.bool_]:
         """Which of n scenes lie in the bare env's observation space."""
+        if not self._plain:
+            seen = (self._view.observation(scene) for scene in self._scenes(layout, vectors))
+            return np.array([self._base.contains(one) for one in seen], dtype=np.bool_)
         low, high = (
             np.concatenate([ends[name] for name in layout.names]) for ends in (self._low, self._high)
         )
         within = (low <= vectors) & (vectors <= high)
         return np.asarray(within.all(axis=1))
 
-    def _raw(self, layout: SceneLayout, vectors: Float2D) -> dict[str, NDArray[Any]]:
+    def _scenes(self, layout: SceneLayout, vectors: Float2D) -> Iterator[Scene]:
+        return (Scene(self._view.schema, layout, vector.copy()) for vector in vectors)
+
+    def _raw(self, layout: SceneLayout, vectors: Float2D) -> Observations:
+        if not self._plain:
+            return _stacked([self._view.observation(scene) for scene in self._scenes(layout, vectors)])
         cuts = ((name, layout.slice(k)) for k, name in enumerate(layout.names))
         return {name: vectors[:, cut].astype(self._dtypes[name]) for name, cut in cuts}
 
@@ -130,3 +158,16 @@ def _stacked(seen: list[Any]) -> Observations:
     if isinstance(seen[0], Mapping):
         return {key: np.stack([np.asarray(one[key]) for one in seen]) for key in seen[0]}
     return np.stack([np.asarray(one) for one in seen])
+
+
+@contextmanager
+def _still(layers: list[Any]) -> Iterator[None]:
+    """Keep wrappers that learn from what they show, such as NormalizeObservation, from learning of dreams."""
+    learning = [layer for layer in layers if getattr(layer, "update_running_mean", False)]
+    for layer in learning:
+        layer.update_running_mean = False
+    try:
+        yield
+    finally:
+        for layer in learning:
+            layer.update_running_mean = True

@@ -45,8 +45,9 @@ class Experience:
 class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """Keeps the latest steps until somebody takes them; what the env returns stays as it is.
 
-    It goes directly round an env whose observations are scenes, inside all wrappers that change observations
-    or actions: what these hide, scale or repeat, the model sees as it is.
+    It goes directly round an env, inside all wrappers that change observations or actions: what these hide, scale or
+    repeat, the model sees as it is. Where observations aren't scenes they are seen as `relgym.wrappers.ModelLearner`
+    sees them by default: one object of numbers, or one per key.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
     Raises
     ------
     ConfigError
-        An env without a schema, or with changed spaces.
+        Observations that need a view of the user's (images, tables, nested spaces), or changed spaces.
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from dyna_worlds import Flat, LineEnv, LineModel, LineTask
 
-from relgym.errors import ConfigError
+from relgym.errors import ConfigError, QueryError
+from relgym.model.world_model import WorldModel
 from relgym.wrappers.sb3.apprentice import Apprentice
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
@@ -101,9 +102,45 @@ def test_training_stops_when_the_model_is_trusted_no_more() -> None:
     env = DreamVecEnv(model, world(), num_envs=4, config=QUICK)
     model.model.off = 2.0  # type: ignore[attr-defined]  # the world is another now
     agent = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
-    agent.learn(1_000, callback=check)
+    with pytest.warns(
+        UserWarning, match=r"training stops after \d+ dreamed steps: .* trusted no more from 0.2"
+    ):
+        agent.learn(1_000, callback=check)
     assert agent.num_timesteps < 100
     assert not model.gate.open
+    with pytest.raises(
+        ConfigError, match=r"the model isn't trusted: .*let it watch more of them \(explore\)"
+    ):
+        agent.learn(1_000, callback=check)
+
+
+def test_check_ups_see_what_the_agent_was_trained_on() -> None:
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
+
+    model = apprentice()
+    dreamed = VecNormalize(DreamVecEnv(model, world(), num_envs=4, config=QUICK))
+    agent = PPO("MlpPolicy", dreamed, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
+    shown: list[Any] = []
+    predict = agent.predict
+    agent.predict = lambda seen, **more: (shown.append(seen), predict(seen, **more))[1]  # type: ignore[method-assign]
+    real = world()
+    agent.learn(64, callback=DreamCheckup(model, real, every=1_000, episodes=1, seed=5))
+    first, _ = world().reset(seed=5)
+    assert not np.allclose(shown[0], first)
+    np.testing.assert_allclose(dreamed.unnormalize_obs(shown[0]), first, atol=2.0)
+
+
+def test_a_task_can_be_learned_while_exploring() -> None:
+    from relgym.wrappers.sb3.dreaming import explore
+    from relgym.wrappers.sb3.judges import LearnedTask
+
+    found = Apprentice(LineModel(), "learned", QUICK)
+    assert isinstance(found.judge, LearnedTask)
+    explore(found, world(), 40, seed=0)
+    assert found.judge.model.seen == 40
 
 
 def test_refusals_name_the_remedy() -> None:
@@ -117,3 +154,13 @@ def test_refusals_name_the_remedy() -> None:
         explore(apprentice(), world(), 0, seed=0)
     with pytest.raises(ConfigError, match="every=0: expected at least 1"):
         DreamCheckup(apprentice(), world(), every=0)
+    with pytest.raises(ConfigError, match="has no TransitionRecorder: put one directly round the bare env"):
+        explore(apprentice(), Flat(LineEnv()), 5, seed=0)
+    with pytest.raises(ConfigError, match="has no TransitionRecorder: put one directly round the bare env"):
+        DreamCheckup(apprentice(), Flat(LineEnv()))
+    blank = Apprentice(WorldModel(LineEnv().schema), LineTask(), QUICK)
+    blank.stock.add(
+        LineEnv().schema.scene({"cart": [0.0, 1.0], "other": [1.0, 2.0], "mark": [0.5]}), first=True
+    )
+    with pytest.raises(QueryError, match="the model knows none of its targets"):
+        DreamVecEnv(blank, world())

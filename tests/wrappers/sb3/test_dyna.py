@@ -11,7 +11,9 @@ import pytest
 from dyna_worlds import Flat, LineEnv, LineModel
 from gymnasium import spaces
 
-from relgym.errors import ConfigError
+import relgym
+from relgym.envs.tasks import Judgement
+from relgym.errors import ConfigError, QueryError
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
 
@@ -83,7 +85,7 @@ def test_trusted_dreams_are_exact_transitions(name: str, make: Any, options: dic
     assert (gate.open, gate.known) == (True, 1.0)
     assert gate.error < 1e-6  # observations are float32
     assert dyna.imagined > 100
-    assert len(world.learned) == 60 - 5
+    assert len(world.learned) == 60  # in the end those too that were waiting for their turn
     pool = algorithm.replay_buffer.imagined
     last = pool.size()
     place = pool.observations["cart"][:last, 0, 0] if make is plain else 2.0 * pool.observations[:last, 0, 0]
@@ -203,7 +205,7 @@ def test_several_envs_teach_one_model() -> None:
     envs = VecNormalize(DummyVecEnv([flat, flat, flat]))
     dyna = Dyna(world, DynaConfig(**QUICK))
     agent("SAC", envs).learn(60, callback=dyna)
-    assert len(world.learned) == 60 - 5
+    assert len(world.learned) == 60
     assert dyna.imagined > 50
 
 
@@ -273,12 +275,97 @@ def test_refusals_name_the_remedy() -> None:
         refused(taskless)
     with pytest.raises(ConfigError, match=r"object is no model to dream with: it lacks \['schema'"):
         refused(flat(), object())
+    ignorant = relgym.WorldModel(LineEnv().schema)
+    ignorant.frozen = True
+    with pytest.raises(QueryError, match="the model knows none of its targets"):
+        refused(flat(), ignorant)
+    for judge in ("foo", abs):
+        with pytest.raises(ConfigError, match="expected 'learned', or an object with judge"):
+            refused(flat(), judge=judge)
+    with pytest.raises(ConfigError, match=r"TransformReward changes rewards outside .* put it inside"):
+        refused(gym.wrappers.TransformReward(flat(), lambda reward: 100.0 * reward))
+    other = agent("SAC", flat(), n_steps=3, gamma=0.5)
+    with pytest.raises(ConfigError, match=r"discount by 0.99, the algorithm by 0.5: .*n_steps=3, gamma=0.5"):
+        other.learn(5, callback=Dyna(LineModel(), DynaConfig(**QUICK)))
     unfrozen = LineModel()
     unfrozen.frozen, unfrozen.targets = True, ()  # type: ignore[assignment]
     with pytest.raises(ConfigError, match="knows none of the targets"):
         refused(flat(), unfrozen)
     with pytest.raises(ConfigError, match="training has not begun"):
         _ = Dyna(LineModel()).apprentice
+
+
+def test_a_reward_that_is_no_number_is_said_to_be_none() -> None:
+    class Odd:
+        def judge(self, layout: Any, before: Any, actions: Any, after: Any) -> Judgement:
+            never = np.zeros(len(after), dtype=bool)
+            return Judgement(np.full(len(after), np.nan), never, never)
+
+    with pytest.raises(ConfigError, match=r"Odd gave a reward of nan: .*mend the reward function"):
+        refused(flat(), judge=Odd())
+
+
+def test_a_second_agent_gets_the_dreams_too() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    dyna = Dyna(LineModel(), DynaConfig(**QUICK))
+    for _ in range(2):
+        algorithm = agent("SAC", flat())
+        algorithm.learn(40, callback=dyna)
+        assert algorithm.replay_buffer.imagined.size() > 50
+    pool = algorithm.replay_buffer.imagined
+    algorithm.learn(20, callback=dyna, reset_num_timesteps=False)
+    assert algorithm.replay_buffer.imagined is pool  # the same agent goes on with what it dreamed
+
+
+def test_dreams_teach_wrappers_nothing() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    env = gym.wrappers.NormalizeObservation(flat())
+    dyna = Dyna(LineModel(), DynaConfig(**QUICK))
+    agent("SAC", env).learn(60, callback=dyna)
+    assert dyna.imagined > 100
+    assert env.obs_rms.count < 60 + 60 / 8 + 2  # an observation a step, and one for every reset
+    assert env.update_running_mean
+
+
+class Drift(gym.Env[Any, Any]):
+    """Two numbers and no schema: a place, and a speed that is pushed; over when the place is far off."""
+
+    def __init__(self) -> None:
+        self.observation_space = spaces.Box(-100.0, 100.0, (2,), np.float64)
+        self.action_space = spaces.Discrete(3)
+        self.state = np.zeros(2)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        self.state = self.np_random.uniform(-1.0, 1.0, 2)
+        return self.state.copy(), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        x, v = self.state
+        self.state = np.array([x + 0.5 * v, v + 0.25 * (int(action) - 1)])
+        return self.state.copy(), -abs(self.state[0]), bool(abs(self.state[0]) > 6.0), False, {}
+
+
+def test_any_env_will_do() -> None:
+    """Observations that are numbers, discrete actions, and a task that is learned."""
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    env = TransitionRecorder(gym.wrappers.TimeLimit(Drift(), 12))
+    dyna = Dyna(relgym.WorldModel(env.view.schema), DynaConfig(**QUICK), judge="learned")
+    algorithm = agent("DQN", env, learning_starts=10, train_freq=1, exploration_fraction=1.0)
+    algorithm.learn(500, callback=dyna)
+    assert dyna.imagined > 100
+    pool = algorithm.replay_buffer.imagined
+    last = pool.size()
+    now, after = pool.observations[:last, 0], pool.next_observations[:last, 0]
+    push = 0.25 * (pool.actions[:last, 0, 0] - 1.0)
+    np.testing.assert_allclose(after[:, 0], now[:, 0] + 0.5 * now[:, 1], atol=1e-6)
+    np.testing.assert_allclose(after[:, 1], now[:, 1] + push, atol=1e-6)
+    np.testing.assert_allclose(pool.rewards[:last, 0], -np.abs(after[:, 0]), atol=1e-6)
 
 
 def test_n_steps_are_refused_where_there_is_no_buffer_for_them() -> None:
@@ -296,6 +383,7 @@ def test_stable_baselines3_is_still_what_this_stands_on() -> None:
     from stable_baselines3.common.buffers import DictReplayBuffer, NStepReplayBuffer, ReplayBuffer
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+    from stable_baselines3.common.policies import BasePolicy
     from stable_baselines3.common.type_aliases import DictReplayBufferSamples, ReplayBufferSamples
 
     for algorithm in (SAC, TD3, DQN):
@@ -313,5 +401,28 @@ def test_stable_baselines3_is_still_what_this_stands_on() -> None:
     assert ReplayBufferSamples._fields == DictReplayBufferSamples._fields == fields
     for hook in ("_init_callback", "_on_step", "_on_training_end", "training_env", "logger"):
         assert hasattr(BaseCallback, hook)
-    for name in ("get_vec_normalize_env", "predict", "set_logger"):
+    for name in ("get_vec_normalize_env", "predict", "set_logger", "train", "learn"):
         assert callable(getattr(OffPolicyAlgorithm, name))
+    assert list(inspect.signature(OffPolicyAlgorithm.train).parameters)[1:] == [
+        "gradient_steps",
+        "batch_size",
+    ]
+    for name in ("scale_action", "unscale_action"):
+        assert callable(getattr(BasePolicy, name))
+
+
+def test_a_vector_env_is_still_made_as_it_was() -> None:
+    """What a `VecEnv` of one's own overrides and calls, as those of Stable-Baselines3 do; fails where it moves."""
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    envs = DummyVecEnv([flat, flat])
+    assert (len(envs._seeds), len(envs._options), list(envs._get_indices(None))) == (2, 2, [0, 1])
+    for name in ("_reset_seeds", "_reset_options", "env_method", "get_attr", "set_attr", "env_is_wrapped"):
+        assert callable(getattr(envs, name))
+    normalise = VecNormalize(envs)
+    for name in ("normalize_obs", "unnormalize_obs", "get_original_obs", "get_original_reward"):
+        assert callable(getattr(normalise, name))
+    algorithm = agent("SAC", envs)
+    algorithm.learn(2)
+    assert algorithm._last_obs.shape == (2, 1)  # what a callback sees first
+    assert algorithm.train_freq.unit.value == "step"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -48,6 +49,15 @@ def test_two_dreams_by_hand() -> None:
     assert found.cut.tolist() == [False, False, True, False, False]
     assert set(found.actions.ravel().tolist()) == {0.25}
     assert (len(found), found.known) == (5, 1.0)
+
+
+def test_actions_mean_what_they_mean_in_the_env_that_the_agent_acts_in() -> None:
+    """A model knows forces; how an env scales them is the env's own affair."""
+    strong = LineEnv()
+    strong.schema = replace(SCHEMA, action_scale=(("push", -8.0, 8.0),))
+    found = imagination(TransitionRecorder(strong)).dream(LAYOUT, vectors(0.0), forwards, horizon=1)
+    assert found is not None
+    assert found.next_observations["cart"][:, 0].tolist() == [4.0]  # type: ignore[call-overload,index]
 
 
 def test_where_the_model_is_silent_the_step_before_is_cut_off() -> None:
