@@ -12,7 +12,7 @@ from gymnasium.error import ResetNeeded
 from relgym.envs.actions import without_action
 from relgym.envs.arguments import check_options, checked_action, checked_count, checked_least
 from relgym.envs.learned_model_ends import Cause, explained, horizon_reached, parts_of
-from relgym.envs.learned_model_judges import Judge, Judges, Start, TaskFunctions
+from relgym.envs.learned_model_judges import Judge, Judges, Start, TaskFunctions, marked
 from relgym.envs.learned_model_setting import Setting, check_knowledge
 from relgym.envs.views import View
 from relgym.errors import ConfigError
@@ -86,14 +86,14 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         ``task.terminated``. None: see above.
     task
         An object with functions `reward` and `terminated`: the ``task`` of another env, say. Default: that of
-        `like`.
+        `like`; a file holds none.
     start
         Function of a random generator that returns a start scene.
     horizon
         Longest episode in steps, >= 1; none: no limit.
     min_margin
         Predictions that lead their rivals by less, in log-odds, aren't followed. Default 0: all are. Raising it
-        makes dreams shorter and truer.
+        makes dreams shorter and truer where modes are voted on; laws have no rivals.
     snapshot
         Whether to dream of a copy of the model as it is now.
     render_mode
@@ -146,6 +146,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         self._scene: Scene | None = None
         self._steps = 0
         self._viewer: Any = None
+        self._camera: Any = None
 
     # ------------------------------------------------------------------ the Gymnasium contract
     def reset(
@@ -165,7 +166,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         super().reset(seed=seed)
         check_knowledge(self.model)
         self._scene = self._first(seed, options or {})
-        self._steps = 0
+        self._steps, self._camera = 0, None
         if self.render_mode == "human":
             self.render()
         return self._observation(), {"scene": self._scene}
@@ -178,7 +179,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         ActionError
             `action` lies outside the action space.
         ConfigError
-            The reward is NaN or infinite; the dream is where it was.
+            The reward or the termination is no finite number; the dream is where it was.
         """
         before = self.scene
         taken = checked_action(self.action_space, action)
@@ -201,14 +202,16 @@ class LearnedModelEnv(gym.Env[Any, Any]):
 
     def render(self) -> Any:
         """Draw the scene: as an array of shape (height, width, 3), or in a window for ``"human"``."""
-        from relgym.envs.rendering import SceneViewer
+        from relgym.envs.rendering import Camera, SceneViewer
 
         if self.render_mode is None:
             raise ConfigError("nothing to render to: make the env with render_mode='rgb_array' or 'human'")
         if self._viewer is None:
             self._viewer = SceneViewer(self.render_mode, fps=self.metadata["render_fps"])
-        regions = getattr(self.task, "regions", None)
-        return self._viewer.show(self.scene, marks=() if regions is None else regions(self.scene))
+        if self._camera is None:
+            self._camera = Camera()
+        marks = marked(self.task, self.scene)
+        return self._viewer.show(self.scene, self._camera.view(self.scene, marks), marks)
 
     def close(self) -> None:
         """Close the window, if there is one."""

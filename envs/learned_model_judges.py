@@ -25,6 +25,7 @@ __all__ = [
     "drawn_from",
     "in_batches",
     "learned_column",
+    "marked",
 ]
 
 Judge: TypeAlias = Callable[[Scene, Any, Scene], float]
@@ -111,6 +112,18 @@ def _chosen(given: Any, own: Any, model: WorldModel, layout: SceneLayout, prop: 
     return given
 
 
+def _functions(task: Any, *names: str) -> list[Any]:
+    """A task's functions; none each without a task."""
+    if task is None:
+        return [None for _ in names]
+    if missing := [name for name in names if not callable(getattr(task, name, None))]:
+        raise ConfigError(
+            f"task={task!r}: expected an object with functions {' and '.join(names)}, such as an env's task (a "
+            f"relgym.envs.Task); it has no {' and no '.join(missing)}"
+        )
+    return [getattr(task, name) for name in names]
+
+
 @dataclass(frozen=True, slots=True)
 class Judges:
     """Reward and termination of single steps: each a function, a column of the next state vector, or None."""
@@ -128,27 +141,33 @@ class Judges:
         layout: SceneLayout,
     ) -> Judges:
         """Settle who judges: what was given, else the task, else what the model has learned, else nobody."""
-        own = (None, None) if task is None else (task.reward, task.terminated)
+        own = _functions(task, "reward", "terminated")
         return cls(
             _chosen(reward, own[0], model, layout, "reward"),
             _chosen(terminated, own[1], model, layout, "terminated"),
         )
 
     def __call__(self, before: Scene, action: Any, after: Scene) -> tuple[float, bool]:
-        """Reward of a step and whether it ends the episode; `ConfigError` where the reward is not finite."""
-        reward, ended = (_verdict(judge, before, action, after) for judge in (self.reward, self.terminated))
-        if not np.isfinite(reward):
-            raise ConfigError(
-                f"the reward of a dreamed step is {reward}: expected a finite number; mend the reward function for "
-                f"before={before.values()}, action={action}, after={after.values()}"
-            )
+        """Reward of a step and whether it ends the episode; `ConfigError` where either is no finite number."""
+        given = {"reward": self.reward, "termination": self.terminated}
+        reward, ended = (_verdict(what, judge, before, action, after) for what, judge in given.items())
         return reward, ended > _ENDED
 
 
-def _verdict(judge: Judge | int | None, before: Scene, action: Any, after: Scene) -> float:
+def _verdict(what: str, judge: Judge | int | None, before: Scene, action: Any, after: Scene) -> float:
     if judge is None:
         return 0.0
-    return float(after.vector[judge]) if isinstance(judge, int) else float(judge(before, action, after))
+    told = after.vector[judge] if isinstance(judge, int) else judge(before, action, after)
+    try:
+        value = float(told)
+    except (TypeError, ValueError):
+        value = np.nan
+    if not np.isfinite(value):
+        raise ConfigError(
+            f"the {what} of a dreamed step is {told!r}: expected a finite number; mend the {what} function for "
+            f"before={before.values()}, action={action}, after={after.values()}"
+        )
+    return value
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +188,7 @@ class BatchJudges:
         layout: SceneLayout,
     ) -> BatchJudges:
         """As `Judges.of`."""
-        own = (None, None) if task is None else (task.rewards, task.terminations)
+        own = _functions(task, "rewards", "terminations")
         return cls(
             layout,
             _chosen(reward, own[0], model, layout, "reward"),
@@ -184,15 +203,10 @@ class BatchJudges:
         ConfigError
             A reward is not finite, or a function returns another shape.
         """
-        rewards = self._verdicts("reward", self.reward, before, actions, after)
-        ended = self._verdicts("terminated", self.terminated, before, actions, after)
-        if not np.isfinite(rewards).all():
-            row = int(np.flatnonzero(~np.isfinite(rewards))[0])
-            raise ConfigError(
-                f"the reward of dreamed step {row} of {len(rewards)} is {rewards[row]}: expected a finite number; "
-                f"mend the reward function for before={before[row].tolist()}, after={after[row].tolist()} "
-                f"(objects {list(self.layout.names)})"
-            )
+        given = {"reward": self.reward, "termination": self.terminated}
+        rewards, ended = (
+            self._verdicts(what, judge, before, actions, after) for what, judge in given.items()
+        )
         return rewards, ended > _ENDED
 
     def _verdicts(
@@ -202,13 +216,31 @@ class BatchJudges:
             return np.zeros(len(after))
         if isinstance(judge, int):
             return after[:, judge].copy()
-        found = np.asarray(judge(self.layout, before, actions, after), dtype=np.float64)
+        told = judge(self.layout, before, actions, after)
+        try:
+            found = np.asarray(told, dtype=np.float64)
+        except (TypeError, ValueError):
+            found = np.empty(0)
         if found.shape != (len(after),):
             raise ConfigError(
-                f"{what}: expected an array of shape {(len(after),)} from a function of (layout, before, actions, "
-                f"after), got shape {found.shape}; in_batches(schema, function) makes one of a function of scenes"
+                f"{what}: expected an array of {len(after)} numbers from a function of (layout, before, actions, "
+                f"after), got {type(told).__name__} of shape {np.shape(told)}; in_batches(schema, function) makes one "
+                "of a function of scenes"
+            )
+        if not np.isfinite(found).all():
+            row = int(np.flatnonzero(~np.isfinite(found))[0])
+            raise ConfigError(
+                f"the {what} of dreamed step {row} of {len(found)} is {found[row]}: expected a finite number; mend the "
+                f"{what} function for before={before[row].tolist()}, after={after[row].tolist()} (objects "
+                f"{list(self.layout.names)})"
             )
         return found
+
+
+def marked(task: Any, scene: Scene) -> tuple[Any, ...]:
+    """Regions that a picture marks, if the task names any."""
+    regions = getattr(task, "regions", None)
+    return () if regions is None else tuple(regions(scene))
 
 
 def in_batches(schema: SceneSchema, judge: Judge) -> BatchJudge:

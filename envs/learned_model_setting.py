@@ -81,6 +81,8 @@ class Setting:
         QueryError
             A model that won't learn any more knows none of its targets.
         """
+        if like is not None and not isinstance(like, (gym.Env, Scene)):
+            raise ConfigError(f"like={like!r}: expected an env (gym.make makes one of an id) or a Scene")
         if not isinstance(model, WorldModel):
             model = WorldModel.load(model)
         elif snapshot:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import check_options, checked_count, checked_least, checked_mask
 from relgym.envs.learned_model_batch import DreamStep, Stepped
 from relgym.envs.learned_model_infos import masked, told_of
-from relgym.envs.learned_model_judges import BatchJudge, BatchJudges, BatchStart, TaskFunctions
+from relgym.envs.learned_model_judges import BatchJudge, BatchJudges, BatchStart, TaskFunctions, marked
 from relgym.envs.learned_model_setting import Setting, check_knowledge
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
@@ -142,6 +142,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._over = np.zeros(self.num_envs, dtype=np.bool_)
         self._viewer: Any = None
+        self._cameras: dict[int, Any] = {}
         self.prediction: BatchPrediction | None = None
 
     # ------------------------------------------------------------------ the Gymnasium contract
@@ -210,13 +211,17 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
 
     def render(self) -> tuple[Any, ...]:
         """Draw every dream: arrays of shape (height, width, 3)."""
-        from relgym.envs.rendering import SceneViewer
+        from relgym.envs.rendering import Camera, SceneViewer
 
         if self.render_mode is None:
             raise ConfigError("nothing to render to: make the envs with render_mode='rgb_array'")
         if self._viewer is None:
             self._viewer = SceneViewer(self.render_mode, fps=self.metadata["render_fps"])
-        return tuple(self._viewer.show(scene) for scene in self.scenes)
+        pictures = []
+        for k, scene in enumerate(self.scenes):
+            camera, marks = self._cameras.setdefault(k, Camera()), marked(self.task, scene)
+            pictures.append(self._viewer.show(scene, camera.view(scene, marks), marks))
+        return tuple(pictures)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Give the viewer back, if there is one."""
@@ -280,6 +285,8 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
 
     def _begin(self, rows: _Rows, first: Float2D) -> None:
         assert self._vectors is not None, "made by reset"
+        if self._cameras:
+            self._cameras = {k: camera for k, camera in self._cameras.items() if k not in set(rows.tolist())}
         self._vectors[rows] = first
         self._steps[rows] = 0
         self._over[rows] = False

@@ -13,7 +13,7 @@ from gymnasium import spaces
 
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.errors import ConfigError, ModelFileError, ObservationError
-from relgym.scene.objects import Scene, SceneSchema
+from relgym.scene.objects import TASK, Scene, SceneSchema
 
 __all__ = ["EnvRecord", "copied", "schema_like", "world_like"]
 
@@ -124,7 +124,9 @@ def schema_like(other: SceneSchema | None, schema: SceneSchema, what: str) -> Sc
             f"{sorted(t.name for t in schema.types)}), but {difference}; make it with the arguments that the model's "
             "env had (only numbers and names of objects may differ)"
         )
-    return schema if other.objects == schema.objects else replace(schema, objects=other.objects)
+    # No env shows what a step brings; a model that learned it foretells it wherever it dreams.
+    objects = (*other.objects, *(own for own in schema.objects if own[0] == TASK and TASK not in other.order))
+    return schema if objects == schema.objects else replace(schema, objects=objects)
 
 
 def _difference(other: SceneSchema, schema: SceneSchema) -> str:

@@ -20,7 +20,7 @@ from relgym.scene.hull import outline_of
 from relgym.scene.objects import POSE, Float1D, Float2D, Scene, SceneObject
 from relgym.scene.shapes import ConvexPolyhedron, Sphere, outline
 
-__all__ = ["SceneViewer", "View", "render_scene", "scene_view"]
+__all__ = ["Camera", "SceneViewer", "View", "render_scene", "scene_view"]
 
 Image = NDArray[np.uint8]
 Colour = tuple[int, int, int]
@@ -126,6 +126,42 @@ def scene_view(scene: Scene, names: Iterable[str] | None = None, margin: float =
     pad = margin * max(float((high - low).max()), 1e-6)
     width, height = high - low + 2 * pad
     return View(float(low[0] - pad), float(low[1] - pad), float(width), float(height))
+
+
+class Camera:
+    """Chooses the view of one scene after the other: it stands still as long as nothing leaves the picture.
+
+    So that what moves is seen to move. At first bodies and marks fill the picture; where one leaves it, the next view
+    has room around them.
+    """
+
+    def __init__(self) -> None:
+        self._view: View | None = None
+
+    def view(self, scene: Scene, marks: Sequence[Region] = ()) -> View:
+        """The view to take of this scene."""
+        if self._view is None:
+            self._view = _with_marks(scene_view(scene), marks)
+        elif not _inside(_with_marks(scene_view(scene, margin=0.0), marks), self._view):
+            self._view = _with_marks(scene_view(scene, margin=1.0), marks)
+        return self._view
+
+
+def _with_marks(view: View, marks: Sequence[Region]) -> View:
+    parts: list[View | Region] = [view, *marks]
+    left, bottom = min(p.left for p in parts), min(p.bottom for p in parts)
+    right, top = max(p.left + p.width for p in parts), max(p.bottom + p.height for p in parts)
+    return View(left, bottom, right - left, top - bottom)
+
+
+def _inside(part: View, whole: View) -> bool:
+    slack = 1e-9 * max(whole.width, whole.height)
+    return (
+        part.left >= whole.left - slack
+        and part.bottom >= whole.bottom - slack
+        and part.left + part.width <= whole.left + whole.width + slack
+        and part.bottom + part.height <= whole.bottom + whole.height + slack
+    )
 
 
 class SceneViewer:

@@ -12,7 +12,7 @@ import numpy as np
 from relgym.envs.views.base import View
 from relgym.envs.views.numeric import NumbersView
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import TASK, TERMINATED, ObjectType, Scene
+from relgym.scene.objects import TASK, TERMINATED, ObjectType, Scene, Target
 
 __all__ = ["REWARD", "TERMINATED", "TaskView"]
 
@@ -51,6 +51,9 @@ class TaskView:
             schema,
             types=(*schema.types, ObjectType(TASK, self._names)),
             objects=(*schema.objects, (TASK, TASK)),
+            targets=None
+            if schema.targets is None
+            else (*schema.targets, *_told(schema.targets, self._names)),
         )
 
     @property
@@ -126,3 +129,14 @@ class TaskView:
     def _with(self, scene: Scene, values: list[float]) -> Scene:
         layout = self.schema.layout((*scene.layout.names, TASK))
         return Scene(self.schema, layout, np.concatenate([scene.vector, values]))
+
+
+def _told(targets: Sequence[Target], names: Sequence[str]) -> tuple[Target, ...]:
+    """What a step brings, as targets beside those that a schema names: it depends on what these will be.
+
+    A reward may depend on whether the step ends the episode, as a bonus for success does.
+    """
+    given = tuple((t.type, t.property) for t in targets)
+    ended = ((TASK, TERMINATED),) if TERMINATED in names else ()
+    order = [name for name in (TERMINATED, REWARD) if name in names]
+    return tuple(Target(TASK, name, given=given + (ended if name == REWARD else ())) for name in order)

@@ -364,6 +364,53 @@ def test_reward_and_end_can_be_learned() -> None:
     assert ends == [False, True, True, True]
 
 
+@pytest.mark.parametrize("told", [None, "much", np.nan, np.inf])
+@pytest.mark.parametrize("what", ["reward", "terminated"])
+def test_verdicts_are_finite_numbers(what: str, told: Any) -> None:
+    dream = LearnedModelEnv(cart_model(), **{what: lambda *_: told})
+    dream.reset(seed=0)
+    was = dream.scene
+    with pytest.raises(ConfigError, match=r"of a dreamed step is .*: expected a finite number; mend the"):
+        dream.step(PUSH)
+    assert dream.scene is was
+
+
+def test_what_was_learned_of_the_task_holds_among_other_objects() -> None:
+    rng = np.random.default_rng(0)
+
+    def taught() -> ModelLearner:
+        real = gym.make("relgym/TruckPush-v0", n_boxes=1)
+        env = ModelLearner(real, predict=False, learn_reward=True, learn_termination=True)
+        env.reset(seed=0)
+        for _ in range(250):
+            *_, terminated, truncated, _ = env.step(rng.uniform(-0.2, 1.0, 1))
+            if terminated or truncated:
+                env.reset()
+        return env
+
+    model = taught().model
+    assert [str(t) for t in model.targets][-2:] == ["task.terminated", "task.reward"]
+    crowd = gym.make("relgym/TruckPush-v0", n_boxes=3)
+    dream = LearnedModelEnv(model, like=crowd, reward="learned", terminated="learned")
+    task = crowd.get_wrapper_attr("task")
+    right = []
+    for episode in range(10):
+        observation, info = crowd.reset(seed=episode)
+        assert dream.reset(options={"scene": info["scene"]})[0].keys() == observation.keys()
+        over = cut = False
+        while not (over or cut):
+            before, action = dream.scene, rng.uniform(-0.2, 1.0, 1)
+            _, reward, over, cut, _ = dream.step(action)
+            if not cut:
+                expected = (
+                    task.reward(before, action, dream.scene),
+                    task.terminated(before, action, dream.scene),
+                )
+                right.append((pytest.approx(reward, abs=1e-6), over) == expected)
+    assert len(right) > 20
+    assert np.mean(right) > 0.9
+
+
 def test_a_dream_is_judged_by_the_real_envs_own_task() -> None:
     real = gym.make("relgym/TruckPush-v0", task="push", n_boxes=1)
     learner = ModelLearner(gym.make("relgym/TruckPush-v0", task="push", n_boxes=1), predict=False)
@@ -517,6 +564,14 @@ def test_bad_input_names_the_remedy(cart: ModelLearner, truck: ModelLearner) -> 
         LearnedModelEnv(cart.model, render_mode="ascii")
     with pytest.raises(ConfigError, match="but it has up='y', planar=True"):
         LearnedModelEnv(truck.model, like=gym.make("relgym/BallBoxRamp-v0"))
+    with pytest.raises(
+        ConfigError, match=r"like='CartPole-v1': expected an env \(gym.make makes one of an id\)"
+    ):
+        LearnedModelEnv(cart.model, like="CartPole-v1")  # type: ignore[arg-type]
+    with pytest.raises(
+        ConfigError, match=r"functions reward and terminated.*it has no reward and no terminated"
+    ):
+        LearnedModelEnv(cart.model, task=object())  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="reward='learnt': expected a function"):
         LearnedModelEnv(cart.model, reward="learnt")  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="make it with the arguments"):

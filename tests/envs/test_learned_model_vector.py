@@ -37,6 +37,7 @@ from relgym.envs.views import NumbersView
 from relgym.errors import ActionError, ConfigError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
+from relgym.wrappers.model_learner import ModelLearner
 
 ID = "relgym/LearnedModel-v0"
 MODES = list(AutoresetMode)
@@ -388,13 +389,36 @@ def cart_start() -> Scene:
     return CART_SCHEMA.scene({"cart": [0.0, 0.0]})
 
 
+def test_terminations_that_are_no_numbers_are_refused() -> None:
+    envs = carts(2, terminated=lambda *_: np.array([0.0, np.nan]))
+    envs.reset(seed=0)
+    with pytest.raises(ConfigError, match="the termination of dreamed step 1 of 2 is nan"):
+        envs.step(np.ones((2, 1)))
+    with pytest.raises(ConfigError, match=r"expected an object with functions rewards and terminations"):
+        carts(2, task=object())
+
+
+def test_pictures_mark_where_to_go() -> None:
+    pytest.importorskip("pygame")
+    real = gym.make("relgym/BallGoal-v0")
+    learner = ModelLearner(real, predict=False)
+    learner.reset(seed=0)
+    for _ in range(40):
+        learner.step(learner.action_space.sample())
+    envs = LearnedModelVectorEnv(learner.model, 2, like=real, render_mode="rgb_array")
+    envs.reset(seed=0)
+    for picture in envs.render():
+        assert (np.abs(picture.astype(int) - np.array([255, 214, 92])).max(axis=2) < 3).mean() > 0.0005
+
+
 def test_rewards_that_are_no_numbers_are_refused_and_nothing_has_changed() -> None:
     for reward, message in [
         (
             lambda _layout, before, _actions, _after: np.where(before[:, 0] > 0, np.nan, 0.0),
             "step 1 of 2 is nan",
         ),
-        (lambda *_: np.ones(3), r"expected an array of shape \(2,\).*got shape \(3,\)"),
+        (lambda *_: np.ones(3), r"expected an array of 2 numbers .*got ndarray of shape \(3,\)"),
+        (lambda *_: None, "reward: expected an array of 2 numbers .*got NoneType"),
         (lambda *_: 1.0, r"in_batches\(schema, function\) makes one"),
     ]:
         envs = carts(2, reward=reward)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from relgym.envs import BallBoxRampEnv, BallGoalEnv, SceneEnv, TruckPushEnv, render_scene
-from relgym.envs.rendering import View, scene_view
+from relgym.envs.rendering import Camera, View, scene_view
+from relgym.envs.tasks import Region
 from relgym.errors import ConfigError
 from relgym.scene.objects import POSE, ObjectType, Scene, SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
@@ -139,3 +140,23 @@ def test_missing_pygame_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(ConfigError, match=r"relgym\[viz\]"):
         env.render()
+
+
+def test_the_camera_stands_still_until_something_leaves_the_picture() -> None:
+    thing = ObjectType("thing", POSE, Box())
+    schema = SceneSchema((thing,), (("it", "thing"), ("other", "thing")), planar=True)
+
+    def at(x: float) -> Scene:
+        values = {"px": x, "py": 0.0, "pz": 0.0, "sx": 1.0, "sy": 1.0, "sz": 1.0}
+        still = [{**values, "px": 0.0}.get(name, 0.0) for name in POSE]
+        return schema.scene({"it": [values.get(name, 0.0) for name in POSE], "other": still})
+
+    goal = (Region(9.0, -0.5, 1.0, 1.0),)
+    camera = Camera()
+    first = camera.view(at(3.0), goal)
+    assert first.left < -0.5 and first.left + first.width >= 10.0
+    assert camera.view(at(4.0), goal) == camera.view(at(9.0), goal) == first
+    later = camera.view(at(12.0), goal)
+    assert later.left + later.width > 12.5 + 3.0  # with room to go on
+    assert camera.view(at(14.0), goal) == later
+    assert Camera().view(at(3.0)) == scene_view(at(3.0))
