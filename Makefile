@@ -14,7 +14,7 @@ SB3 := $(VENV)/.installed-sb3
 DYNA := $(VENV)/.installed-dyna
 
 .DEFAULT_GOAL := help
-.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow bench coverage lint format types check
+.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow slow-sb3 bench coverage lint format types check
 .PHONY: wheel clean example-highway example-ocatari
 
 help:            ## show this list
@@ -51,6 +51,9 @@ test-cluster: $(DEV) ## the tests that start clusters (installs dask and ray)
 
 slow: $(DEV)     ## the tests that take minutes
 	$(PYTEST) -m "slow and not sb3 and not cluster"
+
+slow-sb3: $(SB3) ## likewise those that need Stable-Baselines3
+	$(PYTEST) -m "slow and sb3"
 
 bench: $(DEV)    ## the benchmarks
 	$(PYTEST) tests/bench -m bench --benchmark-enable --benchmark-only
