@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from typing import Any, Literal
@@ -85,8 +86,8 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         Functions of (scene, action, next scene), or ``"learned"``: as the model predicts ``task.reward`` and
         ``task.terminated``. None: see above.
     task
-        An object with functions `reward` and `terminated`: the ``task`` of another env, say. Default: that of
-        `like`; a file holds none.
+        An object with functions `reward` and `terminated`: the ``task`` of another env, say, or a
+        `relgym.wrappers.sb3.LearnedTask`. Default: that of `like`; a file holds none.
     start
         Function of a random generator that returns a start scene.
     horizon
@@ -190,6 +191,15 @@ class LearnedModelEnv(gym.Env[Any, Any]):
             self._steps += 1
             return self._observation(), 0.0, False, True, {**info, **_told(*end)}
         reward, ended = self._judges(before, taken, after)
+        if math.isnan(reward):
+            self._steps += 1
+            return (
+                self._observation(),
+                0.0,
+                False,
+                True,
+                {**info, **_told(Cause.UNJUDGED, Cause.UNJUDGED.value)},
+            )
         if self.task is not None and hasattr(self.task, "succeeded"):
             info["is_success"] = bool(self.task.succeeded(before, taken, after))
         self._scene, self._steps = self._onward(after), self._steps + 1

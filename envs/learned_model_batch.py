@@ -17,7 +17,7 @@ from relgym.scene.objects import Float1D, Float2D, Scene
 
 __all__ = ["DreamStep", "Stepped"]
 
-_HORIZON = CAUSES.index(Cause.HORIZON)
+_HORIZON, _UNJUDGED = CAUSES.index(Cause.HORIZON), CAUSES.index(Cause.UNJUDGED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +95,8 @@ class DreamStep:
         after = self.actions.parted(prediction.vectors)
         why = causes(prediction, self.setting.shown.inside(after), self.min_margin)
         rewards, ended, success = self._judged(before, actions, after, why < 0)
+        if (doubted := np.isnan(rewards)).any():
+            why[doubted], rewards[doubted], ended[doubted] = _UNJUDGED, 0.0, False
         if self.horizon is not None:
             why[(why < 0) & (steps >= self.horizon)] = _HORIZON
         lost = (why >= 0) & (why != _HORIZON)
@@ -126,6 +128,8 @@ class DreamStep:
         """Why a dream was truncated, in a sentence that names objects and properties."""
         if stepped.causes[row] == _HORIZON:
             return horizon_reached(self.horizon)
+        if stepped.causes[row] == _UNJUDGED:
+            return Cause.UNJUDGED.value
         told = explained(parts_of_row(stepped.prediction, row), self.min_margin)
         if told is not None:
             return told[1]

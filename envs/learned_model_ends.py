@@ -17,6 +17,7 @@ class Cause(enum.Enum):
     """What ended a dream; the value is the sentence for people, the name is ``info["cause"]`` in lower case.
 
     All but `HORIZON` say that the prediction was not followed: the dream stays in the last scene that is known.
+    `UNJUDGED` comes of tasks that are learned (`LearnedTask`).
     """
 
     NO_MODE = Outcome.NO_MODE.value
@@ -27,6 +28,7 @@ class Cause(enum.Enum):
     LOW_MARGIN = "the winning mode leads its rival by too little"
     LEFT = "left the observation space"
     HORIZON = "the horizon is reached"
+    UNJUDGED = "nothing that was learned of the task says what this step is worth"
 
 
 CAUSES = tuple(Cause)

@@ -124,12 +124,21 @@ def _functions(task: Any, *names: str) -> list[Any]:
     return [getattr(task, name) for name in names]
 
 
+def _doubts(task: Any) -> bool:
+    """Whether a task is learned, so that a NaN of its says that it doesn't know."""
+    return bool(getattr(task, "learned", False))
+
+
 @dataclass(frozen=True, slots=True)
 class Judges:
-    """Reward and termination of single steps: each a function, a column of the next state vector, or None."""
+    """Reward and termination of single steps: each a function, a column of the next state vector, or None.
+
+    `doubts`: NaN is no error, but says that nobody knows.
+    """
 
     reward: Judge | int | None
     terminated: Judge | int | None
+    doubts: bool = False
 
     @classmethod
     def of(
@@ -145,16 +154,24 @@ class Judges:
         return cls(
             _chosen(reward, own[0], model, layout, "reward"),
             _chosen(terminated, own[1], model, layout, "terminated"),
+            reward is None and _doubts(task),
         )
 
     def __call__(self, before: Scene, action: Any, after: Scene) -> tuple[float, bool]:
         """Reward of a step and whether it ends the episode; `ConfigError` where either is no finite number."""
-        given = {"reward": self.reward, "termination": self.terminated}
-        reward, ended = (_verdict(what, judge, before, action, after) for what, judge in given.items())
-        return reward, ended > _ENDED
+        reward = _verdict("reward", self.reward, before, action, after, doubts=self.doubts)
+        return reward, _verdict("termination", self.terminated, before, action, after) > _ENDED
 
 
-def _verdict(what: str, judge: Judge | int | None, before: Scene, action: Any, after: Scene) -> float:
+def _verdict(
+    what: str,
+    judge: Judge | int | None,
+    before: Scene,
+    action: Any,
+    after: Scene,
+    *,
+    doubts: bool = False,
+) -> float:
     if judge is None:
         return 0.0
     told = after.vector[judge] if isinstance(judge, int) else judge(before, action, after)
@@ -162,7 +179,7 @@ def _verdict(what: str, judge: Judge | int | None, before: Scene, action: Any, a
         value = float(told)
     except (TypeError, ValueError):
         value = np.nan
-    if not np.isfinite(value):
+    if not (np.isfinite(value) or (doubts and np.isnan(value))):
         raise ConfigError(
             f"the {what} of a dreamed step is {told!r}: expected a finite number; mend the {what} function for "
             f"before={before.values()}, action={action}, after={after.values()}"
@@ -177,6 +194,7 @@ class BatchJudges:
     layout: SceneLayout
     reward: BatchJudge | int | None
     terminated: BatchJudge | int | None
+    doubts: bool = False
 
     @classmethod
     def of(
@@ -193,6 +211,7 @@ class BatchJudges:
             layout,
             _chosen(reward, own[0], model, layout, "reward"),
             _chosen(terminated, own[1], model, layout, "terminated"),
+            reward is None and _doubts(task),
         )
 
     def __call__(self, before: Float2D, actions: Any, after: Float2D) -> tuple[Float1D, NDArray[np.bool_]]:
@@ -203,14 +222,18 @@ class BatchJudges:
         ConfigError
             A reward is not finite, or a function returns another shape.
         """
-        given = {"reward": self.reward, "termination": self.terminated}
-        rewards, ended = (
-            self._verdicts(what, judge, before, actions, after) for what, judge in given.items()
-        )
-        return rewards, ended > _ENDED
+        rewards = self._verdicts("reward", self.reward, before, actions, after, doubts=self.doubts)
+        return rewards, self._verdicts("termination", self.terminated, before, actions, after) > _ENDED
 
     def _verdicts(
-        self, what: str, judge: BatchJudge | int | None, before: Float2D, actions: Any, after: Float2D
+        self,
+        what: str,
+        judge: BatchJudge | int | None,
+        before: Float2D,
+        actions: Any,
+        after: Float2D,
+        *,
+        doubts: bool = False,
     ) -> Float1D:
         if judge is None:
             return np.zeros(len(after))
@@ -227,8 +250,9 @@ class BatchJudges:
                 f"after), got {type(told).__name__} of shape {np.shape(told)}; in_batches(schema, function) makes one "
                 "of a function of scenes"
             )
-        if not np.isfinite(found).all():
-            row = int(np.flatnonzero(~np.isfinite(found))[0])
+        fine = np.isfinite(found) | np.isnan(found) if doubts else np.isfinite(found)
+        if not fine.all():
+            row = int(np.flatnonzero(~fine)[0])
             raise ConfigError(
                 f"the {what} of dreamed step {row} of {len(found)} is {found[row]}: expected a finite number; mend the "
                 f"{what} function for before={before[row].tolist()}, after={after[row].tolist()} (objects "

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import relgym
+from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
 from relgym.envs.scripted import ball_home, push_knowing
 from relgym.scene.objects import ObjectType, SceneSchema, Target, Transition
 from relgym.wrappers.sb3.judges import LearnedTask
@@ -151,6 +152,45 @@ def test_a_few_ends_show_what_an_end_is_paid_for() -> None:
     assert len(fresh) >= 5
     assert np.mean(right) > 0.5
     assert not any(v.terminated[:-1].any() for v in said)
+
+
+def test_dreams_are_judged_by_what_was_learned(rng: np.random.Generator) -> None:
+    """As the world judges them; and where nothing is known they are cut off, one by one and in batches alike."""
+    real = gym.make("relgym/TruckPush-v0", disable_env_checker=True)
+    steps = [*pushes(200, 0.0, rng), *pushes(400, 0.9, rng)]
+    model = relgym.WorldModel(steps[0].start.schema)
+    judge = LearnedTask(model.schema, MOVING)
+    for k in rng.permutation(len(steps)):
+        model.learn_one(steps[k].transition)
+        judge.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
+    model.finish()
+    dream = LearnedModelEnv(model, like=real, task=judge)  # type: ignore[arg-type]
+    dreams = LearnedModelVectorEnv(model, 1, like=real, task=judge, autoreset_mode="Disabled")  # type: ignore[arg-type]
+    task, right = real.get_wrapper_attr("task"), []
+    for episode in range(16):
+        _, info = real.reset(seed=episode)
+        dream.reset(options={"scene": info["scene"]})
+        dreams.reset(options={"scene": info["scene"]})
+        over = cut = False
+        while not (over or cut):
+            before = dream.scene
+            action = push_knowing(before) if episode % 2 else real.action_space.sample()
+            _, reward, over, cut, told = dream.step(action)
+            _, *many, infos = dreams.step(np.asarray(action)[None])
+            assert [part.tolist() for part in many] == [[reward], [over], [cut]]
+            if cut:
+                assert infos["cause"].tolist() == [told["cause"]]
+                break
+            expected = task.reward(before, action, dream.scene), task.terminated(before, action, dream.scene)
+            right.append((pytest.approx(reward, abs=1e-6), over) == expected)
+    assert len(right) > 40
+    assert np.mean(right) > 0.95
+    nothing = LearnedTask(model.schema, MOVING)
+    unsure = LearnedModelEnv(model, like=real, task=nothing)  # type: ignore[arg-type]
+    unsure.reset(seed=0)
+    _, reward, over, cut, told = unsure.step(np.array([0.5]))
+    assert (reward, over, cut, told["cause"]) == (0.0, False, True, "unjudged")
+    assert "nothing that was learned of the task" in told["reason"]
 
 
 @pytest.mark.sb3
