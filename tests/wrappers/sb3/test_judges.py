@@ -164,8 +164,8 @@ def test_dreams_are_judged_by_what_was_learned(rng: np.random.Generator) -> None
         model.learn_one(steps[k].transition)
         judge.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
     model.finish()
-    dream = LearnedModelEnv(model, like=real, task=judge)  # type: ignore[arg-type]
-    dreams = LearnedModelVectorEnv(model, 1, like=real, task=judge, autoreset_mode="Disabled")  # type: ignore[arg-type]
+    dream = LearnedModelEnv(model, like=real, task=judge)
+    dreams = LearnedModelVectorEnv(model, 1, like=real, task=judge, autoreset_mode="Disabled")
     task, right = real.get_wrapper_attr("task"), []
     for episode in range(16):
         _, info = real.reset(seed=episode)
@@ -186,7 +186,7 @@ def test_dreams_are_judged_by_what_was_learned(rng: np.random.Generator) -> None
     assert len(right) > 40
     assert np.mean(right) > 0.95
     nothing = LearnedTask(model.schema, MOVING)
-    unsure = LearnedModelEnv(model, like=real, task=nothing)  # type: ignore[arg-type]
+    unsure = LearnedModelEnv(model, like=real, task=nothing)
     unsure.reset(seed=0)
     _, reward, over, cut, told = unsure.step(np.array([0.5]))
     assert (reward, over, cut, told["cause"]) == (0.0, False, True, "unjudged")
