@@ -132,7 +132,7 @@ class FunctionView:
         """The scene with the action's properties: by the schema's own ranges, or see `Acts`."""
         return acting(scene, action) if self._acts is None else self._acts.acting(scene, action)
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
         """The scene as it is: this view learns of the state alone (`TaskView` of more)."""
         return scene
 

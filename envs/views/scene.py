@@ -80,7 +80,7 @@ class SceneView:
         """The scene with the action object, through the affine maps in ``schema.action_scale``."""
         return acting(scene, action)
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
         """The scene as it is: this view learns of the state alone (`TaskView` of more)."""
         return scene
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -72,8 +71,14 @@ class TaskView:
         """The view with angles decided from some first observations: see `NumbersView.settled`."""
         if not isinstance(self.view, NumbersView):
             return self
-        wanted = {"reward": REWARD in self._names, "terminated": TERMINATED in self._names}
-        return TaskView(self.view.settled(observations), **wanted)
+        view = self.view.settled(observations)
+        return TaskView(view, reward=REWARD in self._names, terminated=TERMINATED in self._names)
+
+    def upheld(self, observation: Any) -> TaskView:
+        """The view without guessed angles that an observation refutes: see `NumbersView.upheld`."""
+        if not isinstance(self.view, NumbersView) or (view := self.view.upheld(observation)) is self.view:
+            return self
+        return TaskView(view, reward=REWARD in self._names, terminated=TERMINATED in self._names)
 
     def scene(
         self,
@@ -91,13 +96,17 @@ class TaskView:
         acting = self._own(self.view.with_action(self._bare(scene), action))
         return self._with(acting, [0.0] * len(self._names))
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
-        """The scene together with what the step to it brought; `ObservationError` for a reward that is no number."""
-        if not math.isfinite(reward):
-            raise ObservationError(
-                f"the reward: expected a finite number, got {reward}; mend the env's reward"
-            )
-        brought = {REWARD: float(reward), TERMINATED: float(terminated)}
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
+        """The scene together with what the step to it brought.
+
+        Raises
+        ------
+        ObservationError
+            The reward is no finite number, and it is shown.
+        """
+        brought = {TERMINATED: float(terminated)}
+        if REWARD in self._names:  # else it may be whatever the env likes
+            brought[REWARD] = _number(reward)
         return self._with(self._bare(scene), [brought[name] for name in self._names])
 
     def observation(self, scene: Scene) -> Any:
@@ -126,3 +135,16 @@ class TaskView:
     def _with(self, scene: Scene, values: list[float]) -> Scene:
         layout = self.schema.layout((*scene.layout.names, TASK))
         return Scene(self.schema, layout, np.concatenate([scene.vector, values]))
+
+
+def _number(reward: Any) -> float:
+    try:
+        numbers = np.asarray(reward, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.size != 1 or not np.isfinite(numbers).all():
+        raise ObservationError(
+            f"the reward: expected a finite number, got {reward!r}; make one of it inside the learner "
+            "(gymnasium.wrappers.TransformReward), or leave out learn_reward"
+        )
+    return numbers.item()
