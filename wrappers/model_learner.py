@@ -177,9 +177,17 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
         return observation, reward, terminated, truncated, {**info, "relgym": NOTHING}
 
     def close(self) -> None:
-        """Close the env, and end the background process if there is one, once it has learned all."""
-        self._observer.close()
-        super().close()
+        """Close the env, and end the background process if there is one, once it has learned all.
+
+        Raises
+        ------
+        RelgymError
+            The background process had ended before; all is closed nevertheless.
+        """
+        try:
+            self._observer.close()
+        finally:
+            super().close()
 
     # ------------------------------------------------------------------ learning
     @property

@@ -141,9 +141,11 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
         return observations, rewards, terminated, truncated, {**infos, "relgym": reports}
 
     def close(self, **kwargs: Any) -> None:
-        """Close the envs, and end the background process if there is one, once it has learned all."""
-        self._observer.close()
-        super().close(**kwargs)
+        """Close the envs, and end the background process if there is one; as `ModelLearner.close`."""
+        try:
+            self._observer.close()
+        finally:
+            super().close(**kwargs)
 
     def _actions(self, actions: Any) -> list[Any]:
         """Single actions; ``None`` for all where they can't be told apart, which is for the envs to mind."""
