@@ -80,7 +80,7 @@ def chosen_view(
     Raises
     ------
     ConfigError
-        As `view_of`, or `given` is no view.
+        As `view_of`, or `given` is no view, or one that was made for other actions.
     """
     view: Any
     if given is None:
@@ -97,6 +97,9 @@ def chosen_view(
             f"view={given!r}: expected a view (NumbersView, TableView, FunctionView, ...), or a function of "
             f"(observation_space, action_space) that makes one, got {type(view).__name__}"
         )
+    # Views of the user's own need not have it.
+    if (check := getattr(view, "check_actions", None)) is not None:
+        check(action_space)
     return TaskView(view, reward=reward, terminated=terminated) if reward or terminated else view
 
 

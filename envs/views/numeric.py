@@ -173,6 +173,10 @@ class NumbersView:
             numbers = np.concatenate([numbers, angles, how.constants])
         return Scene(self.schema, how.layout, numbers[how.gather])
 
+    def check_actions(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless the view can read actions of a space."""
+        self._acts.check(space)
+
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action's properties: see `Acts`."""
         return self._acts.acting(scene, action)

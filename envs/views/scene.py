@@ -76,6 +76,10 @@ class SceneView:
             )
         return self.schema.scene(observation)
 
+    def check_actions(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless the view can read actions of a space."""
+        check_action_space(self.schema, space)
+
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action object, through the affine maps in ``schema.action_scale``."""
         return acting(scene, action)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
 from relgym.envs.views.base import View
 from relgym.envs.views.numeric import NumbersView
@@ -90,6 +91,11 @@ class TaskView:
     ) -> Scene:
         """The scene that an observation shows, without `task`; see `View.scene`."""
         return self._own(self.view.scene(observation, info, last=last, expected=expected))
+
+    def check_actions(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless the view can read actions of a space."""
+        if (check := getattr(self.view, "check_actions", None)) is not None:
+            check(space)
 
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with what the agent does in it, and what that brings: 0, as long as it isn't known."""
