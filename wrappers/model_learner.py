@@ -17,7 +17,7 @@ from relgym.wrappers.learning import Learning
 from relgym.wrappers.observer import STARTS, Observer, Step
 from relgym.wrappers.settings import PlainTarget
 from relgym.wrappers.study import NOTHING
-from relgym.wrappers.views import ViewLike, readable, view_of
+from relgym.wrappers.views import ViewLike, readable, recordable, view_of
 
 __all__ = ["STARTS", "ModelLearner"]
 
@@ -70,6 +70,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
     Notes
     -----
     Copies have models of their own, and so does what ``gym.make(env.spec)`` or a vector env makes of this one.
+    ``env.spec.to_json()`` can hold all but views made of functions.
 
     Examples
     --------
@@ -121,7 +122,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
         RecordConstructorArgs.__init__(
             self,
             **self._observer.arguments,
-            view=view,
+            view=recordable(view),
             learn=learn,
             predict=predict,
             learn_reward=learn_reward,

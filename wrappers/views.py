@@ -11,7 +11,7 @@ from gymnasium import spaces
 
 from relgym.envs.arguments import checked_action
 from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
-from relgym.errors import ActionError, ConfigError
+from relgym.errors import ActionError, ConfigError, RelgymError
 
 __all__ = [
     "SceneView",
@@ -20,6 +20,7 @@ __all__ = [
     "chosen_view",
     "is_open",
     "readable",
+    "recordable",
     "settled",
     "upheld",
     "view_of",
@@ -116,6 +117,18 @@ def settled(view: View, observations: Sequence[Any]) -> View:
 def upheld(view: View, observation: Any) -> View:
     """The view without guessed angles that an observation refutes; itself where it refutes none."""
     return view.upheld(observation) if isinstance(view, (NumbersView, TaskView)) else view
+
+
+def recordable(given: ViewLike) -> ViewLike:
+    """What the user passed as a view, as plain data where such data can say it: a spec may then be written as JSON."""
+    if given is None or isinstance(given, Mapping) or not isinstance(given, View):
+        return given
+    try:
+        data = given.to_json()
+        view_from_json(data)
+    except RelgymError:  # made of a function, of the user's own kind, or of a space that no file can hold
+        return given
+    return data
 
 
 def readable(space: spaces.Space[Any], action: Any) -> Any:

@@ -128,6 +128,6 @@ def _choices(space: spaces.Space[Any]) -> tuple[list[float], list[int]]:
         return [0.0] * size, [0] * size
     raise ConfigError(
         f"the action space is {space}: expected Box, Discrete, MultiDiscrete or MultiBinary; flatten it: "
-        "gymnasium.wrappers.TransformAction(env, function, space), where the space is one of these and the function makes "
-        "the env's action of one of its actions"
+        "gymnasium.wrappers.TransformAction(env, function, space), where the space is one of these and the function "
+        "makes the env's action of one of its actions"
     )
