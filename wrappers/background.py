@@ -134,13 +134,16 @@ class Background:
         """Raise what the process failed of, or that it has ended; unasked it says nothing else."""
         try:
             if self._trouble is None and self._answers.poll():
-                self._trouble = self._answers.recv()
+                said = self._answers.recv()
+                # Else it is what nobody waited for, since asking was interrupted.
+                self._trouble = said if isinstance(said, Exception) else None
         except (EOFError, OSError):  # its end, or ours
             self._complain()
         if self._trouble is not None:
             raise self._trouble
 
     def _complain(self) -> NoReturn:
+        self._process.join(1.0)  # its pipe may end before it does
         raise RelgymError(
             f"the learning process has ended (exit code {self._process.exitcode}): what it hadn't handed over yet is "
             "lost; close() goes on without it, and learning in the foreground (background=None) shows why it ended"

@@ -307,7 +307,7 @@ def _table(space: spaces.Space[Any]) -> spaces.Box:
     if not isinstance(space, spaces.Box) or len(space.shape) != 2:
         raise ConfigError(
             f"expected a table, a Box of shape (rows, columns), got {space}; "
-            "gymnasium.wrappers.ReshapeObservation makes one of a flat Box"
+            "gymnasium.wrappers.ReshapeObservation makes one of a flat Box, TransformObservation takes it out of a Dict"
         )
     return space
 
