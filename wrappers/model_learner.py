@@ -65,7 +65,8 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
     Raises
     ------
     ConfigError
-        A vector env, spaces that need a view of the user's, unknown parameters, or a model of another world.
+        A vector env, spaces that need a view of the user's, a view of other actions, unknown parameters, or a model of
+        another world.
 
     Notes
     -----

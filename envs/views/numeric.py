@@ -121,10 +121,16 @@ class NumbersView:
 
         One that is no observation at all (another length, NaN) refutes nothing.
         """
-        if not self._possible or (numbers := self._sound(observation)) is None:
+        if not self._possible:
             return self
-        left = [p for p in self._possible if self._turns(p, numbers)]
-        return self if set(self._how.pairs) <= set(left) else self._guessing(left)
+        try:
+            numbers = self._numbers.read(observation)
+        except ObservationError:
+            return self
+        # What isn't finite is off every circle, and asked last: it is rare, and this is asked at every step.
+        if all(self._turns(pair, numbers) for pair in self._how.pairs) or not np.isfinite(numbers).all():
+            return self
+        return self._guessing([pair for pair in self._possible if self._turns(pair, numbers)])
 
     def _guessing(self, possible: Sequence[tuple[int, int]]) -> NumbersView:
         """The view with angles for the first of these pairs, and as many of the others as go together."""
