@@ -290,6 +290,9 @@ class ModelConfig:
         _one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
         _at_least(self, 0, "seed", "work_per_step")
         _at_least(self, 100, "history")
+        features: object = self.features
+        if not isinstance(features, (tuple, list)) or not all(isinstance(entry, str) for entry in features):
+            raise ConfigError(f"features must be a tuple of names, such as ('trig',), got {features!r}")
 
     @classmethod
     def thesis(cls, **changes: Any) -> ModelConfig:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import multiprocessing
+import pickle
 import queue as queues
 from collections.abc import Iterable, Iterator
 from itertools import groupby
-from typing import Any, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.features import functions_of, register_function
 from relgym.envs.arguments import checked_count
-from relgym.errors import RelgymError
+from relgym.errors import ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, SceneSchema, Transition
 from relgym.wrappers.prequential import Prequential, compared
@@ -49,6 +51,11 @@ class Background:
     sent, dropped : int
         Transitions that went in, and that found the queue full and were left out.
 
+    Raises
+    ------
+    ConfigError
+        A queue of no length, or features (`ModelConfig.features`) that are functions which no process can be sent.
+
     Notes
     -----
     The process is spawned, not forked, so that it shares no threads with engines and networks; that takes a second
@@ -60,6 +67,7 @@ class Background:
         self, model: WorldModel, prequential: Prequential | None, *, queue: int, precision: float = 0.0
     ) -> None:
         length = checked_count("background", queue, 1, 10**7)
+        functions = _sendable(model.config.features)
         context = multiprocessing.get_context("spawn")
         self._size = max(1, length // PARCELS)
         self._parcel: list[Transition] = []
@@ -69,18 +77,30 @@ class Background:
         self._answers, remote = context.Pipe(duplex=False)
         self._process = context.Process(
             target=_learn,
-            args=(model, prequential, precision, self._queue, remote),
+            args=(model, prequential, precision, functions, self._queue, remote),
             daemon=True,
             name="relgym-learner",
         )
         self._process.start()
         remote.close()  # so that the end of the process is the end of the pipe
+        self._trouble: Exception | None = None
         self.sent = self.dropped = 0
 
     def put(self, transition: Transition) -> bool:
-        """Queue one transition; false, and counted, when the queue is full."""
+        """Queue one transition; false, and counted, when the queue is full.
+
+        Raises
+        ------
+        RelgymError
+            The process has ended, or what it learned made it fail; noticed when a parcel is sent.
+        """
         self._parcel.append(transition)
         if len(self._parcel) >= self._size:
+            try:
+                self._check()
+            except Exception:
+                self._parcel.pop()
+                raise
             if self._queue.full():
                 self._parcel.pop()
                 self.dropped += 1
@@ -98,18 +118,36 @@ class Background:
         RelgymError
             The process has ended, or what it learned made it fail.
         """
+        self._check()
         try:
             self._ask()
             answer = self._answers.recv()
         except EOFError:
-            raise RelgymError(
-                f"the learning process has ended (exit code {self._process.exitcode}); learn in the foreground "
-                "(background=None) to see why"
-            ) from None
+            self._complain()
         if isinstance(answer, Exception):
+            self._trouble = answer
             raise answer
         model, prequential = answer
         return model, prequential
+
+    def _check(self) -> None:
+        """Raise what the process failed of, or that it has ended; unasked it says nothing else."""
+        try:
+            if self._trouble is None and self._answers.poll():
+                said = self._answers.recv()
+                # Else it is what nobody waited for, since asking was interrupted.
+                self._trouble = said if isinstance(said, Exception) else None
+        except (EOFError, OSError):  # its end, or ours
+            self._complain()
+        if self._trouble is not None:
+            raise self._trouble
+
+    def _complain(self) -> NoReturn:
+        self._process.join(1.0)  # its pipe may end before it does
+        raise RelgymError(
+            f"the learning process has ended (exit code {self._process.exitcode}): what it hadn't handed over yet is "
+            "lost; close() goes on without it, and learning in the foreground (background=None) shows why it ended"
+        ) from None
 
     def _ask(self) -> None:
         while self._process.is_alive():
@@ -131,10 +169,20 @@ class Background:
 
 
 def _learn(
-    model: WorldModel, prequential: Prequential | None, precision: float, queue: Any, answers: Any
+    model: WorldModel,
+    prequential: Prequential | None,
+    precision: float,
+    functions: bytes,
+    queue: Any,
+    answers: Any,
 ) -> None:
-    """The process' life: learn what comes; answer every ``None`` with all that was learned so far."""
-    trouble: Exception | None = None
+    """The process' life: learn what comes; answer every ``None`` with all that was learned so far.
+
+    What makes it fail it says at once, unasked, so that nobody goes on in vain.
+    """
+    trouble = _registered(functions)
+    if trouble is not None:
+        answers.send(trouble)
     while True:
         for bundle in queue.get():
             if bundle is None:
@@ -145,6 +193,32 @@ def _learn(
                         _take_up(model, prequential, precision, transition)
                 except Exception as error:
                     trouble = error
+                    answers.send(trouble)
+
+
+def _sendable(features: Iterable[str]) -> bytes:
+    """The users' functions among some features, for another process."""
+    functions = functions_of(features)
+    try:
+        return pickle.dumps(functions)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise ConfigError(
+            f"features: the functions {sorted(functions)} can't be sent to the learning process ({error}); register "
+            "such as are defined by def at the top level of a module, or learn in the foreground (background=None)"
+        ) from None
+
+
+def _registered(functions: bytes) -> Exception | None:
+    """Register what another process sent; why that failed, if it did."""
+    try:
+        for name, function in pickle.loads(functions).items():
+            register_function(name, function)
+    except Exception as error:
+        return ConfigError(
+            f"features: a function can't be found in the learning process ({error}); define it at the top level of a "
+            "module, outside of `if __name__ == '__main__':`, or learn in the foreground (background=None)"
+        )
+    return None
 
 
 def _take_up(

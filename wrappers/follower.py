@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from gymnasium.error import ResetNeeded
@@ -12,10 +13,29 @@ from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import ScenePrediction
 from relgym.scene.objects import Scene, Transition
 
-__all__ = ["BadObservations", "Follower", "extrapolated"]
+__all__ = ["BadObservations", "Follower", "Look", "extrapolated"]
 
 BadObservations: TypeAlias = Literal["raise", "skip"]
 """What to do with an observation that shows no scene: raise `ObservationError`, or skip and count it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What an observation shows, before anything follows from it.
+
+    Attributes
+    ----------
+    scene
+        The scene; ``None`` where it shows none.
+    outcome
+        The scene with what the step brought (`View.with_outcome`).
+    trouble
+        Why one of the two is missing.
+    """
+
+    scene: Scene | None = None
+    outcome: Scene | None = None
+    trouble: ObservationError | None = None
 
 
 class Follower:
@@ -27,24 +47,28 @@ class Follower:
         How observations and actions become scenes.
     bad
         What to do with bad observations.
+    name
+        What errors call the env; empty where there is only one.
 
     Attributes
     ----------
     over : bool
         Whether the episode has ended, so that the next observation begins another one.
     skipped : int
-        How many bad observations were skipped.
+        How many bad observations, and unreadable actions, were skipped.
     """
 
-    def __init__(self, view: View, bad: BadObservations = "raise") -> None:
+    def __init__(self, view: View, bad: BadObservations = "raise", *, name: str = "") -> None:
         if bad not in ("raise", "skip"):
             raise ConfigError(f"bad_observations={bad!r}: expected 'raise' or 'skip'")
         self.view = view
         self.over = False
         self.skipped = 0
         self._bad = bad
+        self._name = name
         self._scene: Scene | None = None
         self._earlier: Scene | None = None
+        self._between_views = False
 
     @property
     def scene(self) -> Scene:
@@ -56,9 +80,47 @@ class Follower:
     def forget(self) -> None:
         """The env is about to begin an episode; what was seen so far is no longer current."""
         self._scene = self._earlier = None
-        self.over = False
+        self._between_views = self.over = False
 
-    def begin(self, observation: Any, info: Mapping[str, Any]) -> Scene | None:
+    def change_view(self, view: View) -> None:
+        """See otherwise from the next observation on; until then there is no current scene, and no reset is needed."""
+        self.view = view
+        self._scene = self._earlier = None
+        self._between_views = True
+
+    # ------------------------------------------------------------------ looking changes nothing
+    def look(self, observation: Any, info: Mapping[str, Any]) -> Look:
+        """What the first observation of an episode shows."""
+        return self._look(observation, info, None, None)
+
+    def look_on(
+        self,
+        observation: Any,
+        info: Mapping[str, Any],
+        *,
+        reward: Any,
+        terminated: bool,
+        prediction: ScenePrediction | None = None,
+    ) -> Look:
+        """What the observation after a step shows; arguments as of `follow`."""
+        look = self._look(observation, info, self._scene, self._expected(prediction))
+        if look.scene is None:
+            return look
+        try:
+            return replace(look, outcome=self.view.with_outcome(look.scene, reward, terminated))
+        except ObservationError as error:
+            return replace(look, trouble=error)
+
+    def check(self, look: Look) -> None:
+        """Raise `ObservationError` where a look shows something bad that isn't to be skipped."""
+        if look.trouble is not None and self._bad == "raise":
+            raise ObservationError(
+                f"{self._name}{look.trouble} (the env has moved on, the model is unchanged: call reset() to begin "
+                "anew, or skip and count such observations with bad_observations='skip')"
+            ) from look.trouble
+
+    # ------------------------------------------------------------------ following
+    def begin(self, observation: Any, info: Mapping[str, Any], look: Look | None = None) -> Scene | None:
         """Take up the first observation of an episode; ``None`` when it was bad and is skipped.
 
         Raises
@@ -67,20 +129,37 @@ class Follower:
             It is no scene, and bad observations aren't skipped.
         """
         self.forget()
-        self._scene = self._seen(observation, info, None, None)
+        return self.resume(observation, info, look)
+
+    def resume(self, observation: Any, info: Mapping[str, Any], look: Look | None = None) -> Scene | None:
+        """Take up an observation as if it were the first one, in the midst of an episode; see `begin`."""
+        look = self.look(observation, info) if look is None else look
+        self._between_views = False
+        self._earlier, self._scene = None, look.scene
+        self._heed(look)
         return self._scene
 
     def act(self, action: Any) -> Scene | None:
-        """The current scene with a legal action in it; ``None`` when the current observation was skipped.
+        """The current scene with an action in it.
+
+        Parameters
+        ----------
+        action
+            What the view can read (`relgym.wrappers.views.readable`), or ``None``.
+
+        Returns
+        -------
+        ``None`` when the action can't be read, or the current observation was skipped.
 
         Raises
         ------
         ResetNeeded
             There is no current scene, and bad observations aren't skipped.
         """
-        if self._scene is None and self._bad == "skip":
+        if self._scene is None and (self._bad == "skip" or self._between_views):
             return None
-        return self.view.with_action(self.scene, action)
+        scene = self.scene
+        return None if action is None else self.view.with_action(scene, action)
 
     def follow(
         self,
@@ -89,8 +168,9 @@ class Follower:
         observation: Any,
         info: Mapping[str, Any],
         *,
-        reward: float,
+        reward: Any,
         terminated: bool,
+        look: Look | None = None,
     ) -> Transition | None:
         """Take up the observation after a step.
 
@@ -102,6 +182,8 @@ class Follower:
             What the model expected, if it was asked; helps to recognise objects that have no names.
         observation, info, reward, terminated
             What the env returned.
+        look
+            What `look_on` said of them, if it was asked already.
 
         Returns
         -------
@@ -112,17 +194,15 @@ class Follower:
         ObservationError
             It is no scene, and bad observations aren't skipped. There is no current scene then.
         """
-        last, expected = self._scene, self._expected(prediction)
-        self._scene = None  # until the next observation proves sound
-        after = self._seen(observation, info, last, expected)
-        self._earlier, self._scene = (None if after is None else last), after
-        if before is None or after is None:
-            return None
-        try:
-            return Transition(before, self.view.with_outcome(after, reward, terminated))
-        except ObservationError as error:
-            self._complain(error)
-            return None
+        if look is None or self.view.matches:  # a match may depend on what was predicted
+            look = self.look_on(
+                observation, info, reward=reward, terminated=terminated, prediction=prediction
+            )
+        last, self._scene = self._scene, look.scene
+        self._earlier = None if look.scene is None else last
+        self._between_views = False
+        self._heed(look)
+        return None if before is None or look.outcome is None else Transition(before, look.outcome)
 
     def _expected(self, prediction: ScenePrediction | None) -> Scene | None:
         """Where things should be now: as far on as in the last step, or where modes predict or guess them."""
@@ -134,23 +214,17 @@ class Follower:
         said = {(p.object, p.property): p.value for p in prediction.parts if p.informed and p.object in scene}
         return scene.replace(said) if said else scene
 
-    def _seen(
+    def _look(
         self, observation: Any, info: Mapping[str, Any], last: Scene | None, expected: Scene | None
-    ) -> Scene | None:
+    ) -> Look:
         try:
-            return self.view.scene(observation, info, last=last, expected=expected)
+            return Look(self.view.scene(observation, info, last=last, expected=expected))
         except ObservationError as error:
-            self._complain(error)
-            return None
+            return Look(trouble=error)
 
-    def _complain(self, error: ObservationError) -> None:
-        if self._bad == "skip":
-            self.skipped += 1
-            return
-        raise ObservationError(
-            f"{error} (the env has moved on, the model is unchanged: call reset() to begin anew, or skip and count "
-            "such observations with bad_observations='skip')"
-        ) from error
+    def _heed(self, look: Look) -> None:
+        self.check(look)
+        self.skipped += look.trouble is not None
 
 
 def extrapolated(earlier: Scene, now: Scene) -> Scene:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from relgym.envs.model_files import EnvRecord
-from relgym.envs.views import View
+from relgym.envs.views import Angle, View
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.observer import Observer
 from relgym.wrappers.prequential import Prequential
@@ -20,8 +20,17 @@ class Learning:
 
     @property
     def view(self) -> View:
-        """How observations and actions become scenes; final after the first reset, where angles are open."""
+        """How observations and actions become scenes; where angles are guessed, see `withdrawn`."""
         return self._observer.view
+
+    @property
+    def withdrawn(self) -> tuple[Angle, ...]:
+        """Pairs of numbers that were taken for angles until an observation showed that they are none.
+
+        They are plain numbers since, and learning began anew then, with another `view` and another `model`. Angles that
+        were declared (``NumbersView(..., angles=...)``) are never withdrawn.
+        """
+        return self._observer.withdrawn
 
     @property
     def model(self) -> WorldModel:
@@ -36,25 +45,28 @@ class Learning:
     @property
     def learning(self) -> bool:
         """Whether transitions are being learned from; `ConfigError` to ask it of a model without history."""
-        return self._observer.study.learning
+        return self._observer.learning
 
     @learning.setter
     def learning(self, learn: bool) -> None:
-        self._observer.study.learning = learn
+        self._observer.learning = learn
 
     def pause(self) -> None:
-        """Stop learning; predictions go on and are counted. ``learning = True`` goes on."""
+        """Stop learning; ``learning = True`` goes on.
+
+        Predictions go on and are counted, unless they are made by a background process: it is sent nothing then.
+        """
         self.learning = False
 
     @property
     def skipped(self) -> int:
-        """How many bad observations were skipped."""
+        """How many bad observations, and steps with actions that can't be read, were left out."""
         return self._observer.skipped
 
     @property
     def dropped(self) -> int:
-        """How many transitions found the queue to the background process full."""
-        return self._observer.study.dropped
+        """How many transitions found the queue to the background process full; kept after `close`."""
+        return self._observer.dropped
 
     def catch_up(self) -> WorldModel:
         """Wait until the background process has learned all it was sent; the model as it then is."""

@@ -10,15 +10,14 @@ import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
 from relgym.config import ModelConfig
-from relgym.envs.arguments import checked_action
 from relgym.errors import ConfigError
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.learning import Learning
-from relgym.wrappers.observer import STARTS, Observer
+from relgym.wrappers.observer import STARTS, Observer, Step
 from relgym.wrappers.settings import PlainTarget
 from relgym.wrappers.study import NOTHING
-from relgym.wrappers.views import ViewLike, view_of
+from relgym.wrappers.views import ViewLike, readable, recordable, view_of
 
 __all__ = ["STARTS", "ModelLearner"]
 
@@ -66,11 +65,13 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
     Raises
     ------
     ConfigError
-        A vector env, spaces that need a view of the user's, unknown parameters, or a model of another world.
+        A vector env, spaces that need a view of the user's, a view of other actions, unknown parameters, or a model of
+        another world.
 
     Notes
     -----
     Copies have models of their own, and so does what ``gym.make(env.spec)`` or a vector env makes of this one.
+    ``env.spec.to_json()`` can hold all but views made of functions.
 
     Examples
     --------
@@ -122,7 +123,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
         RecordConstructorArgs.__init__(
             self,
             **self._observer.arguments,
-            view=view,
+            view=recordable(view),
             learn=learn,
             predict=predict,
             learn_reward=learn_reward,
@@ -146,25 +147,26 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Predict, step, learn.
 
+        Whether an action is legal is for the env to say. One that lies outside its space, and that the env takes all
+        the same, is learned from as it was given; nothing is learned from one that can't be read (NaN, another shape,
+        a choice that there isn't), and it is counted in `skipped`.
+
         Raises
         ------
-        ActionError
-            An action outside the action space; model and env are unchanged.
         ObservationError
             The next observation is no scene of this world, and such aren't skipped. The env has stepped, the model
             is unchanged; `reset` begins anew.
         """
-        checked = checked_action(self.env.action_space, action)
         observer, follower = self._observer, self._observer.followers[0]
         if follower.over:
             return self._step_over(action)
-        before = follower.act(checked)
+        known = readable(self.env.action_space, action)
+        before = follower.act(known)
         prediction = observer.expect(before)
         observation, reward, terminated, truncated, info = self.env.step(action)
         follower.over = bool(terminated or truncated)
-        report = observer.follow(
-            0, before, prediction, observation, info, reward=reward, terminated=bool(terminated)
-        )
+        step = Step(known, observation, info, reward, bool(terminated))
+        report = observer.follow(0, before, prediction, step)
         return observation, reward, terminated, truncated, {**info, "relgym": report}
 
     def _step_over(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -177,9 +179,17 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
         return observation, reward, terminated, truncated, {**info, "relgym": NOTHING}
 
     def close(self) -> None:
-        """Close the env, and end the background process if there is one, once it has learned all."""
-        self._observer.close()
-        super().close()
+        """Close the env, and end the background process if there is one, once it has learned all.
+
+        Raises
+        ------
+        RelgymError
+            The background process had ended before; all is closed nevertheless.
+        """
+        try:
+            self._observer.close()
+        finally:
+            super().close()
 
     # ------------------------------------------------------------------ learning
     @property

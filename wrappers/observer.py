@@ -4,28 +4,52 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 
 from relgym.config import ModelConfig
 from relgym.envs.model_files import EnvRecord
-from relgym.envs.views import View
+from relgym.envs.views import Angle, NumbersView, TaskView, View
+from relgym.errors import ObservationError, RelgymError
 from relgym.model.prediction import ScenePrediction
 from relgym.model.storage import target_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
-from relgym.wrappers.follower import BadObservations, Follower
+from relgym.wrappers.follower import BadObservations, Follower, Look
 from relgym.wrappers.prequential import StepReport
 from relgym.wrappers.settings import PlainTarget, config_of, model_of, target_of
 from relgym.wrappers.study import NOTHING, Study
-from relgym.wrappers.views import is_open, settled
+from relgym.wrappers.views import is_open, settled, upheld
 
-__all__ = ["STARTS", "Observer"]
+__all__ = ["STARTS", "First", "Observer", "Step"]
+
+First: TypeAlias = tuple[Any, Mapping[str, Any]]
+"""First observation of an episode, and what info came with it."""
 
 STARTS = 16
 """How many first scenes of episodes a model file keeps, for dreams to start from."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What one env was told to do, and what it returned.
+
+    Attributes
+    ----------
+    action
+        As `relgym.wrappers.views.readable` says.
+    observation, info, reward, terminated
+        The step's own, also where the next episode has begun already.
+    """
+
+    action: Any
+    observation: Any
+    info: Mapping[str, Any]
+    reward: Any
+    terminated: bool
 
 
 class Observer:
@@ -51,7 +75,10 @@ class Observer:
     Attributes
     ----------
     view : View
-        Final after the first observations.
+        Final after the first observations, unless angles were guessed from them and a later one refutes the guess.
+    withdrawn : tuple
+        Guessed angles that were refuted. Their numbers are plain numbers since, and all was begun anew: the model, and
+        what is counted of it. The step that refutes a guess teaches nothing.
     followers : list
         One `Follower` per env.
     arguments : dict
@@ -78,18 +105,21 @@ class Observer:
         self._targets = None if targets is None else [target_of(t) for t in targets]
         self._config = None if config is None else config_of(config)
         self._file = model
-        self._manner = (learn, predict, window, background)
+        self._learn = learn
+        self._manner = (predict, window, background)
         self._spaces = (observation_space, action_space)
         self._metadata = {name: value for name, value in (metadata or {}).items() if value is not None}
         self._starts: list[Scene] = []
         self.view = view
-        self.followers = [Follower(view, bad_observations) for _ in range(envs)]
+        names = [""] if envs == 1 else [f"env {k}: " for k in range(envs)]
+        self.followers = [Follower(view, bad_observations, name=name) for name in names]
+        self.withdrawn: tuple[Angle, ...] = ()
         self._study: Study | None = None
         if not is_open(view):
-            self._open()
+            self._study = self._begun(view)
 
     # ------------------------------------------------------------------ following
-    def begin(self, firsts: Mapping[int, tuple[Any, Mapping[str, Any]]]) -> None:
+    def begin(self, firsts: Mapping[int, First]) -> None:
         """Take up first observations of episodes, with their infos, by the number of the env.
 
         Raises
@@ -97,39 +127,141 @@ class Observer:
         ObservationError
             One is no scene, and bad observations aren't skipped.
         """
-        if self._study is None:
-            self.view = settled(self.view, [observation for observation, _ in firsts.values()])
-            for follower in self.followers:
-                follower.view = self.view
-            self._open()
-        for number, (observation, info) in firsts.items():
-            scene = self.followers[number].begin(observation, info)
-            if scene is not None and len(self._starts) < STARTS:
-                self._starts.append(scene)
-                # So that model.save, too, writes a file to dream from.
-                self.study.model.extra = self.extra()
+        self._regard([observation for observation, _ in firsts.values()])
+        for number, first in firsts.items():
+            self._take_up_first(number, first, None)
 
     def expect(self, before: Scene | None) -> ScenePrediction | None:
         """What the model says will follow; ``None`` where it isn't asked."""
         return None if self._study is None else self._study.expect(before)
 
     def follow(
+        self, number: int, before: Scene | None, prediction: ScenePrediction | None, step: Step
+    ) -> StepReport:
+        """Take up what a step of an env led to, and learn from it; see `Follower.follow`."""
+        if self._regard([step.observation]):
+            self.followers[number].resume(step.observation, step.info)
+            return NOTHING
+        return self._learned(number, before, prediction, step, None)
+
+    def follow_all(self, steps: Mapping[int, Step], firsts: Mapping[int, First]) -> dict[int, StepReport]:
+        """Take up what a step of several envs led to, one after the other: predict, compare, learn.
+
+        All that they say is looked at before anything is learned, so that a bad observation leaves no half of them.
+
+        Parameters
+        ----------
+        steps
+            By the number of the env.
+        firsts
+            First observations of those that have begun an episode, after their step or instead of one.
+
+        Raises
+        ------
+        ObservationError
+            One is no scene, and bad observations aren't skipped. The model is unchanged, and no env has a current
+            scene: all have stepped, and none may go on from what it saw last.
+        """
+        seen = [step.observation for step in steps.values()]
+        if self._regard([*seen, *(observation for observation, _ in firsts.values())]):
+            latest = {k: (step.observation, step.info) for k, step in steps.items()} | dict(firsts)
+            for number, (observation, info) in latest.items():
+                self.followers[number].resume(observation, info)
+            return dict.fromkeys(steps, NOTHING)
+        looks, first_looks = self._looked(steps, firsts)
+        reports = {}
+        for number in sorted({*steps, *firsts}):
+            if number in steps:
+                before = self.followers[number].act(steps[number].action)
+                prediction = self.expect(before)
+                reports[number] = self._learned(number, before, prediction, steps[number], looks[number])
+            if number in firsts:
+                self._take_up_first(number, firsts[number], first_looks[number])
+        return reports
+
+    def _looked(
+        self, steps: Mapping[int, Step], firsts: Mapping[int, First]
+    ) -> tuple[dict[int, Look], dict[int, Look]]:
+        """What all envs show, by number: after a step, and at the beginning of an episode."""
+        followers = self.followers
+        try:
+            looks = {
+                k: followers[k].look_on(s.observation, s.info, reward=s.reward, terminated=s.terminated)
+                for k, s in steps.items()
+            }
+            first_looks = {k: followers[k].look(*first) for k, first in firsts.items()}
+            for number in sorted({*steps, *firsts}):
+                for look in (looks.get(number), first_looks.get(number)):
+                    followers[number].check(Look() if look is None else look)
+        except ObservationError:
+            for follower in followers:
+                follower.forget()
+            raise
+        return looks, first_looks
+
+    def _learned(
         self,
         number: int,
         before: Scene | None,
         prediction: ScenePrediction | None,
-        observation: Any,
-        info: Mapping[str, Any],
-        *,
-        reward: Any,
-        terminated: bool,
+        step: Step,
+        look: Look | None,
     ) -> StepReport:
-        """Take up what a step of an env led to, and learn from it; see `Follower.follow`."""
         follower = self.followers[number]
+        follower.skipped += step.action is None
         transition = follower.follow(
-            before, prediction, observation, info, reward=float(reward), terminated=terminated
+            before,
+            prediction,
+            step.observation,
+            step.info,
+            reward=step.reward,
+            terminated=step.terminated,
+            look=look,
         )
         return NOTHING if self._study is None else self._study.take_up(transition, prediction)
+
+    def _take_up_first(self, number: int, first: First, look: Look | None) -> None:
+        scene = self.followers[number].begin(*first, look)
+        if scene is not None and len(self._starts) < STARTS:
+            self._starts.append(scene)
+            # So that model.save, too, writes a file to dream from.
+            self.study.model.extra = self.extra()
+
+    # ------------------------------------------------------------------ angles
+    def _regard(self, observations: Sequence[Any]) -> bool:
+        """Settle what first observations decide, and take back what these refute: whether all begins anew."""
+        view = self.view
+        if self._study is None:
+            view = settled(view, observations)
+            if is_open(view):  # nothing but bad observations so far
+                return False
+        for observation in observations:
+            view = upheld(view, observation)
+        return view is not self.view and self._adopt(view)
+
+    def _adopt(self, view: View) -> bool:
+        """See otherwise from now on, with a new model; false, and nothing done, where the old view was asked for."""
+        first = self._study is None
+        try:
+            study = self._begun(view)
+        except RelgymError:
+            if first:
+                raise
+            return False  # a file, a target or a feature speaks of the angle, so it is no mere guess
+        if self._study is not None:
+            self._study.discard()
+        old, new = (_angles(v) for v in (self.view, view))
+        self.withdrawn += tuple(angle for angle in old if angle not in new)
+        self._starts = [view.scene(self.view.observation(scene)) for scene in self._starts]
+        self.view, self._study = view, study
+        if self._starts:
+            study.model.extra = self.extra()
+        for follower in self.followers:
+            if first:
+                follower.view = view
+            else:
+                follower.change_view(view)
+        return not first
 
     # ------------------------------------------------------------------ what was learned
     @property
@@ -143,8 +275,24 @@ class Observer:
         return self._study
 
     @property
+    def learning(self) -> bool:
+        """Whether transitions are being learned from; `ConfigError` to ask it of a model without history."""
+        return self._learn
+
+    @learning.setter
+    def learning(self, learn: bool) -> None:
+        if self._study is not None:
+            self._study.learning = learn
+        self._learn = learn
+
+    @property
+    def dropped(self) -> int:
+        """How many transitions found the queue to the background process full."""
+        return 0 if self._study is None else self._study.dropped
+
+    @property
     def skipped(self) -> int:
-        """How many bad observations were skipped."""
+        """How many bad observations, and unreadable actions, were skipped."""
         return sum(follower.skipped for follower in self.followers)
 
     def close(self) -> None:
@@ -152,15 +300,15 @@ class Observer:
         if self._study is not None:
             self._study.close()
 
-    def _open(self) -> None:
-        model = model_of(self.view.schema, config=self._config, targets=self._targets, path=self._file)
-        learn, predict, window, background = self._manner
-        self._study = Study(
+    def _begun(self, view: View) -> Study:
+        model = model_of(view.schema, config=self._config, targets=self._targets, path=self._file)
+        predict, window, background = self._manner
+        return Study(
             model,
-            learn=learn,
+            learn=self._learn,
             predict=predict,
             window=window,
-            precision=self.view.precision,
+            precision=view.precision,
             background=background,
         )
 
@@ -188,3 +336,8 @@ class Observer:
         model: WorldModel = self.study.catch_up()
         model.extra = self.extra()
         model.save(path, history=history)
+
+
+def _angles(view: View) -> tuple[Angle, ...]:
+    state = view.view if isinstance(view, TaskView) else view
+    return state.angles if isinstance(state, NumbersView) else ()

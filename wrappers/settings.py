@@ -34,11 +34,17 @@ def config_of(given: ModelConfig | Mapping[str, Any]) -> ModelConfig:
     """The parameters that are meant: a dict holds those that differ from the default."""
     if isinstance(given, ModelConfig):
         return given
+    if not isinstance(given, Mapping):
+        raise ConfigError(
+            f"config={given!r}: expected a ModelConfig, or a dict of what differs from the default, such as "
+            "{'features': ('trig',)}"
+        )
+    features = given.get("features", ())
     try:
         parts = {
             "clustering": ClusteringConfig(**given.get("clustering", {})),
             "classification": ClassificationConfig(**given.get("classification", {})),
-            "features": tuple(given.get("features", ())),
+            "features": tuple(features) if isinstance(features, list) else features,
         }
         return ModelConfig(**{**given, **parts})
     except TypeError as error:

@@ -57,6 +57,7 @@ class Study:
         self._precision = precision
         self.learning = learn
         self._background: Background | None = None
+        self._dropped = 0
         if background is not None:
             self._background = Background(
                 model, self.prequential if predict else None, precision=precision, queue=background
@@ -83,8 +84,8 @@ class Study:
 
     @property
     def dropped(self) -> int:
-        """How many transitions found the queue full and weren't learned from; 0 without a background process."""
-        return 0 if self._background is None else self._background.dropped
+        """How many transitions found the queue full and weren't learned from; 0 if there never was a queue."""
+        return self._dropped if self._background is None else self._background.dropped
 
     def expect(self, before: Scene | None) -> ScenePrediction | None:
         """What the model says will follow; ``None`` where it isn't asked."""
@@ -115,12 +116,17 @@ class Study:
             self.prequential = self.prequential if count is None else count
         return self.model
 
+    def discard(self) -> None:
+        """End the background process, if there is one, without waiting for what it has yet to learn."""
+        if self._background is not None:
+            self._background.close()
+            self._background = None
+
     def close(self) -> None:
         """Fetch what was learned and end the background process, if there is one; learning goes on here."""
-        background = self._background
-        if background is not None:
+        if self._background is not None:
             try:
                 self.catch_up()
             finally:  # whatever became of the process, it is over
-                background.close()
-                self._background = None
+                self._dropped = self._background.dropped
+                self.discard()

@@ -13,15 +13,13 @@ from gymnasium.vector.utils import iterate
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.envs.arguments import checked_action
-from relgym.errors import ConfigError, ObservationError
+from relgym.errors import ConfigError
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.learning import Learning
-from relgym.wrappers.observer import Observer
-from relgym.wrappers.prequential import StepReport
+from relgym.wrappers.observer import First, Observer, Step
 from relgym.wrappers.settings import PlainTarget
 from relgym.wrappers.study import NOTHING
-from relgym.wrappers.views import ViewLike, chosen_view
+from relgym.wrappers.views import ViewLike, chosen_view, readable
 
 __all__ = ["VectorModelLearner", "info_at"]
 
@@ -112,56 +110,50 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Step all envs, then predict and learn, one env after the other.
 
+        Actions outside their space are treated as in `ModelLearner.step`.
+
         Raises
         ------
-        ActionError
-            An action outside the action space; model and envs are unchanged.
         ObservationError
-            An observation is no scene, and such aren't skipped. The envs have stepped; `reset` begins anew.
+            An observation is no scene, and such aren't skipped; the message says whose. The envs have stepped, the
+            model is unchanged; `reset` begins anew.
         """
-        given = list(iterate(self.action_space, actions))
-        checked = [checked_action(self.single_action_space, action) for action in given]
+        observer, count = self._observer, self.num_envs
+        given = [readable(self.single_action_space, action) for action in self._actions(actions)]
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
-        seen = self._single(observations)
-        reports: NDArray[Any] = np.full(self.num_envs, None, dtype=object)
-        try:
-            for k in range(self.num_envs):
-                ended = bool(terminated[k] or truncated[k])
-                outcome = (rewards[k], bool(terminated[k]), ended)
-                reports[k] = self._take_up(k, checked[k], seen[k], outcome, infos)
-        except ObservationError:
-            # All envs have stepped, not all were followed: none may go on from what it saw last.
-            for follower in self._observer.followers:
-                follower.forget()
-            raise
+        steps: dict[int, Step] = {}
+        firsts: dict[int, First] = {}
+        for k, seen in enumerate(self._single(observations)):
+            follower, info = observer.followers[k], info_at(infos, k)
+            ended = bool(terminated[k] or truncated[k])
+            resets = follower.over and self._mode is AutoresetMode.NEXT_STEP
+            final = ended and not resets and self._mode is AutoresetMode.SAME_STEP
+            if resets or final:
+                firsts[k] = (seen, info)
+            if not resets:  # such a step means nothing but that
+                last = (_final(infos, k), info_at(infos.get("final_info", {}), k)) if final else (seen, info)
+                steps[k] = Step(given[k], *last, rewards[k], bool(terminated[k]))
+        reports: NDArray[Any] = np.full(count, NOTHING, dtype=object)
+        for k, report in observer.follow_all(steps, firsts).items():
+            reports[k] = report
+        for k in range(count):
+            observer.followers[k].over = bool(terminated[k] or truncated[k])
         return observations, rewards, terminated, truncated, {**infos, "relgym": reports}
 
-    def _take_up(
-        self, k: int, action: Any, observation: Any, outcome: tuple[Any, bool, bool], infos: dict[str, Any]
-    ) -> StepReport:
-        observer, follower = self._observer, self._observer.followers[k]
-        reward, terminated, ended = outcome
-        info = info_at(infos, k)
-        if follower.over and self._mode is AutoresetMode.NEXT_STEP:
-            observer.begin({k: (observation, info)})  # this step was a reset, and the action meant nothing
-            follower.over = ended
-            return NOTHING
-        before = follower.act(action)
-        prediction = observer.expect(before)
-        final = ended and self._mode is AutoresetMode.SAME_STEP
-        last, last_info = (
-            (_final(infos, k), info_at(infos.get("final_info", {}), k)) if final else (observation, info)
-        )
-        follower.over = ended
-        report = observer.follow(k, before, prediction, last, last_info, reward=reward, terminated=terminated)
-        if final:
-            observer.begin({k: (observation, info)})
-        return report
-
     def close(self, **kwargs: Any) -> None:
-        """Close the envs, and end the background process if there is one, once it has learned all."""
-        self._observer.close()
-        super().close(**kwargs)
+        """Close the envs, and end the background process if there is one; as `ModelLearner.close`."""
+        try:
+            self._observer.close()
+        finally:
+            super().close(**kwargs)
+
+    def _actions(self, actions: Any) -> list[Any]:
+        """Single actions; ``None`` for all where they can't be told apart, which is for the envs to mind."""
+        try:
+            given = list(iterate(self.action_space, actions))
+        except (TypeError, ValueError, KeyError, IndexError):
+            given = []
+        return given if len(given) == self.num_envs else [None] * self.num_envs
 
     def _single(self, observations: Any) -> list[Any]:
         return list(iterate(self.observation_space, observations))

@@ -6,12 +6,25 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import gymnasium as gym
+import numpy as np
 from gymnasium import spaces
 
+from relgym.envs.arguments import checked_action
 from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
-from relgym.errors import ConfigError
+from relgym.errors import ActionError, ConfigError, RelgymError
 
-__all__ = ["SceneView", "View", "ViewLike", "chosen_view", "is_open", "settled", "view_of"]
+__all__ = [
+    "SceneView",
+    "View",
+    "ViewLike",
+    "chosen_view",
+    "is_open",
+    "readable",
+    "recordable",
+    "settled",
+    "upheld",
+    "view_of",
+]
 
 ViewLike: TypeAlias = View | Mapping[str, Any] | Callable[[spaces.Space[Any], spaces.Space[Any]], View] | None
 """A view, its JSON form, or a function of (observation space, action space) that makes one; ``None``: chosen."""
@@ -68,7 +81,7 @@ def chosen_view(
     Raises
     ------
     ConfigError
-        As `view_of`, or `given` is no view.
+        As `view_of`, or `given` is no view, or one that was made for other actions.
     """
     view: Any
     if given is None:
@@ -85,6 +98,9 @@ def chosen_view(
             f"view={given!r}: expected a view (NumbersView, TableView, FunctionView, ...), or a function of "
             f"(observation_space, action_space) that makes one, got {type(view).__name__}"
         )
+    # Views of the user's own need not have it.
+    if (check := getattr(view, "check_actions", None)) is not None:
+        check(action_space)
     return TaskView(view, reward=reward, terminated=terminated) if reward or terminated else view
 
 
@@ -94,5 +110,41 @@ def is_open(view: View) -> bool:
 
 
 def settled(view: View, observations: Sequence[Any]) -> View:
-    """The view, final, after some first observations."""
+    """The view with angles guessed from some first observations."""
     return view.settled(observations) if isinstance(view, (NumbersView, TaskView)) else view
+
+
+def upheld(view: View, observation: Any) -> View:
+    """The view without guessed angles that an observation refutes; itself where it refutes none."""
+    return view.upheld(observation) if isinstance(view, (NumbersView, TaskView)) else view
+
+
+def recordable(given: ViewLike) -> ViewLike:
+    """What the user passed as a view, as plain data where such data can say it: a spec may then be written as JSON."""
+    if given is None or isinstance(given, Mapping) or not isinstance(given, View):
+        return given
+    try:
+        data = given.to_json()
+        view_from_json(data)
+    except RelgymError:  # made of a function, of the user's own kind, or of a space that no file can hold
+        return given
+    return data
+
+
+def readable(space: spaces.Space[Any], action: Any) -> Any:
+    """An action as views may read it; ``None`` where none can.
+
+    Whether an action is legal is for the env to say. One that lies outside its Box, and that the env takes all the
+    same, is learned from as it was given; what the env makes of it (most clip it) is part of its laws. NaN, other
+    shapes, and choices that a discrete space doesn't have can't be read.
+    """
+    try:
+        return checked_action(space, action)
+    except ActionError:
+        if not isinstance(space, spaces.Box):
+            return None
+    try:
+        array = np.asarray(action, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return array if array.shape == space.shape and np.isfinite(array).all() else None

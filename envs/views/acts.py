@@ -66,6 +66,18 @@ class Acts:
         self.properties = (*given, *(label for part in labels for label in part))
         self._indicated = [k for k, part in enumerate(labels) if part]
 
+    def check(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless actions of a space mean here what they mean there."""
+        try:
+            same = _choices(space) == (self._starts, self._counts)
+        except ConfigError:
+            same = False
+        if not same:
+            raise ConfigError(
+                f"the view was made for actions of {self.space}, but the env's action space is {space}; make it with "
+                "env.action_space"
+            )
+
     @cached_property
     def type(self) -> ObjectType:
         """The type of the action object."""
@@ -115,6 +127,7 @@ def _choices(space: spaces.Space[Any]) -> tuple[list[float], list[int]]:
         size = int(np.prod(space.shape))
         return [0.0] * size, [0] * size
     raise ConfigError(
-        f"the action space is {space}: expected Box, Discrete, MultiDiscrete or MultiBinary; flatten it "
-        "(gymnasium.wrappers.TransformAction), or pass a view whose schema has an action object of its own"
+        f"the action space is {space}: expected Box, Discrete, MultiDiscrete or MultiBinary; flatten it: "
+        "gymnasium.wrappers.TransformAction(env, function, space), where the space is one of these and the function "
+        "makes the env's action of one of its actions"
     )

@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from relgym.scene.objects import Float1D
 
-__all__ = ["candidates", "circular", "decoded", "disjoint", "tolerance"]
+__all__ = ["SLACK", "candidates", "circular", "decoded", "disjoint", "on_circle", "tolerance"]
+
+SLACK = 10.0
+"""So many times the tolerance a pair that was taken for an angle may be off the circle before it is none."""
 
 
 def tolerance(single: bool) -> float:
@@ -27,6 +30,11 @@ def candidates(low: Float1D, high: Float1D) -> tuple[tuple[int, int], ...]:
     unbounded = np.isneginf(low) & np.isposinf(high)
     both = (unit[:-1] & unit[1:]) | (unbounded[:-1] & unbounded[1:])
     return tuple((int(k), int(k) + 1) for k in np.flatnonzero(both))
+
+
+def on_circle(cos: float, sin: float, *, single: bool) -> bool:
+    """Whether two numbers may still be cosine and sine of an angle that they were taken for."""
+    return abs(cos * cos + sin * sin - 1.0) <= SLACK * tolerance(single)
 
 
 def circular(values: NDArray[np.float64], pair: tuple[int, int], *, bounded: bool, single: bool) -> bool:

@@ -52,7 +52,7 @@ def default_parts(names: Sequence[str], parts: Sequence[Part]) -> tuple[Part, ..
     Raises
     ------
     ConfigError
-        A number that isn't there, or that two parts claim.
+        A number that isn't there, or that two parts claim; keys that differ only in what no identifier may hold.
     """
     claimed = [source for part in parts for source in part.sources.values()]
     if unknown := sorted(set(claimed) - set(names)):
@@ -60,10 +60,17 @@ def default_parts(names: Sequence[str], parts: Sequence[Part]) -> tuple[Part, ..
     if twice := sorted({name for name in claimed if claimed.count(name) > 1}):
         raise ConfigError(f"the numbers {twice} are claimed by several parts; give each to one")
     rest: dict[str, dict[str, str]] = {}
+    keys: dict[str, str] = {}
     for name in names:
         if name not in claimed:
             key, dot, prop = name.rpartition(".")
-            rest.setdefault(identifier(key) if dot else SELF, {})[prop] = name
+            owner = identifier(key) if dot else SELF
+            if keys.setdefault(owner, key) != key:
+                raise ConfigError(
+                    f"the keys {keys[owner]!r} and {key!r} would both be objects {owner!r}; name one of them yourself: "
+                    f"parts=[Part('other', {{{prop!r}: {name!r}, ...}})]"
+                )
+            rest.setdefault(owner, {})[prop] = name
     return (*parts, *(Part(owner, columns) for owner, columns in rest.items()))
 
 
@@ -114,7 +121,8 @@ def arranged(
     identifiers("names of the objects", owners, len(owners))
     if ACTION in owners:
         raise ConfigError(
-            f"an object of an observation can't be called {ACTION!r}: that is what the agent does"
+            f"an object of an observation can't be called {ACTION!r}: that is what the agent does; call it otherwise "
+            f"(numbers under a Dict's key {ACTION!r}: parts=[Part('other', {{'x0': '{ACTION}.x0', ...}})])"
         )
     objects = [(name, kind.name) for name, kind in zip(owners, kinds, strict=True)]
     schema = SceneSchema((*merged(kinds), action), (*objects, (ACTION, ACTION)), up=axes[0], planar=axes[1])

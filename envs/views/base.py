@@ -68,8 +68,8 @@ class View(Protocol):
         """The scene together with what the agent does in it, in physical units."""
         ...
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
-        """The scene together with what the step to it brought, where that is to be learned."""
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
+        """The scene together with what the step to it brought, as the env returned it, where that is to be learned."""
         ...
 
     def observation(self, scene: Scene) -> Any:

@@ -128,11 +128,18 @@ class FunctionView:
             )
         return [value[prop] for prop in kind.properties]
 
+    def check_actions(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless the view can read actions of a space."""
+        if self._acts is None:
+            check_action_space(self.schema, space)
+        else:
+            self._acts.check(space)
+
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action's properties: by the schema's own ranges, or see `Acts`."""
         return acting(scene, action) if self._acts is None else self._acts.acting(scene, action)
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
         """The scene as it is: this view learns of the state alone (`TaskView` of more)."""
         return scene
 

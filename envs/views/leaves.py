@@ -163,7 +163,7 @@ def _flat(space: spaces.Space[Any], key: Key) -> spaces.Space[Any]:
             f"(gymnasium.wrappers.FlattenObservation), or pass view=: {own}"
         )
     if isinstance(space, spaces.Box) and len(space.shape) >= 2:
-        raise ConfigError(_shaped(space, where, own))
+        raise ConfigError(_shaped(space, where, own, key))
     if isinstance(space, (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)):
         return space
     raise ConfigError(
@@ -172,13 +172,17 @@ def _flat(space: spaces.Space[Any], key: Key) -> spaces.Space[Any]:
     )
 
 
-def _shaped(space: spaces.Box, where: str, own: str) -> str:
+def _shaped(space: spaces.Box, where: str, own: str, key: Key) -> str:
     if len(space.shape) >= 3 or space.dtype == np.uint8:
         return (
             f"{where} is an image ({space.shape}, {space.dtype}): relgym learns of objects and their properties, "
             f"not of pixels; use the env's state if it offers one, or detect objects and pass view=: {own}"
         )
+    table = f"{where} is a table of shape {space.shape}: nothing says what its rows and columns are; "
+    if key is None:
+        return f"{table}pass view=TableView(env.observation_space, env.action_space, columns=(...)), or flatten it"
     return (
-        f"{where} is a table of shape {space.shape}: nothing says what its rows and columns are; pass "
-        "view=TableView(env.observation_space, env.action_space, columns=(...)), or flatten it"
+        f"{table}show it alone (gymnasium.wrappers.TransformObservation(env, lambda seen: seen[{key!r}], "
+        f"env.observation_space[{key!r}])) and pass view=TableView(env.observation_space, env.action_space, "
+        f"columns=(...)); or flatten all (gymnasium.wrappers.FlattenObservation); or pass view=: {own}"
     )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
-from relgym.envs.views.angles import candidates, circular, decoded, disjoint, tolerance
+from relgym.envs.views.angles import candidates, circular, decoded, disjoint, on_circle
 from relgym.envs.views.arrangement import arranged, default_parts, numbered
 from relgym.envs.views.base import precision_of
 from relgym.envs.views.leaves import Numbers
@@ -38,8 +38,10 @@ class NumbersView:
     parts
         Objects and the numbers that are theirs; numbers of no part stay where they are by default.
     angles
-        Pairs that are (cos, sin) of an angle: names, or `Angle` records. ``"auto"`` (default): neighbours in
-        [-1, 1], or unbounded, whose squares sum to 1 in the first observations (`settled`).
+        Pairs that are (cos, sin) of an angle: names, or `Angle` records. ``"auto"`` (default): neighbours of one
+        object, in [-1, 1] or unbounded, whose squares sum to 1 in the first observations (`settled`). That is a guess:
+        learners take it back when a later observation refutes it (`upheld`). A pair that is given here is no guess;
+        an observation that is off the circle is then a bad one.
     actions
         Names of the choices of a Discrete action, or of the numbers of another one (`Acts`).
     static
@@ -86,6 +88,9 @@ class NumbersView:
             raise ConfigError(f"angles={angles!r}: expected 'auto' or pairs of names (cosine, sine)")
         self._auto = isinstance(angles, str)
         self.angles = () if isinstance(angles, str) else tuple(_angle(given) for given in angles)
+        self._possible: tuple[
+            tuple[int, int], ...
+        ] = ()  # pairs that were guessed, or would be in place of these
         whole = default_parts(self.names, self._parts)
         self._owner = {source: part.name for part in whole for source in part.sources.values()}
         self._how = arranged(self.names, whole, self.angles, static, self._acts.type, self._axes)
@@ -98,22 +103,52 @@ class NumbersView:
         return bool(self._candidates())
 
     def settled(self, observations: Sequence[Any]) -> NumbersView:
-        """The view with angles decided from some first observations; itself where nothing is open.
+        """The view with angles guessed from some first observations; itself where nothing is open.
 
-        Raises
-        ------
-        ObservationError
-            One of them isn't of the space.
+        Those that are no observations (another length, NaN) say nothing; where all are such, the view stays open.
         """
-        pairs = self._candidates()
-        if not pairs:
+        pairs, sound = self._candidates(), [n for o in observations if (n := self._sound(o)) is not None]
+        if not pairs or not sound:
             return self
-        seen: NDArray[np.float64] = np.stack([self._numbers.read(o) for o in observations])
+        seen: NDArray[np.float64] = np.stack(sound)
         low, high = self._numbers.bounds
         bounded, single = np.isfinite(low) & np.isfinite(high), self._numbers.single
         found = [p for p in pairs if circular(seen, p, bounded=bool(bounded[p[0]]), single=single[p[0]])]
-        angles = [Angle(self.names[i], self.names[j]) for i, j in disjoint(found)]
-        return NumbersView.from_json(self.to_json() | {"angles": [[a.cos, a.sin, a.name] for a in angles]})
+        return self._guessing(found)
+
+    def upheld(self, observation: Any) -> NumbersView:
+        """The view without those guessed angles that an observation refutes; itself where it refutes none.
+
+        One that is no observation at all (another length, NaN) refutes nothing.
+        """
+        if not self._possible:
+            return self
+        try:
+            numbers = self._numbers.read(observation)
+        except ObservationError:
+            return self
+        # What isn't finite is off every circle, and asked last: it is rare, and this is asked at every step.
+        if all(self._turns(pair, numbers) for pair in self._how.pairs) or not np.isfinite(numbers).all():
+            return self
+        return self._guessing([pair for pair in self._possible if self._turns(pair, numbers)])
+
+    def _guessing(self, possible: Sequence[tuple[int, int]]) -> NumbersView:
+        """The view with angles for the first of these pairs, and as many of the others as go together."""
+        angles = [[self.names[i], self.names[j], None] for i, j in disjoint(possible)]
+        view = NumbersView.from_json(self.to_json() | {"angles": angles})
+        view._possible = tuple(possible)
+        return view
+
+    def _sound(self, observation: Any) -> Float1D | None:
+        try:
+            numbers = self._numbers.read(observation)
+        except ObservationError:
+            return None
+        return numbers if np.isfinite(numbers).all() else None
+
+    def _turns(self, pair: tuple[int, int], numbers: Float1D) -> bool:
+        cos, sin = (float(numbers[k]) for k in pair)
+        return on_circle(cos, sin, single=self._numbers.single[pair[0]])
 
     def _candidates(self) -> tuple[tuple[int, int], ...]:
         if not self._auto:
@@ -144,11 +179,15 @@ class NumbersView:
             numbers = np.concatenate([numbers, angles, how.constants])
         return Scene(self.schema, how.layout, numbers[how.gather])
 
+    def check_actions(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless the view can read actions of a space."""
+        self._acts.check(space)
+
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action's properties: see `Acts`."""
         return self._acts.acting(scene, action)
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
         """The scene as it is: this view learns of the state alone (`TaskView` of more)."""
         return scene
 
@@ -173,14 +212,13 @@ class NumbersView:
 
     def _decoded(self, pair: tuple[int, int], numbers: Float1D) -> float:
         i, j = pair
-        single = self._numbers.single[i]
-        if abs(numbers[i] ** 2 + numbers[j] ** 2 - 1.0) > 10 * tolerance(single):
+        if not self._turns(pair, numbers):
             raise ObservationError(
                 f"{self.names[i]!r} and {self.names[j]!r} were taken for cosine and sine of an angle, but now they are "
                 f"{numbers[i]:g} and {numbers[j]:g}; say which pairs are angles, "
                 "view=NumbersView(..., angles=()) if none is"
             )
-        return decoded(float(numbers[i]), float(numbers[j]), single=single)
+        return decoded(float(numbers[i]), float(numbers[j]), single=self._numbers.single[i])
 
     def _complain(self, numbers: Float1D) -> None:
         k = int(np.flatnonzero(~np.isfinite(numbers))[0])

@@ -76,11 +76,15 @@ class SceneView:
             )
         return self.schema.scene(observation)
 
+    def check_actions(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless the view can read actions of a space."""
+        check_action_space(self.schema, space)
+
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action object, through the affine maps in ``schema.action_scale``."""
         return acting(scene, action)
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
         """The scene as it is: this view learns of the state alone (`TaskView` of more)."""
         return scene
 

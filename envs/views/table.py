@@ -60,7 +60,8 @@ class TableView:
     Notes
     -----
     Objects may come and go. A matched table has twice as many names as rows, so that one that comes while another
-    goes is never taken for it.
+    goes is never taken for it. A kind of one row has a single name: what comes there in place of another object is not
+    shown until the next step. The numbers of an empty row mean nothing, and may be NaN.
 
     Examples
     --------
@@ -165,7 +166,7 @@ class TableView:
             here = np.arange(len(own)) if self._here is None else np.flatnonzero(own[:, self._here] > 0.5)
             constants = np.array(list(part.constants.values()), dtype=np.float64)
             chosen = self._chosen(own[here], names, here, last, last if expected is None else expected)
-            for name, row in zip(chosen, own[here], strict=True):
+            for name, row in zip(chosen, own[here], strict=False):
                 shown = row[self._shown]
                 values[name] = np.concatenate([shown, self._changed(shown, name, last), constants])
         return self.schema.scene(values | self._fixed)
@@ -185,9 +186,11 @@ class TableView:
         last: Scene | None,
         expected: Scene | None,
     ) -> list[str]:
-        """Name of the object in each row."""
-        if self._match is None or len(names) == 1:
+        """Name of the object in each row; fewer names than rows where one must wait for its name."""
+        if self._match is None:
             return [names[int(k)] for k in here]
+        if len(names) == 1:
+            return [] if self._leapt(rows, names[0], last, expected) else list(names[: len(rows)])
         known = [name for name in names if expected is not None and name in expected]
         columns = [self.columns.index(name) for name in self._match]
         places = [self._properties.index(name) for name in self._match]
@@ -199,6 +202,16 @@ class TableView:
         free = iter(name for name in names if name not in known and (last is None or name not in last))
         return [known[k] if k >= 0 else next(free) for k in pairs.tolist()]
 
+    def _leapt(self, rows: Float2D, name: str, last: Scene | None, expected: Scene | None) -> bool:
+        """Whether the one row of a kind is far from where its object was, and from where it was expected."""
+        if self._match is None or not len(rows) or last is None or name not in last:
+            return False
+        columns = [self.columns.index(column) for column in self._match]
+        places = [self._properties.index(column) for column in self._match]
+        scenes = [last] if expected is None or name not in expected else [last, expected]
+        off = (rows[0, columns] - [scene[name].values[places] for scene in scenes]) / self._scales
+        return bool(((off * off).sum(axis=1) > 1.0).all())
+
     def _checked(self, observation: Any) -> Float2D:
         try:
             table = np.asarray(observation, dtype=np.float64)
@@ -208,19 +221,26 @@ class TableView:
             raise ObservationError(
                 f"expected a table of shape {self._space.shape}, columns {self.columns}, got shape {table.shape}"
             )
-        if not np.isfinite(table).all():
-            row, column = (int(k) for k in np.argwhere(~np.isfinite(table))[0])
+        wrong = ~np.isfinite(table)
+        if self._here is not None:
+            wrong &= (table[:, [self._here]] > 0.5) | (np.arange(table.shape[1]) == self._here)
+        if wrong.any():
+            row, column = (int(k) for k in np.argwhere(wrong)[0])
             raise ObservationError(
                 f"row {row}, column {self.columns[column]!r}: expected a finite number, got {table[row, column]}; "
                 "check the env's observation before it is learned from"
             )
         return table
 
+    def check_actions(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless the view can read actions of a space."""
+        self._acts.check(space)
+
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action's properties: see `Acts`."""
         return self._acts.acting(scene, action)
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
         """The scene as it is: this view learns of the state alone (`TaskView` of more)."""
         return scene
 
@@ -287,7 +307,7 @@ def _table(space: spaces.Space[Any]) -> spaces.Box:
     if not isinstance(space, spaces.Box) or len(space.shape) != 2:
         raise ConfigError(
             f"expected a table, a Box of shape (rows, columns), got {space}; "
-            "gymnasium.wrappers.ReshapeObservation makes one of a flat Box"
+            "gymnasium.wrappers.ReshapeObservation makes one of a flat Box, TransformObservation takes it out of a Dict"
         )
     return space
 

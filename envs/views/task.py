@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
 from relgym.envs.views.base import View
 from relgym.envs.views.numeric import NumbersView
@@ -75,8 +75,14 @@ class TaskView:
         """The view with angles decided from some first observations: see `NumbersView.settled`."""
         if not isinstance(self.view, NumbersView):
             return self
-        wanted = {"reward": REWARD in self._names, "terminated": TERMINATED in self._names}
-        return TaskView(self.view.settled(observations), **wanted)
+        view = self.view.settled(observations)
+        return TaskView(view, reward=REWARD in self._names, terminated=TERMINATED in self._names)
+
+    def upheld(self, observation: Any) -> TaskView:
+        """The view without guessed angles that an observation refutes: see `NumbersView.upheld`."""
+        if not isinstance(self.view, NumbersView) or (view := self.view.upheld(observation)) is self.view:
+            return self
+        return TaskView(view, reward=REWARD in self._names, terminated=TERMINATED in self._names)
 
     def scene(
         self,
@@ -89,18 +95,27 @@ class TaskView:
         """The scene that an observation shows, without `task`; see `View.scene`."""
         return self._own(self.view.scene(observation, info, last=last, expected=expected))
 
+    def check_actions(self, space: spaces.Space[Any]) -> None:
+        """Raise `ConfigError` unless the view can read actions of a space."""
+        if (check := getattr(self.view, "check_actions", None)) is not None:
+            check(space)
+
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with what the agent does in it, and what that brings: 0, as long as it isn't known."""
         acting = self._own(self.view.with_action(self._bare(scene), action))
         return self._with(acting, [0.0] * len(self._names))
 
-    def with_outcome(self, scene: Scene, reward: float, terminated: bool) -> Scene:
-        """The scene together with what the step to it brought; `ObservationError` for a reward that is no number."""
-        if not math.isfinite(reward):
-            raise ObservationError(
-                f"the reward: expected a finite number, got {reward}; mend the env's reward"
-            )
-        brought = {REWARD: float(reward), TERMINATED: float(terminated)}
+    def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
+        """The scene together with what the step to it brought.
+
+        Raises
+        ------
+        ObservationError
+            The reward is no finite number, and it is shown.
+        """
+        brought = {TERMINATED: float(terminated)}
+        if REWARD in self._names:  # else it may be whatever the env likes
+            brought[REWARD] = _number(reward)
         return self._with(self._bare(scene), [brought[name] for name in self._names])
 
     def observation(self, scene: Scene) -> Any:
@@ -140,3 +155,16 @@ def _told(targets: Sequence[Target], names: Sequence[str]) -> tuple[Target, ...]
     ended = ((TASK, TERMINATED),) if TERMINATED in names else ()
     order = [name for name in (TERMINATED, REWARD) if name in names]
     return tuple(Target(TASK, name, given=given + (ended if name == REWARD else ())) for name in order)
+
+
+def _number(reward: Any) -> float:
+    try:
+        numbers = np.asarray(reward, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.size != 1 or not np.isfinite(numbers).all():
+        raise ObservationError(
+            f"the reward: expected a finite number, got {reward!r}; make one of it inside the learner "
+            "(gymnasium.wrappers.TransformReward), or leave out learn_reward"
+        )
+    return numbers.item()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,7 +20,17 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 
-__all__ = ["MOST_FEATURES", "NO_FEATURES", "Atom", "Feature", "Library", "library_of", "register_function"]
+__all__ = [
+    "MOST_FEATURES",
+    "NO_FEATURES",
+    "Atom",
+    "Feature",
+    "Library",
+    "check_entries",
+    "functions_of",
+    "library_of",
+    "register_function",
+]
 
 FREQUENCIES = (1, 2, 3)
 """Sines and cosines are offered at these multiples; only the first one enters products."""
@@ -43,7 +53,8 @@ def register_function(name: str, function: Function) -> None:
     name
         A Python identifier; model files refer to it, so register it before loading one.
     function
-        Maps a float64 array element by element; must be defined wherever the env goes.
+        Maps a float64 array element by element; must be defined wherever the env goes. To learn in the background it
+        must be one that a process can be sent: a ``def`` at the top level of a module, no lambda.
 
     Raises
     ------
@@ -53,6 +64,12 @@ def register_function(name: str, function: Function) -> None:
     if not name.isidentifier() or name in {"trig", "sin", "cos", *_DEGREES}:
         raise ConfigError(f"expected a new identifier as a function's name, got {name!r}; choose another one")
     _functions[name] = function
+
+
+def functions_of(entries: Iterable[str]) -> dict[str, Function]:
+    """Registered functions that entries of ``ModelConfig.features`` name, by name."""
+    kinds = [match["kind"] for entry in entries if (match := _ENTRY.fullmatch(entry))]
+    return {kind: _functions[kind] for kind in kinds if kind in _functions}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +89,7 @@ class Atom:
             return np.sin(self.frequency * column)
         if self.function == "cos":
             return np.cos(self.frequency * column)
-        return np.asarray(_functions[self.function](column), dtype=np.float64)
+        return np.asarray(_registered(self.function)(column), dtype=np.float64)
 
     def text(self, name: str) -> str:
         """How it is printed, given the column's name."""
@@ -172,7 +189,10 @@ class Library:
         """The factors of products, and the features that are none."""
         turning = [k for k, name in enumerate(names) if own[k] and self._turns(name)]
         waves = [Atom(k, f, w) for k in turning for w in FREQUENCIES for f in ("sin", "cos")]
-        named = [Atom(k, f) for f in self.kinds if f in _functions for k in range(len(names))]
+        users = [kind for kind in self.kinds if kind not in {"trig", *_DEGREES}]
+        for kind in users:
+            _registered(kind)
+        named = [Atom(k, f) for f in users for k in range(len(names))]
         found = [Feature(atom.text(names[atom.column]), (atom,)) for atom in (*waves, *named)]
         raw = [Atom(k) for k in range(len(names))]
         return [*raw, *(a for a in waves if a.frequency == 1), *named], found
@@ -213,17 +233,51 @@ def library_of(entries: Iterable[str], type_name: str, angles: tuple[str, ...]) 
     kinds: list[str] = []
     named: list[str] = []
     for entry in entries:
-        match = _ENTRY.fullmatch(entry)
-        kind = match["kind"] if match else entry
-        if match is None or (kind != "trig" and kind not in _DEGREES and kind not in _functions):
-            raise ConfigError(
-                f"features: {entry!r} is unknown; expected 'trig', 'trig(property)', {sorted(_DEGREES)}, or a function "
-                f"registered before, of which there are {sorted(_functions)}; 'type:kind' offers it to one type only"
-            )
-        if match["type"] in (None, type_name):
+        owner, kind, properties = _parsed(entry)
+        if owner in (None, type_name):
             kinds.append(kind)
-            named += [name.strip() for name in (match["names"] or "").split(",") if name.strip()]
+            named += properties
     return Library(tuple(dict.fromkeys(kinds)), tuple(dict.fromkeys(named)) or angles)
+
+
+def check_entries(entries: Iterable[str], types: Mapping[str, Collection[str]]) -> None:
+    """Raise `ConfigError` where an entry of ``ModelConfig.features`` would be offered to nobody.
+
+    Parameters
+    ----------
+    entries
+        As of `library_of`.
+    types
+        Properties of every type, but for the action's.
+    """
+    for entry in entries:
+        owner, _, properties = _parsed(entry)
+        if owner is not None and owner not in types:
+            raise ConfigError(f"features: {entry!r} is for type {owner!r}; expected one of {sorted(types)}")
+        known = sorted({prop for found in types.values() for prop in found})
+        if unknown := [name for name in properties if name not in known]:
+            raise ConfigError(f"features: {entry!r} names the properties {unknown}; expected some of {known}")
+
+
+def _parsed(entry: str) -> tuple[str | None, str, list[str]]:
+    """Type that an entry is for (``None``: all), its kind, and the properties that it names."""
+    match = _ENTRY.fullmatch(entry)
+    kind = match["kind"] if match else entry
+    if match is None or (kind != "trig" and (match["names"] or kind not in {*_DEGREES, *_functions})):
+        raise ConfigError(
+            f"features: {entry!r} is unknown; expected 'trig', 'trig(property)', {sorted(_DEGREES)}, or a function "
+            f"registered before, of which there are {sorted(_functions)}; 'type:kind' offers it to one type only"
+        )
+    return match["type"], kind, [name.strip() for name in (match["names"] or "").split(",") if name.strip()]
+
+
+def _registered(name: str) -> Function:
+    if name not in _functions:
+        raise ConfigError(
+            f"features: no function {name!r} is registered in this process; call register_function({name!r}, ...) "
+            "first, as where the model was made"
+        )
+    return _functions[name]
 
 
 def _product_text(product: Sequence[Atom], names: Sequence[str]) -> str:

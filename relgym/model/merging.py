@@ -18,6 +18,7 @@ from relgym.classification.examples import Example
 from relgym.clustering.examples import ExampleTable
 from relgym.errors import ConfigError
 from relgym.model.chaining import in_order
+from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch
@@ -27,7 +28,7 @@ __all__ = ["merge"]
 
 
 def merge(parts: Parts, other: Parts, *, follow_laws: bool) -> None:
-    """Take up all that another model remembers; the other one stays as it is.
+    """Take up all that another model remembers, as far as memory goes; the other one stays as it is.
 
     Parameters
     ----------
@@ -49,6 +50,8 @@ def merge(parts: Parts, other: Parts, *, follow_laws: bool) -> None:
         mine = parts.property_model(theirs.type, theirs.property)
         rows = moved[theirs.type]
         _take_up(mine, model, parts.tables[theirs.type], rows)
+    for name, table in parts.tables.items():
+        forget(table, [m for t, m in parts.models.items() if t.type == name], parts.config.history)
     if follow_laws and parts.laws is not None:
         parts.laws = copy.deepcopy(other.laws)
 

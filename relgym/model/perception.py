@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
-from relgym.clustering.features import library_of
+from relgym.clustering.features import check_entries, library_of
 from relgym.model.grouping import distinct
 from relgym.scene.contacts import APPROACH_EPS
 from relgym.scene.context import canonical_order, signature, slots
-from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, poses
+from relgym.scene.objects import ACTION, ObjectType, SceneLayout, SceneSchema, poses
 from relgym.scene.relations import Extractor, Relations
 
 __all__ = ["Percept", "Perception", "Situation"]
@@ -127,6 +127,7 @@ class Perception:
         self.parting = parting
         self.given = given
         self.chained = chained
+        check_entries(features, {t.name: t.properties for t in schema.types if t.name != ACTION})
         self.libraries = {t.name: library_of(features, t.name, t.angles) for t in schema.types}
         self.extractor = Extractor(schema, geometry=geometry)
         self._contact_names = self.extractor.features

@@ -358,7 +358,12 @@ class Transition:
 
 
 def _checked(name: str, t: ObjectType, values: Sequence[float] | Float1D) -> Float1D:
-    array = np.asarray(values, dtype=np.float64)
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ObservationError(
+            f"object {name!r} of type {t.name!r}: expected {len(t.properties)} numbers {t.properties}, got {values!r}"
+        ) from None
     if array.shape != (len(t.properties),):
         raise ObservationError(
             f"object {name!r} of type {t.name!r}: expected {len(t.properties)} properties {t.properties}, "

@@ -7,8 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from relgym.clustering import features
 from relgym.clustering.columns import SlotSignature
-from relgym.clustering.features import Library, library_of, register_function
+from relgym.clustering.features import (
+    Atom,
+    Library,
+    check_entries,
+    functions_of,
+    library_of,
+    register_function,
+)
 from relgym.clustering.mode import Mode, Role
 from relgym.clustering.roles import bind
 from relgym.errors import ConfigError
@@ -61,7 +69,29 @@ def test_a_registered_function_is_a_feature() -> None:
     assert found["cube(x)"].values(np.array([[2.0]])).tolist() == [8.0]
 
 
-@pytest.mark.parametrize("entry", ["sines", "trig(", "tan", ""])
+def test_functions_that_entries_name_are_found() -> None:
+    register_function("cube", lambda x: x**3)
+    assert list(functions_of(("trig", "cart:cube", "products"))) == ["cube"]
+    assert functions_of(("trig",)) == {}
+
+
+def test_a_function_that_is_not_known_here_is_never_left_out_silently(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A model of another process, or of a file, may name one."""
+    register_function("cube", lambda x: x**3)
+    library = library_of(("cube",), "cart", ())
+    monkeypatch.setattr(features, "_functions", {})
+    for ask in (
+        lambda: library.features(("x",), (True,)),
+        lambda: library.size(("x",), (True,)),
+        lambda: Atom(0, "cube").values(np.zeros((1, 1))),
+    ):
+        with pytest.raises(ConfigError, match=r"call register_function\('cube', ...\) first"):
+            ask()
+
+
+@pytest.mark.parametrize("entry", ["sines", "trig(", "tan", "", "products(x)", "t"])
 def test_an_unknown_kind_is_refused_with_what_there_is(entry: str) -> None:
     with pytest.raises(ConfigError, match="expected 'trig'"):
         library_of((entry,), "cart", ())
@@ -78,6 +108,22 @@ def test_an_entry_may_be_for_one_type_or_one_property() -> None:
     assert library_of(entries, "cart", ()) == Library(("products", "trig"), ("th",))
     assert library_of(entries, "pole", ()) == Library(("trig",), ("th",))
     assert library_of(("trig",), "pole", ("phi",)) == Library(("trig",), ("phi",))
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("crat:trig", r"is for type 'crat'; expected one of \['cart', 'pole'\]"),
+        ("trig(nope)", r"names the properties \['nope'\]; expected some of \['th', 'x'\]"),
+        ("pole:trig(th, nope)", r"\['nope'\]"),
+        ("trgi", "is unknown"),
+    ],
+)
+def test_an_entry_that_would_be_offered_to_nobody_is_refused(entry: str, message: str) -> None:
+    types = {"cart": ("x",), "pole": ("th",)}
+    check_entries(("trig", "trig(th)", "pole:trig(x)", "cart:products"), types)
+    with pytest.raises(ConfigError, match=message):
+        check_entries(("trig", entry), types)
 
 
 def test_features_are_columns_behind_those_that_a_row_holds() -> None:

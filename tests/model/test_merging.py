@@ -11,6 +11,7 @@ from points import formulas, learned, schema_of, transitions
 
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError
+from relgym.model.forgetting import SLACK
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
@@ -79,3 +80,16 @@ def test_only_models_of_one_world_and_configuration_merge(
     halves[1].save(path)
     with pytest.raises(ModelFileError, match="history"):
         one.merge(WorldModel.load(path))
+
+
+def test_memory_stays_bounded_when_two_are_put_together() -> None:
+    bound = 100
+    mine, theirs = (learned(SCHEMA, steps(120, -2.0, 2.0, seed=seed), history=bound) for seed in (0, 1))
+    assert mine.history == theirs.history == 120
+    mine.merge(theirs)
+    assert mine.seen == 240
+    assert mine.history < SLACK * bound
+    assert formulas(mine, "v") == ["v' = v + action.a"]
+    before = mine.history
+    mine.learn_one(steps(1, -2.0, 2.0, seed=9)[0])
+    assert mine.history == before + 1

@@ -99,3 +99,37 @@ class Birds(gym.Env[Any, Any]):
         for row, (x, d) in enumerate(sorted(self.birds, key=lambda bird: abs(bird[0]))):
             table[row] = 1.0, x, d
         return table
+
+
+class Drifter(gym.Env[Any, Any]):
+    """A point in the square [-1, 1]² that each action moves along the first axis; observes it as float32.
+
+    It starts on the unit circle, where `start` says, so that its place could be cosine and sine of an angle. `says`,
+    where it is set, replaces the next observation; `reward` is what every step pays.
+    """
+
+    def __init__(
+        self, start: tuple[float, float] = (-1.0, 0.0), *, length: int = 1000, bound: float = 1.0
+    ) -> None:
+        self.observation_space: spaces.Space[Any] = spaces.Box(-bound, bound, (2,), np.float32)
+        self.action_space: spaces.Space[Any] = spaces.Box(0.0, 0.05, (1,), np.float64)
+        self.start, self.length = start, length
+        self.place = np.zeros(2)
+        self.steps = 0
+        self.says: Any = None
+        self.reward: Any = 0.0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        self.place, self.steps = np.array(self.start), 0
+        return self._seen(), {}
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        self.place[0] = 0.9 * self.place[0] + float(action[0])
+        self.steps += 1
+        return self._seen(), self.reward, False, self.steps >= self.length, {}
+
+    def _seen(self) -> Any:
+        return self.place.astype(np.float32) if self.says is None else self.says

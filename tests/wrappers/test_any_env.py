@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from carts import run
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from plain_envs import Slider, Wheel
 
@@ -220,6 +221,36 @@ def test_the_spec_rebuilds_views_and_options() -> None:
         again = gym.make(env.spec)
         assert again.get_wrapper_attr("view").schema == env.view.schema
         assert again.get_wrapper_attr("view").schema.type("self").properties == ("x", "v")
+    finally:
+        gym.registry.pop("tests/Slider-v0")
+
+
+@pytest.mark.parametrize("angles", ["auto", (), [("c", "s")]])
+def test_the_spec_of_a_view_may_be_written_and_read(angles: Any) -> None:
+    gym.register("tests/Wheel-v0", "plain_envs:Wheel")
+    try:
+        inner = gym.make("tests/Wheel-v0", bound=1.0)
+        view = NumbersView(inner.observation_space, inner.action_space, names=("c", "s"), angles=angles)
+        env = ModelLearner(inner, view=TaskView(view), config={"features": ("trig",)}, targets=None)
+        assert env.spec is not None
+        again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+        for learner in (env, again):
+            learner.reset(seed=0)
+        assert again.get_wrapper_attr("view").schema == env.view.schema
+        assert again.get_wrapper_attr("model").config == env.model.config
+        assert again.get_wrapper_attr("view") is not env.view
+    finally:
+        gym.registry.pop("tests/Wheel-v0")
+
+
+def test_a_view_made_of_a_function_stays_an_object_in_the_spec() -> None:
+    gym.register("tests/Slider-v0", Slider)
+    try:
+        eye = SceneSchema((ObjectType("eye", ("sum",)),), (("eye", "eye"),))
+        view = FunctionView(eye, lambda seen, info: {"eye": [info["limit"]]}, PUSHES)
+        env = ModelLearner(gym.make("tests/Slider-v0"), view=view)
+        assert env.spec is not None
+        assert gym.make(env.spec).get_wrapper_attr("view").schema == env.view.schema
     finally:
         gym.registry.pop("tests/Slider-v0")
 

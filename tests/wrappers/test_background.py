@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import copy
+import os
+import signal
 from typing import Any
 
 import numpy as np
 import pytest
 from carts import run
+from gymnasium.vector import SyncVectorEnv
 from plain_envs import Slider
 
+from relgym.clustering.features import register_function
 from relgym.envs.views import NumbersView
 from relgym.errors import ConfigError, ObservationError, RelgymError
 from relgym.scene.objects import Transition
-from relgym.wrappers import ModelLearner
-from relgym.wrappers.background import Background
+from relgym.wrappers import ModelLearner, VectorModelLearner
+from relgym.wrappers.background import Background, _registered
 
 
 def view_of_slider(observation_space: Any, action_space: Any) -> NumbersView:
@@ -54,12 +58,12 @@ def test_parcels_lose_nothing_and_what_waits_is_bounded() -> None:
     for _ in range(20):
         assert background.put(Transition(scene, scene))
     assert background.fetch()[0].seen == 20  # the last parcel isn't full
-    background._process.terminate()
-    background._process.join()
+    os.kill(background._process.pid, signal.SIGSTOP)  # it lives, and learns nothing
     taken = [background.put(Transition(scene, scene)) for _ in range(420)]
     assert (background.sent, background.dropped) == (20 + sum(taken), 420 - sum(taken))
     assert 390 <= sum(taken) <= 400
     assert taken == sorted(taken, reverse=True)
+    os.kill(background._process.pid, signal.SIGCONT)
     background.close()
 
 
@@ -84,11 +88,109 @@ def test_a_process_that_died_is_reported() -> None:
         ModelLearner(Slider(), background=0)
 
 
-def test_closing_over_a_dead_process_says_so_and_ends_it() -> None:
-    env = ModelLearner(Slider(), background=10)
-    background: Any = env._observer.study._background
-    background._process.terminate()
-    background._process.join()
+class Closing(Slider):
+    closed = False
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def killed(env: Any) -> None:
+    process = env._observer.study._background._process
+    process.terminate()
+    process.join()
+
+
+def test_closing_over_a_dead_process_says_so_and_closes_all() -> None:
+    inner = Closing()
+    env = ModelLearner(inner, background=10)
+    killed(env)
     with pytest.raises(RelgymError, match="the learning process has ended"):
         env.close()
+    assert inner.closed
     env.close()  # nothing is left to end
+    inner.closed = False
+    envs = VectorModelLearner(SyncVectorEnv([lambda: inner]), background=10)
+    killed(envs)
+    with pytest.raises(RelgymError, match="the learning process has ended"):
+        envs.close()
+    assert inner.closed
+
+
+def test_a_dead_process_ends_acting_in_vain() -> None:
+    """Not from the first step on where several are sent at a time, but soon."""
+    env = ModelLearner(Slider(), background=400)
+    run(env, 10)
+    killed(env)
+    with pytest.raises(RelgymError, match=r"the learning process has ended.*close\(\) goes on without it"):
+        run(env, 10)
+    assert env.dropped == 0
+    with pytest.raises(RelgymError):
+        env.close()
+    run(env, 5)  # in the foreground
+    assert env.model.seen == 5
+
+
+def test_what_makes_learning_fail_is_said_soon() -> None:
+    model = ModelLearner(Slider()).model
+    bad = model.schema.scene({"self": [0.0, 0.0], "action": [0.0]})
+    bad.vector.flags.writeable = True
+    bad.vector[0] = np.nan
+    background = Background(model, None, queue=10)
+    assert background.put(Transition(bad, bad))
+    assert background._answers.poll(60.0)
+    for _ in range(2):
+        with pytest.raises(ObservationError, match="got nan"):
+            background.put(Transition(bad, bad))
+    assert (background.sent, background.dropped) == (1, 0)
+    background.close()
+
+
+def test_what_was_dropped_is_known_after_the_end() -> None:
+    env = ModelLearner(Slider(), background=1)
+    run(env, 100)
+    env.catch_up()
+    dropped = env.dropped
+    env.close()
+    assert env.dropped == dropped > 0
+    assert env.model.seen + env.dropped == 100
+
+
+def test_nothing_is_sent_while_learning_is_paused() -> None:
+    env = ModelLearner(Slider(), background=100)
+    run(env, 10)
+    env.pause()
+    run(env, 10)
+    env.close()
+    assert (env.model.seen, env.prequential.steps) == (10, 10)
+
+
+# ---------------------------------------------------------------------- functions of the user's
+def halved(x: Any) -> Any:
+    return x / (1.0 + np.abs(x))
+
+
+def test_registered_functions_are_known_in_the_background() -> None:
+    register_function("halved", halved)
+    here, there = (
+        ModelLearner(Slider(), config={"features": ("halved",)}, background=queue) for queue in (None, 1000)
+    )
+    run(here, 40)
+    run(there, 40)
+    assert there.catch_up().to_json(history=True) == here.model.to_json(history=True)
+    there.close()
+
+
+def test_functions_that_no_process_can_be_sent_are_refused() -> None:
+    register_function("local", lambda x: x)
+    with pytest.raises(ConfigError, match=r"\['local'\] can't be sent.*top level.*background=None"):
+        ModelLearner(Slider(), config={"features": ("local",)}, background=10)
+    assert ModelLearner(Slider(), config={"features": ("local",)}).model.seen == 0
+    assert ModelLearner(Slider(), config={"features": ("trig",)}).model.seen == 0
+
+
+def test_a_function_that_another_process_cannot_find_is_reported() -> None:
+    trouble = _registered(b"cno_such_module\nf\n.")
+    assert isinstance(trouble, ConfigError)
+    with pytest.raises(ConfigError, match=r"outside of `if __name__ == '__main__':`"):
+        raise trouble

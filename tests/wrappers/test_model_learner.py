@@ -20,6 +20,7 @@ from relgym.errors import ActionError, ConfigError, ObservationError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Target
 from relgym.wrappers import ModelLearner
+from relgym.wrappers.study import NOTHING
 
 HALF = np.array([0.5], np.float32)
 
@@ -162,15 +163,39 @@ def test_the_current_scene_is_at_hand() -> None:
 
 
 # ---------------------------------------------------------------------- bad input
-@pytest.mark.parametrize("action", [[1.5], [np.nan], [0.0, 0.0], "left"])
-def test_an_illegal_action_changes_neither_env_nor_model(action: Any) -> None:
+def test_an_action_that_the_env_refuses_changes_nothing() -> None:
     env = learned()
     v, before = cart(env).v, everything(env.model)
-    with pytest.raises(ActionError, match="expected"):
-        env.step(action)
-    assert cart(env).v == v
+    with pytest.raises(ValueError, match="could not convert string"):  # the env's own words
+        env.step("left")
+    assert (cart(env).v, env.skipped) == (v, 0)
     assert everything(env.model) == before
     env.step(HALF)  # the episode goes on
+    assert env.model.seen == 101
+    pushed = ModelLearner(gym.make("relgym/TruckPush-v0"))
+    pushed.reset(seed=0)
+    with pytest.raises(ActionError, match="within"):
+        pushed.step([2.0, 0.0])
+    assert pushed.model.seen == 0
+
+
+def test_an_action_outside_its_space_that_the_env_takes_is_learned_from_as_it_was_given() -> None:
+    env = learned()
+    v = cart(env).v
+    report = env.step([1.5])[4]["relgym"]
+    assert cart(env).v == pytest.approx(0.9 * v + 0.1 * 12.5)
+    assert report.learned is not None and not report.wrong
+    assert (env.model.seen, env.skipped) == (101, 0)
+
+
+def test_an_action_that_the_view_cannot_read_teaches_nothing_and_is_counted() -> None:
+    env = learned()
+    v, before = cart(env).v, everything(env.model)
+    assert env.step([0.0, 0.0])[4]["relgym"] is NOTHING
+    assert cart(env).v == pytest.approx(0.9 * v + 0.5)
+    assert everything(env.model) == before
+    assert env.skipped == 1
+    env.step(HALF)
     assert env.model.seen == 101
 
 

@@ -12,7 +12,7 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from plain_envs import Slider, Wheel
 
 from relgym.envs.views import FunctionView, NumbersView
-from relgym.errors import ActionError, ConfigError, ObservationError
+from relgym.errors import ConfigError, ObservationError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, SceneSchema, Transition
 from relgym.wrappers import ModelLearner, VectorModelLearner
@@ -135,8 +135,10 @@ def test_a_bad_observation_of_one_env_is_no_excuse_for_leaps_of_the_others() -> 
     envs.reset(seed=0)
     second: Any = envs.env.unwrapped.envs[1]  # type: ignore[attr-defined]
     second.says = np.array([np.nan, 0.0])
-    with pytest.raises(ObservationError, match="'x0': expected a finite number, got nan"):
+    before = envs.model.to_json(history=True)
+    with pytest.raises(ObservationError, match=r"^env 1: .*'x0': expected a finite number, got nan"):
         envs.step(np.zeros((N, 1)))
+    assert envs.model.to_json(history=True) == before  # nor was the first env's step learned
     second.says = None
     seen = envs.model.seen
     with pytest.raises(gym.error.ResetNeeded):
@@ -162,9 +164,32 @@ def test_what_is_no_vector_env_is_refused() -> None:
         VectorModelLearner(silent)
 
 
-def test_illegal_actions_change_nothing() -> None:
-    envs = VectorModelLearner(sliders(AutoresetMode.NEXT_STEP))
+def test_the_last_observation_of_an_episode_may_be_bad_too() -> None:
+    class Broken(Slider):
+        def step(self, action: Any) -> Any:
+            seen, reward, terminated, truncated, info = super().step(action)
+            return (seen * np.nan if truncated else seen), reward, terminated, truncated, info
+
+    envs = VectorModelLearner(
+        SyncVectorEnv(
+            [lambda: Slider(length=9), lambda: Broken(length=2)], autoreset_mode=AutoresetMode.SAME_STEP
+        )
+    )
     envs.reset(seed=0)
-    with pytest.raises(ActionError):
-        envs.step(np.full((N, 1), 2.0))
-    assert envs.env.unwrapped.envs[0].steps == 0  # type: ignore[attr-defined]
+    envs.step(np.zeros((2, 1)))
+    with pytest.raises(ObservationError, match=r"^env 1: "):
+        envs.step(np.zeros((2, 1)))
+    assert envs.model.seen == 2
+
+
+def test_actions_outside_their_space_are_learned_from_as_they_were_given() -> None:
+    envs = VectorModelLearner(sliders(AutoresetMode.NEXT_STEP), view=view_of_slider)
+    envs.reset(seed=0)
+    kept = record(envs)
+    envs.step(np.full((N, 1), 2.0))
+    assert envs.env.unwrapped.envs[0].steps == 1  # type: ignore[attr-defined]
+    assert [transition.before["action"]["a"] for transition in kept] == [2.0] * N
+    for transition in kept:
+        assert transition.after["self"]["v"] == 0.8 * transition.before["self"]["v"] + 1.0
+    envs.step(np.ones((N, 2)))
+    assert (envs.model.seen, envs.skipped) == (N, N)

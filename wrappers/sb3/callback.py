@@ -7,18 +7,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize, unwrap_vec_wrapper
 
 from relgym.config import ModelConfig
-from relgym.envs.arguments import checked_actions, checked_count
+from relgym.envs.arguments import checked_count
+from relgym.envs.views import Angle
 from relgym.errors import ConfigError
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.follower import BadObservations
-from relgym.wrappers.observer import Observer
+from relgym.wrappers.observer import First, Observer, Step
 from relgym.wrappers.prequential import Prequential
 from relgym.wrappers.settings import PlainTarget
-from relgym.wrappers.views import ViewLike, chosen_view
+from relgym.wrappers.views import ViewLike, chosen_view, readable
 
 __all__ = ["ModelCallback"]
 
@@ -33,7 +35,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
 
     Parameters
     ----------
-    view, targets, config, predict, learn_reward, learn_termination, bad_observations, model, window
+    view, targets, config, learn, predict, learn_reward, learn_termination, bad_observations, model, window
         As of `relgym.wrappers.ModelLearner`.
     background
         Learn in a process of its own, behind a queue of at most this many transitions: where learning takes longer
@@ -69,6 +71,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
         view: ViewLike = None,
         targets: Sequence[PlainTarget] | None = None,
         config: ModelConfig | Mapping[str, Any] | None = None,
+        learn: bool = True,
         predict: bool = True,
         learn_reward: bool = False,
         learn_termination: bool = False,
@@ -91,6 +94,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
             "model": model,
             "window": window,
         }
+        self._learning = learn
         self._log_every = checked_count("log_every", log_every, 1, 10**9)
         self._observer: Observer | None = None
         self._normalised: VecNormalize | None = None
@@ -103,7 +107,9 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
             spaces_of = (_space(self._normalised, env.observation_space), env.action_space)
             reward, ended = self._task
             view = chosen_view(self._view, *spaces_of, schema=_schema(env), reward=reward, terminated=ended)
-            self._observer = Observer(view, *spaces_of, envs=env.num_envs, **self._arguments)
+            self._observer = Observer(
+                view, *spaces_of, envs=env.num_envs, learn=self._learning, **self._arguments
+            )
         elif len(self._observer.followers) != env.num_envs:
             raise ConfigError(
                 f"this callback has followed {len(self._observer.followers)} envs, now there are {env.num_envs}: "
@@ -115,31 +121,26 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
     def _on_step(self) -> bool:
         dones, infos = self.locals["dones"], self.locals["infos"]
         actions = self.locals.get("clipped_actions", self.locals["actions"])
-        actions = checked_actions(self.training_env.action_space, actions, len(dones))
-        seen = self._single(self.locals["new_obs"])
         rewards = self.locals["rewards"]
         if self._normalised is not None:
             rewards = self._normalised.get_original_reward()
-        for k in range(len(dones)):
-            self._take_up(k, actions[k], seen[k], float(rewards[k]), bool(dones[k]), infos[k])
+        space, begun = self.training_env.action_space, self.training_env.unwrapped.reset_infos
+        steps: dict[int, Step] = {}
+        firsts: dict[int, First] = {}
+        for k, seen in enumerate(self._single(self.locals["new_obs"])):
+            done = bool(dones[k])
+            last = self._last(infos[k]) if done else seen
+            terminated = done and not infos[k].get("TimeLimit.truncated", False)
+            steps[k] = Step(readable(space, actions[k]), last, infos[k], rewards[k], terminated)
+            if done:
+                firsts[k] = (seen, begun[k])
+        self.observer.follow_all(steps, firsts)
         if self.n_calls % self._log_every == 0:
             self._log()
         return True
 
     def _on_training_end(self) -> None:
         self._log()
-
-    def _take_up(
-        self, k: int, action: Any, observation: Any, reward: float, done: bool, info: dict[str, Any]
-    ) -> None:
-        observer, follower = self.observer, self.observer.followers[k]
-        before = follower.act(action)
-        prediction = observer.expect(before)
-        last = self._last(info) if done else observation
-        terminated = done and not info.get("TimeLimit.truncated", False)
-        observer.follow(k, before, prediction, last, info, reward=reward, terminated=terminated)
-        if done:
-            observer.begin({k: (observation, self.training_env.unwrapped.reset_infos[k])})
 
     def _last(self, info: dict[str, Any]) -> Any:
         """The episode's true last observation, as the env said it."""
@@ -179,9 +180,34 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
         return self.observer.study.prequential
 
     @property
+    def learning(self) -> bool:
+        """Whether transitions are being learned from; as of `relgym.wrappers.ModelLearner`."""
+        return self._learning
+
+    @learning.setter
+    def learning(self, learn: bool) -> None:
+        if self._observer is not None:
+            self._observer.learning = learn
+        self._learning = learn
+
+    def pause(self) -> None:
+        """Stop learning, while training goes on; ``learning = True`` goes on."""
+        self.learning = False
+
+    @property
+    def skipped(self) -> int:
+        """How many bad observations, and steps with actions that can't be read, were left out."""
+        return 0 if self._observer is None else self._observer.skipped
+
+    @property
     def dropped(self) -> int:
-        """How many transitions found the queue to the background process full."""
-        return self.observer.study.dropped
+        """How many transitions found the queue to the background process full; kept after `close`."""
+        return 0 if self._observer is None else self._observer.dropped
+
+    @property
+    def withdrawn(self) -> tuple[Angle, ...]:
+        """Guessed angles that were none, so that learning began anew; as of `relgym.wrappers.ModelLearner`."""
+        return () if self._observer is None else self._observer.withdrawn
 
     def catch_up(self) -> WorldModel:
         """Wait until the background process has learned all it was sent; the model as it then is."""
@@ -196,7 +222,10 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
         self.observer.close()
 
     def _log(self) -> None:
-        study = self.observer.study
+        try:
+            study = self.observer.study
+        except ResetNeeded:  # nothing but bad observations so far
+            return
         world = study.model
         modes = sum(len(world.modes(t.type, t.property)) for t in world.targets)
         self.logger.record("relgym/transitions", world.seen)

@@ -61,6 +61,9 @@ def test_optional_objects_come_and_go() -> None:
             "'ball', property 'vy': expected a finite number, got inf",
         ),
         ([1.0], "returned list"),
+        ({"ball": "hello", "paddle": [1.0]}, r"'ball' of type 'ball': expected 2 numbers .* got 'hello'"),
+        ({"ball": [1.0, "a"], "paddle": [1.0]}, r"expected 2 numbers .* got \[1.0, 'a'\]"),
+        ({"ball": {"y": None, "vy": 1.0}, "paddle": [1.0]}, "'ball', property 'y': .* got nan"),
     ],
 )
 def test_what_is_wrong_is_named_with_a_remedy(seen: Any, message: str) -> None:

@@ -158,6 +158,38 @@ def test_angles_of_float32_numbers_show_their_precision() -> None:
     assert flat().precision == 0.0
 
 
+def test_a_guess_is_taken_back_when_an_observation_refutes_it() -> None:
+    view = flat(PAIR).settled([np.array([-1.0, 0.0], np.float32)])
+    assert view.angles == (Angle("x0", "x1"),)
+    for no_news in (np.array([0.6, 0.8], np.float32), np.array([np.nan, 0.0]), np.zeros(3), None):
+        assert view.upheld(no_news) is view
+    plain = view.upheld(np.array([-0.9, 0.0], np.float32))
+    assert plain.schema.type("self").properties == ("x0", "x1")
+    assert plain.upheld(np.array([0.1, 0.1], np.float32)) is plain
+    assert not plain.open  # it isn't guessed again
+
+
+def test_another_guess_that_was_as_good_takes_its_place() -> None:
+    """Of (1, 0, 1) either pair may be an angle; the first one moves off the circle, the second doesn't."""
+    view = flat(spaces.Box(-1.0, 1.0, (3,), np.float64)).settled([np.array([1.0, 0.0, 1.0])])
+    assert view.angles == (Angle("x0", "x1"),)
+    turned = np.array([1.0, 0.6, 0.8])
+    assert view.upheld(turned).angles == (Angle("x1", "x2"),)
+    assert view.upheld(turned).upheld(np.array([1.0, 0.6, 0.6])).angles == ()
+
+
+def test_declared_angles_are_no_guess() -> None:
+    view = flat(PAIR, angles=[("x0", "x1")])
+    assert view.upheld(np.array([0.5, 0.5], np.float32)) is view
+
+
+def test_what_is_no_observation_settles_nothing() -> None:
+    view = flat(PAIR)
+    assert view.settled([np.full(2, np.nan), np.zeros(3)]) is view
+    assert view.open
+    assert view.settled([np.full(2, np.nan), np.array([0.6, 0.8])]).angles == (Angle("x0", "x1"),)
+
+
 def test_an_angle_that_leaves_the_circle_was_none() -> None:
     view = flat(PAIR).settled([np.array([1.0, 0.0], np.float32)])
     assert view.angles

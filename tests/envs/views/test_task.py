@@ -9,7 +9,7 @@ import pytest
 from gymnasium import spaces
 
 from relgym.envs.views import NumbersView, TaskView, view_from_json
-from relgym.errors import ConfigError
+from relgym.errors import ConfigError, ObservationError
 
 VIEW = NumbersView(spaces.Box(-9.0, 9.0, (2,), np.float64), spaces.Discrete(2))
 SEEN = np.array([1.0, 2.0])
@@ -25,6 +25,22 @@ def test_what_a_step_brings_is_unknown_before_it() -> None:
     assert (after["task"]["reward"], after["task"]["terminated"]) == (-2.5, 1.0)
     assert view.with_action(after, 0)["task"].values.tolist() == [0.0, 0.0]
     np.testing.assert_array_equal(view.observation(after), SEEN)
+
+
+@pytest.mark.parametrize("reward", [float("nan"), None, "much", np.array([1.0, 2.0]), np.zeros(0)])
+def test_a_reward_that_is_no_number_is_bad_only_where_it_is_shown(reward: object) -> None:
+    scene = TaskView(VIEW).scene(SEEN)
+    with pytest.raises(
+        ObservationError, match=r"the reward: expected a finite number.*leave out learn_reward"
+    ):
+        TaskView(VIEW).with_outcome(scene, reward, False)
+    view = TaskView(VIEW, reward=False)
+    assert view.with_outcome(view.scene(SEEN), reward, True)["task"].values.tolist() == [1.0]
+
+
+def test_a_reward_may_be_an_array_of_one_number() -> None:
+    view = TaskView(VIEW)
+    assert view.with_outcome(view.scene(SEEN), np.array([2.5], np.float32), False)["task"]["reward"] == 2.5
 
 
 def test_either_may_be_left_out() -> None:

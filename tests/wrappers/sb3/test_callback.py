@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plain_envs import Slider
+from plain_envs import Drifter, Slider
 
-from relgym.envs.views import NumbersView
-from relgym.errors import ConfigError
+from relgym.envs.views import Angle, NumbersView
+from relgym.errors import ConfigError, ObservationError
 
 pytestmark = pytest.mark.sb3
 
@@ -114,3 +114,44 @@ def test_a_vec_env_that_hides_last_observations_is_refused() -> None:
 
     with pytest.raises(ConfigError, match=r"without infos\['terminal_observation'\]"):
         algorithm("PPO", Forgetful(vec_env())).learn(32, callback=callback())
+
+
+def drifters(n: int = 2) -> Any:
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    return DummyVecEnv([lambda: Monitor(Drifter(length=9)) for _ in range(n)])
+
+
+def test_a_guessed_angle_that_is_none_ends_no_training() -> None:
+    watch = callback()
+    assert (watch.withdrawn, watch.skipped, watch.dropped) == ((), 0, 0)
+    algorithm("PPO", drifters()).learn(64, callback=watch)
+    assert watch.withdrawn == (Angle("x0", "x1"),)
+    assert watch.world.seen == 62  # all but the step of both envs that refuted it
+    assert watch.world.property_model("self", "x0").clusterer.noise_examples == 0
+
+
+def test_learning_may_be_paused_while_training_goes_on() -> None:
+    watch = callback(view=view_of_slider)
+    watch.pause()
+    agent = algorithm("PPO", vec_env())
+    agent.learn(32, callback=watch)
+    assert (watch.learning, watch.world.seen) == (False, 0)
+    watch.learning = True
+    agent.learn(32, callback=watch, reset_num_timesteps=False)
+    assert watch.world.seen == 32
+
+
+def test_bad_observations_of_one_env_are_skipped_or_name_it() -> None:
+    def broken() -> Any:
+        env = vec_env()
+        env.envs[1].unwrapped.says = np.array([np.nan, 0.0])
+        return env
+
+    watch = callback(bad_observations="skip")
+    with pytest.raises(ValueError, match="nan"):  # what the policy makes of it
+        algorithm("PPO", broken()).learn(32, callback=watch)
+    assert watch.skipped == 1
+    with pytest.raises(ObservationError, match=r"^env 1: .*got nan"):
+        algorithm("PPO", broken()).learn(32, callback=callback())

@@ -1,0 +1,73 @@
+"""The guides' code runs as it stands, from top to bottom, and prints what they say it prints."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+from itertools import pairwise
+from pathlib import Path
+from types import CodeType
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+GUIDE = (ROOT / "docs" / "guides" / "your-own-env.md").read_text(encoding="utf-8")
+BLOCKS: list[tuple[str, str]] = re.findall(r"^```(\w+)\n(.*?)^```$", GUIDE, re.DOTALL | re.MULTILINE)
+SNIPPETS = [(code, text) for (kind, code), (_, text) in pairwise(BLOCKS) if kind == "python"]
+SCRIPTS = [(line.split()[1:], text) for (kind, line), (_, text) in pairwise(BLOCKS) if kind == "bash"]
+
+
+def defined_in(code: str) -> CodeType:
+    """The imports and definitions among it."""
+    kept = [part for part in ast.parse(code).body if isinstance(part, _DEFINITIONS)]
+    return compile(ast.Module(kept, []), "the guide", "exec")
+
+
+_DEFINITIONS = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.ClassDef)
+
+
+def assert_shown(text: str, printed: str) -> None:
+    """All of it, but for what a line with an ellipsis stands for."""
+    parts = re.split(r"^…\n", text, flags=re.MULTILINE)
+    assert all(part.strip() for part in parts[1:-1])
+    pattern = ".*?".join(re.escape(part) for part in parts)
+    assert re.fullmatch(pattern, printed, re.DOTALL), f"the guide shows\n{text}\nand this came:\n{printed}"
+
+
+def test_every_output_has_code_that_printed_it() -> None:
+    kinds = [kind for kind, _ in BLOCKS]
+    assert set(kinds) == {"python", "bash", "text"}
+    for kind, following in zip(kinds, [*kinds[1:], ""], strict=True):
+        assert (kind == "text") != (following == "text")
+
+
+def test_what_is_left_out_and_what_is_not() -> None:
+    assert_shown("a\n…\nc\n", "a\nb\nc\n")
+    assert_shown("…\nb\n…\n", "a\nb\nc\n")
+    for text in ("a\nc\n", "b\n…\n", "…\nb\n", "a\n…\nb\n"):
+        with pytest.raises(AssertionError):
+            assert_shown(text, "a\nb\nc\n")
+
+
+@pytest.mark.parametrize("number", range(len(SNIPPETS)))
+def test_the_code_of_the_guide(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With what the code above it has imported and defined."""
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "__main__"}
+    for code, _ in SNIPPETS[:number]:
+        exec(defined_in(code), names)
+    code, text = SNIPPETS[number]
+    exec(code, names)
+    assert_shown(text, capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(("script", "text"), SCRIPTS, ids=[script[0] for script, _ in SCRIPTS])
+def test_the_examples_of_the_guide(
+    script: list[str], text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", script)
+    runpy.run_path(str(ROOT / script[0]), run_name="__main__")
+    assert_shown(text, capsys.readouterr().out)
