@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
+from relgym.clustering.mode import NOISE
 from relgym.scene.objects import ACTION
 
 __all__ = ["Spread", "Spreads", "measure"]
@@ -24,18 +25,35 @@ __all__ = ["Spread", "Spreads", "measure"]
 ROWS = 2_000
 """At most this many examples of a mode, the newest, are measured."""
 
-FEW_ACTIONS, LEAST = 8, 8
-"""More different actions than this are no choice among a few; fewer examples of one say nothing of its spread."""
+FEW_ACTIONS, LEAST = 64, 8
+"""More different actions than this aren't told apart; fewer examples of one say nothing of its spread."""
+
+RECURRING = 0.5
+"""At most so many different actions an example: a choice among many, and not a number that is hardly ever the same."""
+
+TYPICAL = 0.6745
+"""Median of a normal variable's size, in standard deviations."""
 
 _Action = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Standard deviations of residuals, in units of the target: over all, and by action where there are few."""
+    """Standard deviations of residuals, in units of the target.
+
+    Attributes
+    ----------
+    whole
+        Over all examples.
+    by_action
+        By action, where an agent chooses among a few.
+    pooled
+        Whether it chooses among more than are told apart: what holds over all may hold after none.
+    """
 
     whole: float
     by_action: dict[_Action, float] = field(default_factory=dict)
+    pooled: bool = False
 
     def uneven(self, factor: float = 3.0) -> bool:
         """Whether some action scatters so many times as much as another one."""
@@ -68,7 +86,12 @@ class Spreads:
     def to_json(self) -> list[Any]:
         """Plain data that `from_json` reads back."""
         return [
-            [mode, s.whole, [[list(action), value] for action, value in s.by_action.items()]]
+            [
+                mode,
+                s.whole,
+                [[list(action), value] for action, value in s.by_action.items()],
+                *([True] if s.pooled else []),
+            ]
             for mode, s in sorted(self.by_mode.items())
         ]
 
@@ -77,8 +100,10 @@ class Spreads:
         """Read what `to_json` wrote."""
         return cls(
             {
-                int(mode): Spread(float(whole), {tuple(map(float, a)): float(v) for a, v in by_action})
-                for mode, whole, by_action in data
+                int(mode): Spread(
+                    float(whole), {tuple(map(float, a)): float(v) for a, v in by_action}, bool(pooled)
+                )
+                for mode, whole, by_action, *pooled in data
             }
         )
 
@@ -86,13 +111,57 @@ class Spreads:
 def measure(clusterer: ModeClusterer, table: ExampleTable) -> Spreads:
     """Measure all modes of a target. Cost: O(modes) evaluations of at most `ROWS` rows each."""
     found: dict[int, Spread] = {}
+    own: dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
     for number, cluster in sorted(clusterer.clusters.items()):
         members = np.flatnonzero(clusterer.labels == number)[-ROWS:]
         rows = clusterer.rows[members]
-        if len(members):
-            error, _ = cluster.errors(table, rows, clusterer.y[members], clusterer.scale)
-            found[number] = Spread(_size(error), _by_action(error, _actions(table, rows)))
+        if not len(members):
+            continue
+        error, _ = cluster.errors(table, rows, clusterer.y[members], clusterer.scale)
+        actions = _actions(table, rows)
+        found[number] = Spread(_size(error), *_by_action(error, actions))
+        if found[number].by_action and actions is not None:
+            own[number] = error, actions
+    for number, (error, rows) in _left_over(clusterer, table, list(own)).items():
+        after = _actions(table, rows)
+        if after is not None and after.shape[1] == own[number][1].shape[1]:
+            found[number].by_action.update(_loud(*own[number], error, after))
     return Spreads(found)
+
+
+def _left_over(
+    clusterer: ModeClusterer, table: ExampleTable, modes: Sequence[int]
+) -> dict[int, tuple[NDArray[np.float64], NDArray[np.int64]]]:
+    """Errors and rows of the newest noise, by the mode that comes closest."""
+    noise = np.flatnonzero(clusterer.labels == NOISE)[-ROWS:]
+    if not modes or not len(noise):
+        return {}
+    rows = clusterer.rows[noise]
+    every = sorted(clusterer.clusters)
+    errors = np.stack(
+        [clusterer.clusters[k].errors(table, rows, clusterer.y[noise], clusterer.scale)[0] for k in every]
+    )
+    least = errors.argmin(axis=0)
+    parts = {k: (least == every.index(k)) & np.isfinite(errors.min(axis=0)) for k in modes}
+    return {k: (errors[every.index(k), part], rows[part]) for k, part in parts.items() if part.any()}
+
+
+def _loud(
+    error: NDArray[np.float64],
+    actions: NDArray[np.float64],
+    left: NDArray[np.float64],
+    after: NDArray[np.float64],
+) -> dict[_Action, float]:
+    """Spreads after actions that throw most examples beyond the tolerance, where a mode's own are but the least off.
+
+    A median, since some of what is left over may be of other modes that nobody knows yet.
+    """
+    found = {}
+    for kind in np.unique(after, axis=0):
+        own, beyond = error[(actions == kind).all(axis=1)], left[(after == kind).all(axis=1)]
+        if len(beyond) >= LEAST and len(beyond) > len(own):
+            found[tuple(kind.tolist())] = float(np.median(np.concatenate([own, beyond]))) / TYPICAL
+    return found
 
 
 def action_columns(signature: SlotSignature) -> NDArray[np.intp]:
@@ -108,21 +177,31 @@ def action_columns(signature: SlotSignature) -> NDArray[np.intp]:
 
 
 def _actions(table: ExampleTable, rows: NDArray[np.int64]) -> NDArray[np.float64] | None:
-    """Actions of some rows, shape ``(n, components)``; None if the rows don't agree on where they stand."""
-    signatures = np.unique(table.signature_ids[rows])
-    if len(signatures) != 1:
+    """Actions of some rows, shape ``(n, components)``; None if they haven't as many components everywhere."""
+    ids = table.signature_ids[rows]
+    # Where the action's columns lie depends on which objects are there.
+    places = {k: action_columns(table.signatures[k]) for k in np.unique(ids).tolist()}
+    width = {len(columns) for columns in places.values()}
+    if len(width) != 1:
         return None
-    return table.x[rows][:, action_columns(table.signatures[int(signatures[0])])]
+    actions = np.empty((len(rows), width.pop()))
+    for k, columns in places.items():
+        part = np.flatnonzero(ids == k)
+        actions[part] = table.x[np.ix_(rows[part], columns)]
+    return actions
 
 
-def _by_action(error: NDArray[np.float64], actions: NDArray[np.float64] | None) -> dict[_Action, float]:
+def _by_action(
+    error: NDArray[np.float64], actions: NDArray[np.float64] | None
+) -> tuple[dict[_Action, float], bool]:
+    """Spreads by action, and whether there were too many actions, though they recur, for that."""
     if actions is None or not actions.shape[1]:
-        return {}
+        return {}, False
     kinds, which = np.unique(actions, axis=0, return_inverse=True)
     if not 1 < len(kinds) <= FEW_ACTIONS:
-        return {}
+        return {}, FEW_ACTIONS < len(kinds) <= RECURRING * len(error)
     parts = [(tuple(kind), error[which.reshape(-1) == k]) for k, kind in enumerate(kinds.tolist())]
-    return {kind: _size(part) for kind, part in parts if len(part) >= LEAST}
+    return {kind: _size(part) for kind, part in parts if len(part) >= LEAST}, False
 
 
 def _size(error: NDArray[np.float64]) -> float:
