@@ -106,6 +106,7 @@ class _Trial:
     left: float
     law: str
     size: int
+    bare: bool = False  # whether the law needs none of the features
 
 
 def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
@@ -139,6 +140,10 @@ def _lacks(model: PropertyModel, table: ExampleTable) -> Advice | None:
     if not good and not known.issuperset(LAST_RESORT):
         trials.append(_try(model, table, recent, LAST_RESORT))
     best = _choose([t for t in trials if t is not None], left)
+    if best is not None and best.bare:
+        if clusterer.clusters and best.left <= GOOD and not undecided:
+            return None  # the law is of the form that it has, and what it leaves is noise
+        best = None
     if best is not None and (best.left <= GOOD or not covered):
         return Advice(str(model.target), noise, left, best.features, best.law, best.left)
     if noise <= UNEXPLAINED and not clusterer.approximate and not undecided:
@@ -168,11 +173,14 @@ def advices(parts: Parts) -> tuple[Advice, ...]:
 
 
 def _choose(trials: Iterable[_Trial], left: float) -> _Trial | None:
-    """The smallest library that is as good as the best one, if that is better than what there is."""
+    """The smallest library that is as good as the best one, if that is better than what there is.
+
+    One whose law needs no features goes first.
+    """
     trials = list(trials)
     least = min((t.left for t in trials), default=1.0)
     good = [t for t in trials if t.left <= max((EQUAL if least <= GOOD else CLOSE) * least, _EXACT)]
-    return min(good, key=lambda t: t.size) if least <= BETTER * left else None
+    return min(good, key=lambda t: (not t.bare, t.size)) if least <= BETTER * left else None
 
 
 def _try(
@@ -208,7 +216,8 @@ def _try(
         (w, slots.named(int(order[c]))) for c, w in zip(found.fit.columns, found.fit.weights, strict=True)
     ]
     law = f"{model.target.property}' = {sum_text(text, found.fit.intercept, 4)}"
-    return _Trial(kinds, found.sigma / change, law, len(order))
+    bare = all(order[c] < len(slots.columns) for c in found.fit.columns)
+    return _Trial(kinds, found.sigma / change, law, len(order), bare)
 
 
 def _present(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> NDArray[np.float64]:
