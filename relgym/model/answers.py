@@ -24,7 +24,7 @@ from relgym.model.hindsight import Hindsight
 from relgym.model.limits import Limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
-from relgym.model.spread import Spreads, action_columns
+from relgym.model.spread import Spreads
 from relgym.model.stops import Stops
 
 __all__ = ["Answers"]
@@ -210,8 +210,7 @@ class Answers(ModeFunctions):
             outcome = Outcome.UNEXPLAINED if self.undecided else Outcome.PREDICTED
             found = Prediction("", "", binding.value(x, slots), outcome, mode, roles, margin)
             found = self._stopped(self.limits.cut_off(found), situation.signature, row)
-            action = tuple(x[k] for k in action_columns(situation.signature).tolist())
-            return replace(found, spread=self.spreads.of(found.mode, action))
+            return replace(found, spread=self.spreads.at(found.mode, situation.signature, x))
         return replace(nothing, outcome=Outcome.NO_ROLES)
 
     def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
@@ -271,7 +270,7 @@ class Answers(ModeFunctions):
         binding = self._binding(signature, mode)
         if binding is None or binding.open:
             return Prediction("", "", float("nan"), Outcome.OUTSIDE)
-        spread = self.spreads.of(mode, tuple(x[k] for k in action_columns(signature).tolist()))
+        spread = self.spreads.at(mode, signature, x)
         return Prediction("", "", binding.value(x), Outcome.OUTSIDE, spread=spread)
 
     def _lean(

@@ -63,8 +63,8 @@ class Prediction:
         (`relgym.laws.frames`), and then the roles are the target and all that it touches.
     spread
         Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
-        among a few) left, in units of the property; of a stopgap what it left there; NaN where the property keeps its
-        value.
+        among a few, or else on the same side of a threshold that tells) left, in units of the property; of a stopgap
+        what it left there; NaN where the property keeps its value.
     """
 
     object: str

@@ -12,6 +12,7 @@ from relgym.errors import ConfigError
 from relgym.laws.text import LawRow, WorldRow, law_rows, world_rows
 from relgym.model.advice import Advice
 from relgym.model.report_tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
+from relgym.model.spread import ROUNDING
 from relgym.model.spread_text import spread_text
 from relgym.model.text import Cell, table
 from relgym.scene.objects import ACTION
@@ -30,9 +31,6 @@ __all__ = [
     "describe",
     "report",
 ]
-
-_ROUNDING = 0.1
-"""A spread below this fraction of the noise assumed is not worth telling."""
 
 _OTHERWISE = "otherwise"
 
@@ -134,7 +132,7 @@ def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
 def _spread(part: PropertyModel, mode: Mode) -> str:
     """A mode's spread in words, action by action where they differ much."""
     known = part.spreads.by_mode.get(mode.id)
-    if known is None or known.whole <= max(part.clusterer.floor, _ROUNDING * part.clusterer.scale.sigma):
+    if known is None or known.whole <= max(part.clusterer.floor, ROUNDING * part.clusterer.scale.sigma):
         return ""
     names = next((t.properties for t in part.schema.types if t.name == ACTION), ())
     return spread_text(known, names)

@@ -2,22 +2,23 @@
 
 Noise need not be the same everywhere: an engine that fires makes what follows uncertain, one that rests doesn't. The
 spread that goes with a prediction is that of training examples of the same mode after the same action, where the agent
-chooses among a few; else that of the mode.
+chooses among a few; else on the same side of a number's threshold, if one tells; else that of the mode.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ModeClusterer
-from relgym.clustering.columns import SlotSignature
+from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
+from relgym.model.spread_split import Split, find_split, place_of
 from relgym.scene.objects import ACTION
 
 __all__ = ["Spread", "Spreads", "measure"]
@@ -30,6 +31,9 @@ FEW_ACTIONS, LEAST = 64, 8
 
 RECURRING = 0.5
 """At most so many different actions an example: a choice among many, and not a number that is hardly ever the same."""
+
+ROUNDING = 0.1
+"""A spread below this fraction of the noise assumed is mere rounding, and not worth telling."""
 
 TYPICAL = 0.6745
 """Median of a normal variable's size, in standard deviations."""
@@ -49,11 +53,14 @@ class Spread:
         By action, where an agent chooses among a few.
     pooled
         Whether it chooses among more than are told apart: what holds over all may hold after none.
+    split
+        By which side of a threshold a number lies, where that and no action tells them apart.
     """
 
     whole: float
     by_action: dict[_Action, float] = field(default_factory=dict)
     pooled: bool = False
+    split: Split | None = None
 
     def uneven(self, factor: float = 3.0) -> bool:
         """Whether some action scatters so many times as much as another one."""
@@ -78,6 +85,15 @@ class Spreads:
         spread = self.by_mode.get(mode)
         return float("nan") if spread is None else spread.by_action.get(action, spread.whole)
 
+    def at(self, mode: int, signature: SlotSignature, x: Sequence[float]) -> float:
+        """Spread of a mode in the situation that a row of the table would describe; NaN if it was never measured."""
+        spread = self.by_mode.get(mode)
+        if spread is not None and spread.split is not None:
+            place = place_of(spread.split.name, signature)
+            if place is not None:
+                return spread.split.of(x[place])
+        return self.of(mode, tuple(x[k] for k in action_columns(signature).tolist()))
+
     def of_many(self, modes: NDArray[np.int64], actions: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same for n predictions, actions of shape ``(n, components)``."""
         pairs = zip(modes.tolist(), map(tuple, actions.tolist()), strict=True)
@@ -90,7 +106,8 @@ class Spreads:
                 mode,
                 s.whole,
                 [[list(action), value] for action, value in s.by_action.items()],
-                *([True] if s.pooled else []),
+                *([s.pooled] if s.pooled or s.split else []),
+                *([s.split.to_json()] if s.split else []),
             ]
             for mode, s in sorted(self.by_mode.items())
         ]
@@ -98,14 +115,12 @@ class Spreads:
     @classmethod
     def from_json(cls, data: Sequence[Any]) -> Spreads:
         """Read what `to_json` wrote."""
-        return cls(
-            {
-                int(mode): Spread(
-                    float(whole), {tuple(map(float, a)): float(v) for a, v in by_action}, bool(pooled)
-                )
-                for mode, whole, by_action, *pooled in data
-            }
-        )
+        found = {}
+        for mode, whole, by_action, *rest in data:
+            split = Split.from_json(rest[1]) if len(rest) > 1 else None
+            actions = {tuple(map(float, a)): float(v) for a, v in by_action}
+            found[int(mode)] = Spread(float(whole), actions, bool(rest and rest[0]), split)
+        return cls(found)
 
 
 def measure(clusterer: ModeClusterer, table: ExampleTable) -> Spreads:
@@ -126,7 +141,27 @@ def measure(clusterer: ModeClusterer, table: ExampleTable) -> Spreads:
         after = _actions(table, rows)
         if after is not None and after.shape[1] == own[number][1].shape[1]:
             found[number].by_action.update(_loud(*own[number], error, after))
+    quiet = max(clusterer.floor, ROUNDING * clusterer.scale.sigma)
+    for number, spread in found.items():
+        if spread.whole > quiet and not spread.uneven():
+            found[number] = replace(spread, split=_split(clusterer, table, number))
     return Spreads(found)
+
+
+def _split(clusterer: ModeClusterer, table: ExampleTable, mode: int) -> Split | None:
+    """A threshold of a number, the target's own or of something without a body, that tells spreads apart."""
+    members = np.flatnonzero(clusterer.labels == mode)[-ROWS:]
+    ids = table.signature_ids[clusterer.rows[members]]
+    core = {
+        k: [table.signatures[k].named(c) for c in range(table.signatures[k].core)] for k in set(ids.tolist())
+    }
+    known = core[int(ids[-1])]
+    members = members[np.isin(ids, [k for k, names in core.items() if names == known])]
+    rows = clusterer.rows[members]
+    error, _ = clusterer.clusters[mode].errors(table, rows, clusterer.y[members], clusterer.scale)
+    places = np.array([k for k, name in enumerate(known) if not name.endswith(PRIME)], dtype=np.intp)
+    names = [known[k] for k in places.tolist()]
+    return find_split(error, table.x[np.ix_(rows, places)], names, clusterer.floor)
 
 
 def _left_over(

@@ -31,6 +31,8 @@ def spread_text(spread: Spread, names: Sequence[str]) -> str:
     >>> spread_text(Spread(0.4, {(0.0, 1.0, 0.0): 0.1, (1.0, 0.0, 1.0): 0.5}), ("a", "left", "right"))
     '± 0.1 after left; ± 0.5 after right'
     """
+    if spread.split is not None:
+        return str(spread.split)
     if spread.pooled:
         return f"± {spread.whole:.2g} over all actions: more than are told apart"
     if not spread.uneven():
