@@ -31,6 +31,9 @@ GOOD, BETTER = 0.01, 0.5
 EQUAL, CLOSE = 3.0, 1.5
 """What leaves more than the best by at most this factor is as good: of what explains, and of what comes close."""
 
+MOST = 0.5
+"""With so large a share of noise the target counts as unexplained, however little modes and guesses leave."""
+
 LEAST, ROWS, UNEXPLAINED = 100, 1000, 0.1
 """Fewer examples than this say nothing; the newest so many are looked at; so large a share of noise needs advice."""
 
@@ -91,7 +94,9 @@ class Advice:
             "" if self.left >= 1.0 else f"an approximation that leaves {_percent(self.left)} of the change"
         )
         if not self.spoken:
-            return rough or "unexplained"
+            # Where most is left over, a function of some of the examples is no approximation of them all.
+            lost = self.unexplained > MOST
+            return f"unexplained; {rough}" if rough and lost else rough or "unexplained"
         lately = f"{self.wrong} of the latest {self.spoken} predictions were wrong"
         if rough or self.unexplained > UNEXPLAINED:
             return f"unexplained; {rough and f'{rough}, and '}{lately}"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from points import formulas, learned, schema_of, transitions
 
-from relgym.model.advice import LAST_RESORT, _choose, _Trial, _try
+from relgym.model.advice import LAST_RESORT, Advice, _choose, _Trial, _try
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
@@ -169,3 +169,13 @@ def test_what_is_tried_knows_whether_its_law_needs_features() -> None:
         part, table = model.property_model("self", "v"), model._parts.tables["self"]
         found.append(_try(part, table, np.arange(200), ("trig",)))
     assert [None if f is None else f.bare for f in found] == [True, False]
+
+
+def test_most_left_over_is_unexplained_whatever_the_rest_leaves() -> None:
+    told = {
+        share: str(Advice("self.v", share, 0.066, ("trig",), "v' = sin(v)", 0.001)) for share in (0.2, 0.8)
+    }
+    assert told[0.2] == (
+        "an approximation that leaves 6.6 % of the change; ModelConfig(features=('trig',)) explains it: v' = sin(v)"
+    )
+    assert told[0.8] == f"unexplained; {told[0.2]}"
