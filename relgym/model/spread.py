@@ -142,7 +142,8 @@ def measure(clusterer: ModeClusterer, table: ExampleTable) -> Spreads:
         if after is not None and after.shape[1] == own[number][1].shape[1]:
             found[number].by_action.update(_loud(*own[number], error, after))
     quiet = max(clusterer.floor, ROUNDING * clusterer.scale.sigma)
-    for number, spread in found.items():
+    # What an approximation leaves is a curve, no noise that depends on where one is.
+    for number, spread in () if clusterer.approximate else found.items():
         if spread.whole > quiet and not spread.uneven():
             found[number] = replace(spread, split=_split(clusterer, table, number))
     return Spreads(found)
