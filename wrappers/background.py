@@ -225,8 +225,10 @@ def _take_up(
     model: WorldModel, prequential: Prequential | None, precision: float, transition: Transition
 ) -> None:
     if prequential is not None:
-        residuals, wrong = compared(model.predict_one(transition.before), transition.after, precision)
+        prediction = model.predict_one(transition.before)
+        residuals, wrong = compared(prediction, transition.after, precision)
         prequential.count(residuals, wrong)
+        model.look_back(prediction, residuals, precision)
     model.learn_one(transition)
 
 

@@ -9,15 +9,13 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from relgym.envs.arguments import checked_count
+from relgym.model.hindsight import WRONG
 from relgym.model.prediction import ScenePrediction
 from relgym.model.text import Cell, table
 from relgym.model.world_model import LearnReport
 from relgym.scene.objects import Scene
 
 __all__ = ["WRONG", "Key", "Prequential", "StepReport", "compared"]
-
-WRONG = 1e-9
-"""A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
 
 Key: TypeAlias = tuple[str, str]
 """An object and one of its properties."""

@@ -1,4 +1,8 @@
-"""The learning half of every wrapper: predict, compare, learn; here or in a process of its own."""
+"""The learning half of every wrapper: predict, compare, learn; here or in a process of its own.
+
+The model is told how its predictions came out while it learns: so it knows where its modes cover the examples and
+nobody can tell which of them holds when (`relgym.model.hindsight`).
+"""
 
 from __future__ import annotations
 
@@ -104,6 +108,8 @@ class Study:
         residuals, wrong = compared(prediction, transition.after, self._precision)
         if prediction is not None:
             self.prequential.count(residuals, wrong)
+            if self._learn:
+                self.model.look_back(prediction, residuals, self._precision)
         learned = self.model.learn_one(transition) if self._learn else None
         return StepReport(prediction, residuals, wrong, learned)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -30,6 +31,9 @@ GOOD, BETTER = 0.01, 0.5
 EQUAL, CLOSE = 3.0, 1.5
 """What leaves more than the best by at most this factor is as good: of what explains, and of what comes close."""
 
+MOST = 0.5
+"""With so large a share of noise the target counts as unexplained, however little modes and guesses leave."""
+
 LEAST, ROWS, UNEXPLAINED = 100, 1000, 0.1
 """Fewer examples than this say nothing; the newest so many are looked at; so large a share of noise needs advice."""
 
@@ -57,7 +61,10 @@ class Advice:
     law
         The law that was found with these features, as text; empty without any.
     remains
-        Share of the change that it would leave.
+        Share of the change that it would leave; NaN if nothing was tried, for want of examples.
+    wrong, spoken
+        How many of the latest predictions were wrong, of how many, where too many were for anybody to say that the
+        modes explain it (`relgym.model.hindsight`); else 0.
     """
 
     target: str
@@ -66,13 +73,13 @@ class Advice:
     features: tuple[str, ...]
     law: str
     remains: float
+    wrong: int = 0
+    spoken: int = 0
 
     def __str__(self) -> str:
-        now = (
-            "unexplained"
-            if self.left >= 1.0
-            else f"an approximation that leaves {_percent(self.left)} of the change"
-        )
+        now = self._now()
+        if math.isnan(self.remains):
+            return now
         if not self.features:
             return f"{now}; no library of features that was tried explains it"
         close = (
@@ -82,6 +89,21 @@ class Advice:
             now += "; no library of features that was tried explains it"
         return f"{now}; ModelConfig(features={self.features}) {close}: {self.law}"
 
+    def _now(self) -> str:
+        rough = (
+            "" if self.left >= 1.0 else f"an approximation that leaves {_percent(self.left)} of the change"
+        )
+        if not self.spoken:
+            # Where most is left over, a function of some of the examples is no approximation of them all.
+            lost = self.unexplained > MOST
+            return f"unexplained; {rough}" if rough and lost else rough or "unexplained"
+        lately = f"{self.wrong} of the latest {self.spoken} predictions were wrong"
+        if rough or self.unexplained > UNEXPLAINED:
+            return f"unexplained; {rough and f'{rough}, and '}{lately}"
+        return (
+            f"unexplained; its modes cover the examples, but nothing tells which of them holds when: {lately}"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class _Trial:
@@ -89,6 +111,7 @@ class _Trial:
     left: float
     law: str
     size: int
+    bare: bool = False  # whether the law needs none of the features
 
 
 def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
@@ -97,25 +120,38 @@ def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
     Cost: several regressions on at most `ROWS` examples with up to some thousand features, about a second; nothing is
     changed.
     """
-    clusterer = model.clusterer
-    if len(clusterer.y) < LEAST:
-        return None
+    known, enough = model.hindsight, len(model.clusterer.y) >= LEAST
+    if not model.undecided:
+        return _lacks(model, table) if enough else None
+    found = _lacks(model, table) if enough else Advice(str(model.target), 0.0, 1.0, (), "", math.nan)
+    return None if found is None else replace(found, wrong=known.wrong, spoken=known.spoken)
+
+
+def _lacks(model: PropertyModel, table: ExampleTable) -> Advice | None:
+    """`advise`, but for how predictions came out, of a target with some examples."""
+    clusterer, undecided = model.clusterer, model.undecided
     recent = np.arange(max(0, len(clusterer.y) - ROWS), len(clusterer.y))
     noise = float((clusterer.labels[recent] == NOISE).mean())
     change = clusterer.y[recent] - _present(model, table, recent)
     rough = clusterer.approximate or _supposed(model, table)
     left = min(1.0, _remains(model, table, recent) / max(float(change.std()), 1e-300)) if rough else 1.0
-    if left <= FINE or (noise <= UNEXPLAINED and not rough):
+    covered = left <= FINE or (noise <= UNEXPLAINED and not rough)
+    if covered and not undecided:
         return None
+    left = 1.0 if covered else left
     known = frozenset(model.config.features)
     trials = [_try(model, table, recent, kinds) for kinds in LIBRARIES if not known.issuperset(kinds)]
     good = min((t.left for t in trials if t is not None), default=1.0) <= GOOD
     if not good and not known.issuperset(LAST_RESORT):
         trials.append(_try(model, table, recent, LAST_RESORT))
     best = _choose([t for t in trials if t is not None], left)
-    if best is not None:
+    if best is not None and best.bare:
+        if clusterer.clusters and best.left <= GOOD and not undecided:
+            return None  # the law is of the form that it has, and what it leaves is noise
+        best = None
+    if best is not None and (best.left <= GOOD or not covered):
         return Advice(str(model.target), noise, left, best.features, best.law, best.left)
-    if noise <= UNEXPLAINED and not clusterer.approximate:
+    if noise <= UNEXPLAINED and not clusterer.approximate and not undecided:
         return None  # it is noise indeed
     return Advice(str(model.target), noise, left, (), "", 1.0)
 
@@ -142,11 +178,14 @@ def advices(parts: Parts) -> tuple[Advice, ...]:
 
 
 def _choose(trials: Iterable[_Trial], left: float) -> _Trial | None:
-    """The smallest library that is as good as the best one, if that is better than what there is."""
+    """The smallest library that is as good as the best one, if that is better than what there is.
+
+    One whose law needs no features goes first.
+    """
     trials = list(trials)
     least = min((t.left for t in trials), default=1.0)
     good = [t for t in trials if t.left <= max((EQUAL if least <= GOOD else CLOSE) * least, _EXACT)]
-    return min(good, key=lambda t: t.size) if least <= BETTER * left else None
+    return min(good, key=lambda t: (not t.bare, t.size)) if least <= BETTER * left else None
 
 
 def _try(
@@ -182,7 +221,8 @@ def _try(
         (w, slots.named(int(order[c]))) for c, w in zip(found.fit.columns, found.fit.weights, strict=True)
     ]
     law = f"{model.target.property}' = {sum_text(text, found.fit.intercept, 4)}"
-    return _Trial(kinds, found.sigma / change, law, len(order))
+    bare = all(order[c] < len(slots.columns) for c in found.fit.columns)
+    return _Trial(kinds, found.sigma / change, law, len(order), bare)
 
 
 def _present(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -20,10 +20,11 @@ from relgym.model.conditions import Conditions
 from relgym.model.functions import ModeFunctions, Verdict
 from relgym.model.grouping import distinct, members
 from relgym.model.guess import Guess, Guesses
+from relgym.model.hindsight import Hindsight
 from relgym.model.limits import Limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
-from relgym.model.spread import Spreads, action_columns
+from relgym.model.spread import Spreads
 from relgym.model.stops import Stops
 
 __all__ = ["Answers"]
@@ -59,6 +60,8 @@ class Answers(ModeFunctions):
         Which modes are walls at work: they take no part in the vote either.
     guesses
         The best guess, where nothing is explained.
+    hindsight
+        How the latest predictions came out, if somebody looked back at them.
     leaned_on
         Whether laws of other properties read this one's next value. Then its modes answer as long as it has any: what a
         guess leaves would be magnified in those laws.
@@ -79,6 +82,7 @@ class Answers(ModeFunctions):
         self.limits = Limits()
         self.stops = Stops()
         self.guesses = Guesses()
+        self.hindsight = Hindsight()
         self.leaned_on = False
         self._unexplained = False
 
@@ -88,8 +92,16 @@ class Answers(ModeFunctions):
 
     @property
     def unexplained(self) -> bool:
-        """Whether it is known by now that modes don't describe the target, or just some of its examples."""
-        return self._unexplained
+        """Whether it is known by now that modes don't describe the target: just some of its examples, or not when."""
+        return self._unexplained or self.undecided
+
+    @property
+    def undecided(self) -> bool:
+        """Whether modes cover the examples, but nothing tells which of them holds when (`relgym.model.hindsight`).
+
+        With a single mode there is no choice; whether it holds is told by the examples that it leaves over.
+        """
+        return len(self.classifier.modes) > 1 and self.hindsight.undecided
 
     @property
     def guess(self) -> Guess | None:
@@ -195,10 +207,10 @@ class Answers(ModeFunctions):
             played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
             roles = tuple(layout.names[order[s]] for s in played)
             margin = ranking.margin if place == 0 else 0.0
-            found = Prediction("", "", binding.value(x, slots), Outcome.PREDICTED, mode, roles, margin)
+            outcome = Outcome.UNEXPLAINED if self.undecided else Outcome.PREDICTED
+            found = Prediction("", "", binding.value(x, slots), outcome, mode, roles, margin)
             found = self._stopped(self.limits.cut_off(found), situation.signature, row)
-            action = tuple(x[k] for k in action_columns(situation.signature).tolist())
-            return replace(found, spread=self.spreads.of(found.mode, action))
+            return replace(found, spread=self.spreads.at(found.mode, situation.signature, x))
         return replace(nothing, outcome=Outcome.NO_ROLES)
 
     def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
@@ -226,6 +238,7 @@ class Answers(ModeFunctions):
         x = percept.rows(index, following, ordered=self._casts(situation.signature))
         ranking = self._rank_batch(situation, x)
         verdict.outcomes[:] = _NO_ROLES
+        said = _UNEXPLAINED if self.undecided else _PREDICTED
         waiting = np.ones(n, dtype=bool)
         if self.config.abstain and len(modes) > 1:
             waiting = ranking.seen.copy()
@@ -238,7 +251,7 @@ class Answers(ModeFunctions):
                 part = np.flatnonzero(waiting & (ranking.modes[:, place] == mode))
                 done, values = self._apply(int(mode), binding, percept, situation, x, part)
                 verdict.values[done], verdict.modes[done] = values, mode
-                verdict.outcomes[done] = _PREDICTED
+                verdict.outcomes[done] = said
                 verdict.margins[done] = ranking.margin[done] if place == 0 else 0.0
                 waiting[done] = False
                 if self.config.abstain:  # in doubt about the players
@@ -257,7 +270,7 @@ class Answers(ModeFunctions):
         binding = self._binding(signature, mode)
         if binding is None or binding.open:
             return Prediction("", "", float("nan"), Outcome.OUTSIDE)
-        spread = self.spreads.of(mode, tuple(x[k] for k in action_columns(signature).tolist()))
+        spread = self.spreads.at(mode, signature, x)
         return Prediction("", "", binding.value(x), Outcome.OUTSIDE, spread=spread)
 
     def _lean(

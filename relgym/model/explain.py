@@ -100,6 +100,8 @@ class Explanation:
         examples = amount(self.mode.examples, "training example")
         lines.append(f"  mode      {self.mode.id}: {self.mode.formula(d)}  ({examples})")
         lines.append(f"  roles     {self._roles(self.mode)}")
+        if not p.ok:
+            lines.append(f"  outcome   {p.outcome.value}")
         if self.limit:
             return "\n".join([*lines, f"  because   {self.limit}"])
         lines += self._because() if self.reasons else ["  because   no other mode is known"]
@@ -153,7 +155,7 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
                 lines = model.law_lines(scene, index, digits) if one.ok else ()
                 found.append(Explanation(one, now, None, digits, (), lines))
                 continue
-            mode = next(m for m in part.modes if m.id == one.mode) if one.ok else None
+            mode = next(m for m in part.modes if m.id == one.mode) if one.mode else None
             if part.bounds(one.mode):
                 found.append(Explanation(one, now, mode, digits, (), limit=_limit(part, one.mode)))
                 continue

@@ -115,6 +115,7 @@ def _take_up(
         mine.remember(table, example, weight)
     mine.follow(table)
     mine.start_over(table)
+    mine.hindsight = mine.hindsight.united(theirs.hindsight)
 
 
 def _exemplars(

@@ -19,7 +19,8 @@ class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
     Only `PREDICTED` is a mode's word. With every other outcome the value is a stopgap, not a claim: what is unexplained
-    is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes; outside experience it is
+    is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes, or, where modes cover the
+    examples but nothing tells which of them holds when, it is what the vote's winner says; outside experience it is
     what the mode says that would win the vote; what depends on such a stopgap follows from it; else the property keeps
     its value.
     """
@@ -51,7 +52,8 @@ class Prediction:
     outcome
         Whether a mode predicted it, or why none did.
     mode
-        Id of the mode; 0 if none.
+        Id of the mode; 0 if none. With `Outcome.UNEXPLAINED` the one that won the vote: its value is no claim, since
+        the winner was too often the wrong one (`relgym.model.hindsight`).
     roles
         Names of the objects that play the mode's roles, the target first.
     margin
@@ -61,8 +63,8 @@ class Prediction:
         (`relgym.laws.frames`), and then the roles are the target and all that it touches.
     spread
         Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
-        among a few) left, in units of the property; of a stopgap what it left there; NaN where the property keeps its
-        value.
+        among a few, or else on the same side of a threshold that tells) left, in units of the property; of a stopgap
+        what it left there; NaN where the property keeps its value.
     """
 
     object: str
@@ -83,7 +85,7 @@ class Prediction:
     @builtins.property
     def informed(self) -> bool:
         """Whether a mode predicted it, or the stopgap is more than that nothing changes."""
-        return self.ok or not math.isnan(self.spread)
+        return self.ok or self.mode != 0 or not math.isnan(self.spread)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +129,7 @@ class BatchPrediction:
     parts
         The (object, property) of each target, in causal order.
     modes
-        Ids of the modes, shape ``(n, len(parts))``; 0 where none predicted.
+        Ids of the modes, shape ``(n, len(parts))``; 0 where none said anything.
     outcomes
         Position in `OUTCOMES`, shape ``(n, len(parts))``.
     margins

@@ -21,6 +21,7 @@ from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions, needed
 from relgym.model.functions import Verdict, bodies_of
 from relgym.model.guess import Guesses
+from relgym.model.hindsight import Hindsight
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Situation
 from relgym.model.spread import Spreads, measure
@@ -205,6 +206,7 @@ class PropertyModel(Answers):
         self.conditions = Conditions(self.schema, target)
         self.clusterer.retarget(target)
         self.casting = Casting(self._base, self.config.classification)
+        self.hindsight = Hindsight()  # what follows is another model's word
         self._follow(table)
         self._widen(table, self.classifier.vocabulary.follows)
 

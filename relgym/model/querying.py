@@ -17,8 +17,8 @@ from relgym.scene.objects import Scene, SceneLayout, SceneSchema, Target
 
 __all__ = ["predict", "predict_many"]
 
-_PREDICTED, _OUTSIDE, _DEPENDS = (
-    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.OUTSIDE, Outcome.DEPENDS)
+_PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED = (
+    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.OUTSIDE, Outcome.DEPENDS, Outcome.UNEXPLAINED)
 )
 
 
@@ -101,7 +101,8 @@ def predict_many(
                 bare &= ~rest
             following[told, column] = verdict.values[told]
             verdict.outcomes[~told & (verdict.outcomes == _PREDICTED)] = _OUTSIDE
-            verdict.modes[~known] = 0
+            # What is unexplained has a value only if a mode gave it, one that is too often the wrong one.
+            verdict.modes[~(known | told & (verdict.outcomes == _UNEXPLAINED))] = 0
             key = (target.type, target.property)
             lost[key] = lost.get(key, nowhere) | ~known
             blind[key] = blind.get(key, nowhere) | bare

@@ -12,7 +12,10 @@ from relgym.errors import ConfigError
 from relgym.laws.text import LawRow, WorldRow, law_rows, world_rows
 from relgym.model.advice import Advice
 from relgym.model.report_tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
+from relgym.model.spread import ROUNDING
+from relgym.model.spread_text import spread_text
 from relgym.model.text import Cell, table
+from relgym.scene.objects import ACTION
 
 if TYPE_CHECKING:
     from relgym.model.property_model import PropertyModel
@@ -28,9 +31,6 @@ __all__ = [
     "describe",
     "report",
 ]
-
-_ROUNDING = 0.1
-"""A spread below this fraction of the noise assumed is not worth telling."""
 
 _OTHERWISE = "otherwise"
 
@@ -132,12 +132,10 @@ def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
 def _spread(part: PropertyModel, mode: Mode) -> str:
     """A mode's spread in words, action by action where they differ much."""
     known = part.spreads.by_mode.get(mode.id)
-    if known is None or known.whole <= max(part.clusterer.floor, _ROUNDING * part.clusterer.scale.sigma):
+    if known is None or known.whole <= max(part.clusterer.floor, ROUNDING * part.clusterer.scale.sigma):
         return ""
-    if not known.uneven():
-        return f"± {known.whole:.2g}"
-    texts = (f"± {s:.2g} after {', '.join(f'{x:g}' for x in a)}" for a, s in known.by_action.items())
-    return "; ".join(texts)
+    names = next((t.properties for t in part.schema.types if t.name == ACTION), ())
+    return spread_text(known, names)
 
 
 def _pair_table(classifier: BinaryClassifier) -> PairTable:

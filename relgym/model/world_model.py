@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from relgym.errors import ConfigError, ModelFileError
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
+from relgym.model.hindsight import hindsight_to_json, look_back, restore_hindsight
 from relgym.model.learning import LearnReport, finish, learn
 from relgym.model.merging import merge
 from relgym.model.parts import Parts
@@ -135,6 +136,29 @@ class WorldModel:
         report = learn(self._parts, self._perceive(transition.before), transition)
         self.seen += 1
         return report
+
+    def look_back(
+        self,
+        prediction: ScenePrediction,
+        residuals: Mapping[tuple[str, str], float],
+        precision: float = 0.0,
+    ) -> None:
+        """Take note of how a prediction came out, before the step is learned from.
+
+        A target whose predictions were too often wrong lately counts as `unexplained`, until they are right again
+        (`relgym.model.hindsight`). A model that is never told counts as right where its modes cover the examples.
+
+        Parameters
+        ----------
+        prediction
+            What the model said.
+        residuals
+            Observed minus predicted value by (object, property), in units of the property; objects that vanished have
+            none.
+        precision
+            Relative precision of what was observed (`View.precision`); of numbers below 1 it is absolute.
+        """
+        look_back(self._parts, prediction, residuals, precision)
 
     def merge(self, other: WorldModel) -> None:
         """Take up all that another model of the same world remembers, as if this one had seen it too.
@@ -261,9 +285,9 @@ class WorldModel:
     def advice(self) -> tuple[Advice, ...]:
         """What isn't explained, target by target, and which features would explain it (`ModelConfig.features`).
 
-        Empty for a model that was loaded without its history.
+        Of a model that was loaded without its history only which modes nobody can choose between.
         """
-        return () if self.frozen else advices(self._parts)
+        return advices(self._parts)
 
     def explain(self, scene: Scene) -> str:
         """Why this prediction: mode, function, roles, clause and rival of every target."""
@@ -296,15 +320,20 @@ class WorldModel:
         if not history:
             finished = copy.deepcopy(self)  # saving must not change what is learned from here on
             finished.finish()
-            write_model(path, finished.to_json() | {"extra": self.extra if extra is None else extra}, None)
+            write_model(path, finished._body(history=False, extra=extra), None)
             return
         if self.frozen:
             raise ModelFileError(
                 "this model was loaded without its history: save it with history=False, or load it from a file "
                 "that was saved with history=True"
             )
-        body = self.to_json(history=True) | {"extra": self.extra if extra is None else extra}
-        write_model(path, body, parts_to_arrays(self._parts))
+        write_model(path, self._body(history=True, extra=extra), parts_to_arrays(self._parts))
+
+    def _body(self, *, history: bool, extra: dict[str, Any] | None) -> dict[str, Any]:
+        """All that a file says. What is known in hindsight stands apart: it is not learned from transitions."""
+        body = self.to_json(history=history) | {"extra": self.extra if extra is None else extra}
+        known = hindsight_to_json(self._parts)
+        return body | {"hindsight": known} if known else body
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
@@ -330,6 +359,7 @@ class WorldModel:
             model = cls(parts.schema, parts.config, targets=())
             model._parts, model.seen, model.frozen = parts, int(body["seen"]), arrays is None
             model.extra = dict(body["extra"])
+            restore_hindsight(parts, body.get("hindsight", {}))
             return model, model.extra
         except (KeyError, TypeError, IndexError) as error:
             raise ModelFileError(

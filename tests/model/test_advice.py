@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from points import formulas, learned, schema_of, transitions
 
-from relgym.model.advice import LAST_RESORT
+from relgym.model.advice import LAST_RESORT, Advice, _choose, _Trial, _try
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
@@ -103,16 +105,20 @@ def test_too_few_examples_are_no_reason_for_advice() -> None:
     assert learned(SCHEMA, hills(60)).advice() == ()
 
 
-def test_a_small_curve_drawn_at_random_counts_as_noise_and_is_told() -> None:
+def drift(n: int) -> list[Transition]:
+    """Nearly a line: a sine so small that it may be noise."""
     rng = np.random.default_rng(0)
-    starts = np.column_stack([rng.normal(size=400), rng.normal(size=400)])
-    steps = transitions(
+    starts = np.column_stack([rng.normal(size=n), rng.normal(size=n)])
+    return transitions(
         SCHEMA,
         lambda s, u: [s[0], s[1] + u[0] + 0.002 * np.sin(3.0 * s[1])],
         starts,
-        rng.normal(size=(400, 1)),
+        rng.normal(size=(n, 1)),
     )
-    model = learned(SCHEMA, steps)
+
+
+def test_a_small_curve_drawn_at_random_counts_as_noise_and_is_told() -> None:
+    model = learned(SCHEMA, drift(400))
     clusterer = model.property_model("self", "v").clusterer
     assert clusterer.scale.sigma == pytest.approx(0.002 / 2**0.5, rel=0.3)
     assert "± 0.0014" in model.describe()
@@ -129,3 +135,47 @@ def test_a_model_without_history_gives_no_advice(
     again = WorldModel.load(path)
     assert again.advice() == ()
     assert again.predict_one(hills(1, seed=5)[0].before)["self", "v"].outcome is Outcome.UNEXPLAINED
+
+
+def trial(left: float, size: int, *, bare: bool = False) -> _Trial:
+    return _Trial(("trig",), left, "", size, bare)
+
+
+def test_a_law_that_needs_no_features_goes_first() -> None:
+    small, plain, best = trial(0.0012, 9), trial(0.0013, 15, bare=True), trial(0.0011, 43)
+    assert _choose([small, plain, best], 0.01) is plain
+    assert _choose([small, best], 0.01) is small
+    assert _choose([small, replace(plain, left=0.005), best], 0.01) is small  # not as good
+    assert _choose([small, plain, best], 0.002) is None  # hardly better than what there is
+
+
+def test_no_features_are_recommended_that_the_law_does_not_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = learned(SCHEMA, drift(400))
+    (advice,) = model.advice()
+    assert advice.features == ("trig",)
+    bare = lambda *args: _Trial(args[-1], 0.0001, "v' = v + action.a", 15, bare=True)  # noqa: E731
+    monkeypatch.setattr("relgym.model.advice._try", bare)
+    assert model.advice() == ()
+
+
+def test_what_is_tried_knows_whether_its_law_needs_features() -> None:
+    rng = np.random.default_rng(0)
+    straight = transitions(
+        SCHEMA, lambda s, u: [s[0], 0.9 * s[1] + u[0]], rng.normal(size=(200, 2)), rng.normal(size=(200, 1))
+    )
+    found = []
+    for steps in (straight, drift(200)):
+        model = learned(SCHEMA, steps)
+        part, table = model.property_model("self", "v"), model._parts.tables["self"]
+        found.append(_try(part, table, np.arange(200), ("trig",)))
+    assert [None if f is None else f.bare for f in found] == [True, False]
+
+
+def test_most_left_over_is_unexplained_whatever_the_rest_leaves() -> None:
+    told = {
+        share: str(Advice("self.v", share, 0.066, ("trig",), "v' = sin(v)", 0.001)) for share in (0.2, 0.8)
+    }
+    assert told[0.2] == (
+        "an approximation that leaves 6.6 % of the change; ModelConfig(features=('trig',)) explains it: v' = sin(v)"
+    )
+    assert told[0.8] == f"unexplained; {told[0.2]}"

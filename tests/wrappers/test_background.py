@@ -34,6 +34,9 @@ def test_the_background_learns_the_same_model_and_counts_the_same_errors() -> No
     assert there.catch_up().to_json(history=True) == here.model.to_json(history=True)
     assert there.dropped == 0
     assert there.prequential.wrong == here.prequential.wrong
+    told = [e.model.property_model("self", "v").hindsight.to_json() for e in (here, there)]
+    assert told[0] == told[1]
+    assert len(told[0]["steps"]) > 40
     twin = copy.deepcopy(there)
     run(there, 10, seed=5)
     there.close()

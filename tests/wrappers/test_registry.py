@@ -13,7 +13,7 @@ import gymnasium as gym
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from relgym.model.prediction import Outcome
+from relgym.model.prediction import Outcome, Prediction
 from relgym.wrappers import ModelLearner
 
 LIGHT = (
@@ -83,6 +83,68 @@ def _check(name: str) -> None:
     with noted() as wrapped:
         check_env(ModelLearner(make(name)), skip_render_check=True)
     assert wrapped == bare
+
+
+WITHOUT_LAW = {
+    "Blackjack-v1": "self.x0",
+    "CliffWalkingSlippery-v1": "self.x",
+    "FrozenLake-v1": "self.x",
+    "FrozenLake8x8-v1": "self.x",
+    "Taxi-v4": "self.x",
+}
+"""Numbers that follow no law of the form that is looked for: a card drawn, or the number of a cell."""
+
+LAWFUL = {
+    "CartPole-v1": ("self.x0", "self.x2"),
+    "MountainCarContinuous-v0": ("self.x0",),
+}
+"""Targets whose modes are right of all but few steps."""
+
+
+def lived(name: str, steps: int) -> ModelLearner:
+    env = ModelLearner(make(name))
+    live(env, steps)
+    return env
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WITHOUT_LAW)
+def test_modes_that_nobody_can_choose_between_are_called_unexplained(name: str) -> None:
+    env = lived(name, 500)
+    part = env.model.property_model(*WITHOUT_LAW[name].split("."))
+    assert part.modes
+    assert not part.clusterer.noise_examples > 0.1 * part.clusterer.seen  # they cover the examples
+    assert part.unexplained
+    assert (
+        "advice: unexplained; its modes cover the examples, but nothing tells which" in env.model.describe()
+    )
+    said, wrong = _foretold(env, 100)
+    assert wrong > 15
+    assert Outcome.PREDICTED not in {p.outcome for p in said if p.property == part.target.property}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "targets"), LAWFUL.items())
+def test_what_is_explained_is_not_called_unexplained(name: str, targets: tuple[str, ...]) -> None:
+    env = lived(name, 500)
+    told = [str(a) for a in env.model.advice() if a.target in targets]
+    assert told == []
+    for target in targets:
+        assert not env.model.property_model(*target.split(".")).unexplained
+
+
+def _foretold(env: ModelLearner, steps: int) -> tuple[list[Prediction], int]:
+    """What is said of further steps, and of how many of them something was wrong by the values alone."""
+    said, wrong = list[Prediction](), 0
+    env.reset(seed=1)
+    for _ in range(steps):
+        *_, terminated, truncated, info = env.step(env.action_space.sample())
+        report = info["relgym"]
+        said += report.prediction.parts
+        wrong += any(abs(residual) > 1e-9 for residual in report.residuals.values())
+        if terminated or truncated:
+            env.reset()
+    return said, wrong
 
 
 @pytest.mark.slow
