@@ -207,7 +207,8 @@ class ClusteringConfig:
         Whether, where noise is so large that modes explain each other's examples by chance (an example verifies a
         function by 12 bits at most), all are assigned anew as they become more, by their errors and by what each mode
         has in their relational state; and modes are sought among those that are explained badly
-        (`relgym.clustering.suspects`). Default true; the thesis knew noise as what no mode explains.
+        (`relgym.clustering.suspects`). Default true; the thesis knew noise as what no mode explains. Needs more than
+        one relational state, so bodies: without them it does nothing.
     """
 
     noise_std: float | Literal["auto"] = "auto"

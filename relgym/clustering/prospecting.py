@@ -150,7 +150,10 @@ class Prospector(Population):
     def _review(self, table: ExampleTable) -> bool:
         """Where noise is large, look for modes whose examples others explain by chance, and assign all anew."""
         by_chance = not self.scale.misfit and verifying_bits(self.y, self.scale) <= CHANCY * EXACT
-        self._chancy = self.config.review and by_chance
+        # In a world of one state all examples are where they are; there noise that depends on the action would give
+        # its quiet actions a mode of their own, and leave the loud ones without any (LunarLander's engine).
+        states = table.strata[self.rows]
+        self._chancy = self.config.review and by_chance and bool((states != states[0]).any())
         if not self._chancy:
             return False
         ids = table.signature_ids[self.rows]

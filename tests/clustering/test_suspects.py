@@ -133,15 +133,25 @@ def test_a_stream_through_much_noise_learns_its_rare_mode(
 
 
 def test_reviews_say_that_examples_were_assigned_anew(rng: np.random.Generator) -> None:
-    x, y, _ = bouncing(4e-3, rng, n=640)
-    reports = Stream(config=ClusteringConfig(noise_std=4e-3)).feed(x, y)
-    assert [k + 1 for k, r in enumerate(reports) if r.reassigned] == [512, 640]
+    assert reviews(ClusteringConfig(noise_std=4e-3), rng) == [512, 640]
 
 
 def test_a_review_can_be_switched_off(rng: np.random.Generator) -> None:
-    x, y, _ = bouncing(4e-3, rng, n=640)
-    reports = Stream(config=ClusteringConfig(noise_std=4e-3, review=False)).feed(x, y)
-    assert not any(r.reassigned for r in reports)
+    assert reviews(ClusteringConfig(noise_std=4e-3, review=False), rng) == []
+
+
+def test_a_world_of_one_state_is_not_reviewed(rng: np.random.Generator) -> None:
+    assert reviews(ClusteringConfig(noise_std=4e-3), rng, apart=False) == []
+
+
+def reviews(config: ClusteringConfig, rng: np.random.Generator, *, apart: bool = True) -> list[int]:
+    """After how many of 640 examples there were reviews; `apart`: bounces have a state of their own."""
+    x, y, ramp = bouncing(4e-3, rng, n=640)
+    stream, found = Stream(config=config), []
+    for k, (row, value, bounces) in enumerate(zip(x, y, ramp, strict=True)):
+        (report,) = stream.feed([row], [value], b"ramp" if bounces and apart else b"air")
+        found += [k + 1] if report.reassigned else []
+    return found
 
 
 @pytest.mark.parametrize("preset", [ModelConfig.thesis(), ModelConfig.original()])
