@@ -60,8 +60,8 @@ class TableView:
     Notes
     -----
     Objects may come and go. A matched table has twice as many names as rows, so that one that comes while another
-    goes is never taken for it. A kind of one row has a single name: what comes there in place of another object is not
-    shown until the next step. The numbers of an empty row mean nothing, and may be NaN.
+    goes is never taken for it. A kind of one row is one object, however far it moves: where another may come in its
+    place, give the kind two rows. The numbers of an empty row mean nothing, and may be NaN.
 
     Examples
     --------
@@ -166,7 +166,7 @@ class TableView:
             here = np.arange(len(own)) if self._here is None else np.flatnonzero(own[:, self._here] > 0.5)
             constants = np.array(list(part.constants.values()), dtype=np.float64)
             chosen = self._chosen(own[here], names, here, last, last if expected is None else expected)
-            for name, row in zip(chosen, own[here], strict=False):
+            for name, row in zip(chosen, own[here], strict=True):
                 shown = row[self._shown]
                 values[name] = np.concatenate([shown, self._changed(shown, name, last), constants])
         return self.schema.scene(values | self._fixed)
@@ -186,11 +186,9 @@ class TableView:
         last: Scene | None,
         expected: Scene | None,
     ) -> list[str]:
-        """Name of the object in each row; fewer names than rows where one must wait for its name."""
-        if self._match is None:
+        """Name of the object in each row."""
+        if self._match is None or len(names) == 1:
             return [names[int(k)] for k in here]
-        if len(names) == 1:
-            return [] if self._leapt(rows, names[0], last, expected) else list(names[: len(rows)])
         known = [name for name in names if expected is not None and name in expected]
         columns = [self.columns.index(name) for name in self._match]
         places = [self._properties.index(name) for name in self._match]
@@ -201,16 +199,6 @@ class TableView:
         # A name that was there a step ago would make a leap of two different objects.
         free = iter(name for name in names if name not in known and (last is None or name not in last))
         return [known[k] if k >= 0 else next(free) for k in pairs.tolist()]
-
-    def _leapt(self, rows: Float2D, name: str, last: Scene | None, expected: Scene | None) -> bool:
-        """Whether the one row of a kind is far from where its object was, and from where it was expected."""
-        if self._match is None or not len(rows) or last is None or name not in last:
-            return False
-        columns = [self.columns.index(column) for column in self._match]
-        places = [self._properties.index(column) for column in self._match]
-        scenes = [last] if expected is None or name not in expected else [last, expected]
-        off = (rows[0, columns] - [scene[name].values[places] for scene in scenes]) / self._scales
-        return bool(((off * off).sum(axis=1) > 1.0).all())
 
     def _checked(self, observation: Any) -> Float2D:
         try:
