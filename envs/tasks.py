@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from relgym.envs.actions import without_action
 from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
 
-__all__ = ["Judgement", "Region", "Task", "column_of"]
+__all__ = ["Judgement", "Judging", "Region", "Task", "column_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +48,8 @@ class Region:
     height: float
 
 
-class Task(ABC):
-    """What an agent is asked to do. Immutable; its methods depend on nothing but their arguments.
+class Judging(ABC):
+    """Says what steps are worth, and which of them are the last.
 
     A subclass supplies `judge`. The functions of single scenes and those of arrays go through it, so that they
     agree to the last bit.
@@ -74,10 +74,6 @@ class Task(ABC):
             What was done, in the units of the action space, shape ``(n, …)``.
         """
 
-    @abstractmethod
-    def regions(self, scene: Scene) -> tuple[Region, ...]:
-        """Where the agent is to go: what a picture marks."""
-
     def rewards(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float1D:
         """Rewards of n steps, shape ``(n,)``; see `judge`."""
         return self.judge(layout, before, actions, after).rewards
@@ -88,12 +84,6 @@ class Task(ABC):
         """Which of n steps end their episodes, shape ``(n,)``; see `judge`."""
         return self.judge(layout, before, actions, after).terminated
 
-    def successes(
-        self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
-    ) -> NDArray[np.bool_]:
-        """Which of n steps reach the aim, shape ``(n,)``; see `judge`."""
-        return self.judge(layout, before, actions, after).succeeded
-
     def reward(self, before: Scene, action: Any, after: Scene) -> float:
         """Reward of one step; the scenes may hold an action object or not."""
         return float(self._one(before, action, after).rewards[0])
@@ -102,14 +92,28 @@ class Task(ABC):
         """Whether a step ends the episode."""
         return bool(self._one(before, action, after).terminated[0])
 
-    def succeeded(self, before: Scene, action: Any, after: Scene) -> bool:
-        """Whether a step reaches the aim."""
-        return bool(self._one(before, action, after).succeeded[0])
-
     def _one(self, before: Scene, action: Any, after: Scene) -> Judgement:
         # A scene with what is done in it is wider than the one that follows.
         first, last = without_action(before), without_action(after)
         return self.judge(first.layout, first.vector[None], np.asarray(action)[None], last.vector[None])
+
+
+class Task(Judging):
+    """What an agent is asked to do. Immutable; its methods depend on nothing but their arguments."""
+
+    @abstractmethod
+    def regions(self, scene: Scene) -> tuple[Region, ...]:
+        """Where the agent is to go: what a picture marks."""
+
+    def successes(
+        self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
+    ) -> NDArray[np.bool_]:
+        """Which of n steps reach the aim, shape ``(n,)``; see `judge`."""
+        return self.judge(layout, before, actions, after).succeeded
+
+    def succeeded(self, before: Scene, action: Any, after: Scene) -> bool:
+        """Whether a step reaches the aim."""
+        return bool(self._one(before, action, after).succeeded[0])
 
 
 def column_of(layout: SceneLayout, name: str, prop: str, vectors: Float2D) -> Float1D:

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
-from relgym.envs.actions import without_action
-from relgym.envs.tasks import Judgement
+from relgym.envs.tasks import Judgement, Judging
 from relgym.errors import ConfigError
 from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
@@ -22,7 +21,6 @@ from relgym.scene.objects import (
     Float1D,
     Float2D,
     ObjectType,
-    Scene,
     SceneLayout,
     SceneSchema,
     Target,
@@ -76,7 +74,7 @@ def check_rewards(rewards: NDArray[np.float64], judge: Judge) -> None:
         )
 
 
-class LearnedTask:
+class LearnedTask(Judging):
     """Learns reward and termination as properties of the bodiless object `task`, with modes and clauses.
 
     They are functions of the scene, the action and the next scene, so the judge's own little world has no
@@ -103,7 +101,8 @@ class LearnedTask:
     -----
     What depends on one among several objects of a type can't be learned so.
 
-    It is a task like those of envs: dreams may be judged by it (`LearnedModelEnv`, argument ``task``).
+    It judges as an env's task does: dreams may be judged by it (`LearnedModelEnv`, argument ``task``). Where nothing is
+    known, rewards are NaN.
 
     The reward may depend on whether the step ends the episode, as a bonus for success does: it is learned given that.
 
@@ -196,28 +195,6 @@ class LearnedTask:
         rewards = np.where(known, found.vectors[:, small.column(task, "reward")], np.nan)
         ended = found.vectors[:, small.column(task, "terminated")] > 0.5
         return Judgement(rewards, ended & known, np.zeros(len(before), dtype=bool))
-
-    def rewards(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float1D:
-        """Rewards of n steps, shape ``(n,)``; NaN where nothing is known."""
-        return self.judge(layout, before, actions, after).rewards
-
-    def terminations(
-        self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
-    ) -> NDArray[np.bool_]:
-        """Which of n steps end their episodes, shape ``(n,)``."""
-        return self.judge(layout, before, actions, after).terminated
-
-    def reward(self, before: Scene, action: Any, after: Scene) -> float:
-        """Reward of one step; NaN where nothing is known."""
-        return float(self._one(before, action, after).rewards[0])
-
-    def terminated(self, before: Scene, action: Any, after: Scene) -> bool:
-        """Whether a step ends the episode."""
-        return bool(self._one(before, action, after).terminated[0])
-
-    def _one(self, before: Scene, action: Any, after: Scene) -> Judgement:
-        first, last = without_action(before), without_action(after)
-        return self.judge(first.layout, first.vector[None], np.asarray(action)[None], last.vector[None])
 
     def _ever_together(self, found: BatchPrediction) -> NDArray[np.bool_]:
         """Where reward and termination come from modes that were right of one and the same real step."""
