@@ -27,6 +27,9 @@ __all__ = ["ClusterReport", "ModeClusterer"]
 ESTIMATE_AT = (64, 512, 4096)
 """Numbers of examples after which the noise is estimated anew."""
 
+LESS = 0.5
+"""Where most is unexplained, noise was overrated by the first few examples if more of them show so much less."""
+
 LEAST_MEMBERS = 4
 """Examples that a mode of another model must explain here to be taken over."""
 
@@ -151,8 +154,9 @@ class ModeClusterer(Prospector):
         if self._log.seen in ESTIMATE_AT and 2 * self.noise_examples > self._log.seen:
             estimate = self._estimate(table, floor)
             explained = 1.0 - self.noise_examples / self._log.seen
-            if refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
-                self._spread, self.approximate = estimate, False
+            less = estimate < LESS * self.scale.sigma and not self.approximate
+            if less or refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
+                self._spread, self.approximate = estimate if estimate > floor else 0.0, False
                 self._start_over()
         self._assume(max(floor, self._spread))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus, consensus, refine
-from relgym.numeric.stepwise import PIVOT, LinearFit, least_squares, varying_columns
+from relgym.numeric.stepwise import PIVOT, LinearFit, forward_stepwise, least_squares, varying_columns
 
 __all__ = ["EXACT", "SEARCH", "Scale", "find_mode", "identified", "least_examples", "plans", "verifying_bits"]
 
@@ -130,6 +130,7 @@ def find_mode(
     needed = least_examples(y, scale, config) if needed is None else needed
     rows = _recent(len(y), fresh, rng)
     simple = [SIMPLE] if counting else []
+    completed = 0  # columns among which terms that were missing have been looked for
     for number, (columns, terms, size) in enumerate([*simple, *plans(stages, config)]):
         if simple and number:
             needed = max(needed, WORDY)
@@ -152,9 +153,36 @@ def find_mode(
         if found is None or found.size < min(needed, 6):
             continue
         found = identified(x, y, found.fit, scale=scale, support=config.support)
-        if found is not None and found.size >= needed and is_law(x, y, found, stages[0], scale):
+        if found is None or found.size < needed:
+            continue
+        if is_law(x, y, found, stages[0], scale):
             return found
+        if number >= len(simple) and columns > completed:
+            completed = columns
+            fit = _complete(x[rows][:, :columns], y[rows], found.fit, scale=scale, terms=config.max_terms)
+            found = identified(x, y, fit, scale=scale, support=config.support)
+            if found is not None and found.size >= needed and is_law(x, y, found, stages[0], scale):
+                return found
     return None
+
+
+def _complete(
+    x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, *, scale: Scale, terms: int
+) -> LinearFit:
+    """A function with the small terms that another one lacks, from rows that it misses by less and less.
+
+    A few rows don't show a term that is small beside their function's: what they leave of it is within what the
+    extrapolation of any function of so few rows is allowed. It makes near misses of the others.
+    """
+    reach = NEAR * scale.tail
+    while True:
+        near = np.abs(y - fit.predict(x)) <= reach
+        if near.sum() <= terms + 1:
+            return fit
+        fit = forward_stepwise(x[near], y[near], sigma=scale.sigma, max_terms=terms)
+        if reach <= scale.tolerance:
+            return fit
+        reach = max(0.5 * reach, scale.tolerance)
 
 
 def is_law(x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, own: int, scale: Scale) -> bool:

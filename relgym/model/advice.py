@@ -25,7 +25,7 @@ LIBRARIES = (("trig",), ("products",), ("trig", "products"))
 LAST_RESORT = ("trig", "degree4")
 """What is tried when nothing else leaves less than `GOOD`."""
 
-GOOD, BETTER = 0.01, 0.5
+GOOD, BETTER = 0.01, 0.75
 """A share of the change so small is explained; so much less than before is better."""
 
 EQUAL, CLOSE = 3.0, 1.5
@@ -133,7 +133,10 @@ def _lacks(model: PropertyModel, table: ExampleTable) -> Advice | None:
     recent = np.arange(max(0, len(clusterer.y) - ROWS), len(clusterer.y))
     noise = float((clusterer.labels[recent] == NOISE).mean())
     change = clusterer.y[recent] - _present(model, table, recent)
-    rough = clusterer.approximate or _supposed(model, table)
+    # A noise that was only supposed may be a curve for features to follow.
+    rough = clusterer.approximate or (
+        clusterer.config.noise_std == "auto" and clusterer.scale.sigma > ROUGH * clusterer.floor
+    )
     left = min(1.0, _remains(model, table, recent) / max(float(change.std()), 1e-300)) if rough else 1.0
     covered = left <= FINE or (noise <= UNEXPLAINED and not rough)
     if covered and not undecided:
@@ -154,13 +157,6 @@ def _lacks(model: PropertyModel, table: ExampleTable) -> Advice | None:
     if noise <= UNEXPLAINED and not clusterer.approximate and not undecided:
         return None  # it is noise indeed
     return Advice(str(model.target), noise, left, (), "", 1.0)
-
-
-def _supposed(model: PropertyModel, table: ExampleTable) -> bool:
-    """Whether a noise is supposed, in a world that nobody described, that may be a curve for features to follow."""
-    clusterer = model.clusterer
-    described = not table.signatures[int(table.signature_ids[clusterer.rows[-1]])].chained
-    return not described and clusterer.scale.sigma > ROUGH * clusterer.floor
 
 
 def _remains(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> float:

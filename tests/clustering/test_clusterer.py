@@ -146,6 +146,20 @@ def test_noisy_data_give_one_mode_with_the_noise_estimated(sd: float, rng: np.ra
     assert stream.clusterer.noise_examples <= 3
 
 
+def test_noise_that_the_first_few_examples_overrated_is_lowered(rng: np.random.Generator) -> None:
+    # The first examples are disturbed; through so much noise the law without its last term is but a tangent.
+    stream = Stream(SlotSignature((ObjectType("ball", ("v", "w", "a")),)))
+    x = rng.normal(size=(700, 3)) * (1.0, 1.0, 0.3)
+    y = x[:, 0] + 0.2 * x[:, 1] + 0.1 * x[:, 2]
+    y[:64] += rng.normal(scale=0.05, size=64)
+    stream.feed(x[:500], y[:500])
+    assert stream.clusterer.scale.sigma > 0.01
+    assert stream.counts() == {"noise": 500}
+    stream.feed(x[500:], y[500:])
+    assert stream.clusterer.scale.sigma < 1e-10
+    assert stream.counts() == {"v' = v + 0.2 w + 0.1 a": 636, "noise": 64}
+
+
 def test_float32_observations_are_no_noise_but_rounding(rng: np.random.Generator) -> None:
     x = states(rng, 200).astype(np.float32)
     y = (x[:, 0] * np.float32(-0.9)).astype(np.float32)

@@ -116,6 +116,27 @@ def test_a_mode_among_the_noise_is_found_by_its_newest_example(rng: np.random.Ge
     assert found.fit.intercept == pytest.approx(-0.000245, abs=1e-12)
 
 
+def test_a_term_that_few_rows_do_not_show_is_found_from_near_misses(rng: np.random.Generator) -> None:
+    # Extrapolated from a few rows, the function without it is as good as any, but explains hardly a row.
+    x = rng.normal(size=(400, 24)) * np.array([100.0, 2.0, 0.2] + 21 * [1.0])
+    y = x[:, 0] + 0.2 * x[:, 1] + 0.01 * x[:, 2] + 0.002 + rng.normal(scale=2e-5, size=400)
+    y[:100] += rng.normal(scale=0.05, size=100)
+    found = find_mode(
+        x,
+        y,
+        np.zeros(400, dtype=int),
+        stages=(24,),
+        fresh=1,
+        scale=Scale(1e-4, 4.0, 6.0),
+        config=CONFIG,
+        rng=rng,
+    )
+    assert found is not None
+    assert found.fit.columns == (0, 1, 2)
+    assert found.fit.weights == pytest.approx((1.0, 0.2, 0.01), abs=1e-4)
+    assert 298 <= found.size <= 306
+
+
 def test_fresh_rows_may_outnumber_those_left_to_search(rng: np.random.Generator) -> None:
     # Of 900 rows that no search has seen some have become a mode's tail, and 600 are left.
     x = rng.normal(size=(600, 3))
