@@ -29,7 +29,9 @@ __all__ = [
     "check_entries",
     "functions_of",
     "library_of",
+    "offered",
     "register_function",
+    "switched_on",
 ]
 
 FREQUENCIES = (1, 2, 3)
@@ -238,6 +240,24 @@ def library_of(entries: Iterable[str], type_name: str, angles: tuple[str, ...]) 
             kinds.append(kind)
             named += properties
     return Library(tuple(dict.fromkeys(kinds)), tuple(dict.fromkeys(named)) or angles)
+
+
+def offered(entries: Iterable[str], type_name: str) -> frozenset[str]:
+    """Kinds of features that `library_of` offers a type's targets of all properties that have them."""
+    parsed = [_parsed(entry) for entry in entries]
+    return frozenset(kind for owner, kind, named in parsed if owner in (None, type_name) and not named)
+
+
+def switched_on(entries: Iterable[str], type_name: str, kinds: Iterable[str]) -> tuple[str, ...]:
+    """Entries that offer a type's targets these kinds as well, and everybody else what these entries do.
+
+    Examples
+    --------
+    >>> switched_on(("car:trig", "ego:trig"), "ego", ("products",))
+    ('car:trig', 'ego:products')
+    """
+    kept = [entry for entry in entries if _parsed(entry)[0] != type_name]
+    return (*kept, *(f"{type_name}:{kind}" for kind in kinds if kind not in kept))
 
 
 def check_entries(entries: Iterable[str], types: Mapping[str, Collection[str]]) -> None:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from relgym.clustering.approximation import LEFT, NEARLY_ALL, NORMAL, approximate, terms_of
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.features import MOST_FEATURES, library_of
+from relgym.clustering.features import MOST_FEATURES, library_of, offered, switched_on
 from relgym.clustering.mode import NOISE, sum_text
 from relgym.model.parts import Parts
 from relgym.model.property_model import PropertyModel
+from relgym.scene.objects import ACTION, TASK
 
 __all__ = ["Advice", "advices", "advise"]
 
@@ -57,7 +58,8 @@ class Advice:
     left
         Share of the change's standard deviation that the present modes leave; 1 if there are none.
     features
-        What to switch on (``ModelConfig(features=...)``); empty: nothing that was tried explains it.
+        What to switch on (``ModelConfig(features=...)``), what is on for other types included; empty: nothing that
+        was tried explains it.
     law
         The law that was found with these features, as text; empty without any.
     remains
@@ -142,7 +144,7 @@ def _lacks(model: PropertyModel, table: ExampleTable) -> Advice | None:
     if covered and not undecided:
         return None
     left = 1.0 if covered else left
-    known = frozenset(model.config.features)
+    known = offered(model.config.features, model.target.type)
     trials = [_try(model, table, recent, kinds) for kinds in LIBRARIES if not known.issuperset(kinds)]
     good = min((t.left for t in trials if t is not None), default=1.0) <= GOOD
     if not good and not known.issuperset(LAST_RESORT):
@@ -153,10 +155,16 @@ def _lacks(model: PropertyModel, table: ExampleTable) -> Advice | None:
             return None  # the law is of the form that it has, and what it leaves is noise
         best = None
     if best is not None and (best.left <= GOOD or not covered):
-        return Advice(str(model.target), noise, left, best.features, best.law, best.left)
+        return Advice(str(model.target), noise, left, _entries(model, best.features), best.law, best.left)
     if noise <= UNEXPLAINED and not clusterer.approximate and not undecided:
         return None  # it is noise indeed
     return Advice(str(model.target), noise, left, (), "", 1.0)
+
+
+def _entries(model: PropertyModel, kinds: tuple[str, ...]) -> tuple[str, ...]:
+    """What to switch on; among several types for this one alone, since others' laws would only be blurred."""
+    others = {t.name for t in model.schema.types} - {ACTION, TASK, model.target.type}
+    return switched_on(model.config.features, model.target.type, kinds) if others else kinds
 
 
 def _remains(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> float:

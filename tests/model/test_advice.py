@@ -11,7 +11,7 @@ from points import formulas, learned, schema_of, transitions
 from relgym.model.advice import LAST_RESORT, Advice, _choose, _Trial, _try
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Transition
+from relgym.scene.objects import ObjectType, SceneSchema, Transition
 
 SCHEMA = schema_of(("x", "v"), ("a",))
 
@@ -66,6 +66,25 @@ def test_the_advice_names_the_smallest_library_that_explains_it(plain: WorldMode
 def test_taken_it_gives_the_law() -> None:
     model = learned(SCHEMA, hills(300), features=("trig",))
     assert formulas(model, "v") == ["v' = v + 0.3 sin(2 x) + 0.1 action.a"]
+    assert model.advice() == ()
+
+
+def test_among_several_types_it_is_for_the_one_that_lacks_it() -> None:
+    # Of the other type's linear laws features would only make worse ones.
+    types = (ObjectType("hill", ("x", "v")), ObjectType("cart", ("w",)))
+    schema = SceneSchema(types, (("hill", "hill"), ("cart", "cart")))
+    rng = np.random.default_rng(0)
+    steps = []
+    for x, v, w in rng.uniform(-3.0, 3.0, size=(300, 3)):
+        before = {"hill": [x, v], "cart": [w]}
+        after = {"hill": [x + 1.0, v + 0.3 * np.sin(2.0 * x)], "cart": [0.9 * w]}
+        steps.append(Transition(schema.scene(before), schema.scene(after)))
+    model = learned(schema, steps, features=("cart:products",))
+    (advice,) = model.advice()
+    assert advice.features == ("cart:products", "hill:trig")
+    assert "ModelConfig(features=('cart:products', 'hill:trig')) explains it" in model.describe()
+    model = learned(schema, steps, features=advice.features)
+    assert [m.formula(4) for m in model.modes("hill", "v")] == ["v' = v + 0.3 sin(2 x)"]
     assert model.advice() == ()
 
 
