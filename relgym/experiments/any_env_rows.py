@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.baselines.base import Regressor
-from relgym.baselines.catalogue import make_regressor
-from relgym.baselines.fitted import FittedRegressor
-from relgym.baselines.kinds import Columns
+from relgym.baselines.changes import ONLINE, rivals, titles
 from relgym.config import ModelConfig
 from relgym.envs.views import TableView
 from relgym.experiments.recording import Recording
@@ -25,11 +20,7 @@ from relgym.scene.objects import Scene, Target, Transition
 from relgym.wrappers.follower import Follower
 from relgym.wrappers.study import Study
 
-__all__ = ["ONLINE", "Rows", "live", "rivals", "size", "stream"]
-
-ONLINE = ("persistence", "constant velocity", "rls", "hoeffding", "amrules")
-"""Online baselines by name."""
-
+__all__ = ["Rows", "live", "size", "stream"]
 
 _COLUMNS = ("step", "now", "seen", "last", "change", "said", "sure", "ended")
 
@@ -180,51 +171,6 @@ def _alone(view: object, scene: Scene) -> NDArray[np.float64]:
     return np.concatenate(found)
 
 
-def rivals(columns: dict[str, NDArray[np.float64]], *, batch: bool) -> dict[str, NDArray[np.float64]]:
-    """What other learners say of the same rows, the batch learners fitted to the first half; shape ``(n, m)`` each."""
-    seen, change = columns["seen"], columns["change"]
-    half, rng = len(seen) // 2, np.random.default_rng(0)
-    found = {"persistence": np.zeros_like(change), "constant velocity": columns["last"]}
-    for name in ONLINE[2:] if find_spec("river") else ONLINE[2:3]:
-        learner = make_regressor(name, columns=Columns(tuple(range(change.shape[1]))), rng=rng)
-        found[name] = _along(learner, seen, change)
-    for name, learner in _batch(half, rng).items() if batch else ():
-        for row, y in zip(seen[:half], change[:half], strict=True):
-            learner.learn_one(row, y)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a single target is a column here, which scikit-learn warns of
-            told = learner.predict_batch(seen[half:])
-        found[name] = np.concatenate([np.full((half, change.shape[1]), np.nan), told])
-    return found
-
-
-def _along(learner: Regressor, seen: NDArray[np.float64], change: NDArray[np.float64]) -> NDArray[np.float64]:
-    found = np.zeros_like(change)
-    learner.learn_one(seen[0], change[0])
-    for k in range(1, len(seen)):
-        found[k] = learner.predict_one(seen[k])
-        learner.learn_one(seen[k], change[k])
-    return found
-
-
-def _batch(half: int, rng: np.random.Generator) -> dict[str, Regressor]:
-    found: dict[str, Regressor] = {}
-    if find_spec("sklearn") is not None:
-
-        def tree() -> object:
-            from sklearn.tree import DecisionTreeRegressor
-
-            return DecisionTreeRegressor(min_samples_leaf=3, random_state=0)
-
-        found["tree"] = FittedRegressor(tree, rng=rng, scale=False)
-        found["forest"] = make_regressor("forest", columns=Columns(()), rng=rng)
-    if find_spec("torch") is not None:
-        from relgym.baselines.ensemble import MLPEnsemble
-
-        found["MLP ensemble"] = MLPEnsemble(hidden=128, train_every=half, train_steps=3_000, seed=0)
-    return found
-
-
 def size(
     guess: NDArray[np.float64], change: NDArray[np.float64], keep: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
@@ -251,7 +197,8 @@ def stream(name: str, rows: Rows, *, verbose: bool, batch: bool) -> Iterator[tup
     columns = rows.columns()
     late = np.arange(len(columns["step"])) >= len(columns["step"]) // 2
     kinds = {"all steps": late, "the episode goes on": late & ~columns["ended"].astype(bool)}
-    said = {"relgym": columns["said"]} | rivals(columns, batch=batch)
+    told = rivals(columns["seen"], columns["change"], once=batch, last=columns["last"])
+    said = {"relgym": columns["said"]} | told
     lines: list[list[Cell]] = []
     for kind, keep in kinds.items():
         sizes = {who: size(guess, columns["change"], keep) for who, guess in said.items()}
@@ -261,4 +208,4 @@ def stream(name: str, rows: Rows, *, verbose: bool, batch: bool) -> Iterator[tup
             what = f"{name}.{prop}, prequential, {kind}, over the best online baseline"
             yield what, float(sizes["relgym"][k]) / best
     if verbose:
-        print(table(["nRMSE-d", *said], lines), "\n", flush=True)
+        print(table(["nRMSE-d", *titles(said)], lines), "\n", flush=True)
