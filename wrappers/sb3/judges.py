@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter, deque
 from collections.abc import Callable
 from functools import partial
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 
 from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
 from relgym.envs.tasks import Judgement, Judging
-from relgym.errors import ConfigError
+from relgym.errors import ConfigError, ModelFileError, SchemaError
 from relgym.model.prediction import BatchPrediction
+from relgym.model.storage import schema_from_json, schema_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import (
     ACTION,
@@ -35,6 +37,7 @@ Acting: TypeAlias = Callable[[SceneLayout, Float2D, Any], tuple[SceneLayout, NDA
 
 _NOW, _NEXT = "now", "next"
 _TOLD: Final = ("reward", "terminated")
+_FILE: Final = "learned_task"  # under this name the rest of a judge stands in a model's file
 _RIGHT: Final = 1e-6  # how far a right verdict may be off
 
 _EXACT: Final = ModelConfig(
@@ -122,6 +125,7 @@ class LearnedTask(Judging):
         acting: Acting | None = None,
     ) -> None:
         self.schema = schema
+        self._changing = frozenset(changing)
         self._acting = partial(acting_all, schema) if acting is None else acting
         counts = Counter(name for _, name in schema.objects)
         single = [
@@ -139,6 +143,63 @@ class LearnedTask(Judging):
         self._rng = np.random.default_rng(0)
         self._together: set[tuple[int, int]] = set()
         self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the judge to one file, atomically, with all that further learning needs; `load` reads it.
+
+        The file is a model's, of the judge's own little world: `relgym.WorldModel.load` reads that alone.
+        """
+        remembered = {"ends": self._ends, "latest": self._latest, "earlier": self._earlier}
+        data: dict[str, Any] = {name: [v.tolist() for v in part] for name, part in remembered.items()}
+        data |= {
+            "schema": schema_to_json(self.schema),
+            "changing": sorted(map(list, self._changing)),
+            "passed": self._passed,
+            "rng": self._rng.bit_generator.state,
+            "together": sorted(map(list, self._together)),
+            "reviewed": self._reviewed,
+        }
+        self.model.save(path, history=True, extra={_FILE: data})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], *, acting: Acting | None = None) -> LearnedTask:
+        """Read what `save` wrote: it judges and learns on as if it had never been saved.
+
+        Parameters
+        ----------
+        path
+            The file.
+        acting
+            As of the class: functions aren't part of the file.
+
+        Raises
+        ------
+        ModelFileError
+            No file of a judge, a damaged one, or one of another version.
+        """
+        model, extra = WorldModel.load_with_extra(path)
+        if _FILE not in extra:
+            raise ModelFileError(
+                f"{path} holds a model but no learned task: expected what LearnedTask.save wrote"
+            )
+        data = extra[_FILE]
+        try:
+            judge = cls(
+                schema_from_json(data["schema"]), {(t, p) for t, p in data["changing"]}, acting=acting
+            )
+            judge._ends.extend(map(np.array, data["ends"]))
+            judge._latest.extend(map(np.array, data["latest"]))
+            judge._earlier.extend(map(np.array, data["earlier"]))
+            judge._passed, judge._rng.bit_generator.state = int(data["passed"]), data["rng"]
+            judge._together = {(int(r), int(e)) for r, e in data["together"]}
+            seen, modes = data["reviewed"]
+            judge._reviewed = (int(seen), tuple(modes))
+        except (KeyError, TypeError, ValueError, SchemaError) as error:
+            raise ModelFileError(
+                f"{path}: a part of the learned task is missing or malformed ({error!r}); save it again"
+            ) from None
+        judge.model, model.extra = model, {}
+        return judge
 
     def _small_schema(self) -> SceneSchema:
         def named(pairs: list[tuple[str, str]]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from relgym.errors import StoreError
 from relgym.experiments.chapter4.canvas import TITLES
@@ -23,6 +23,9 @@ from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
 
 __all__ = ["Made", "compute", "make", "page", "section"]
+
+PAGES: Final = {"dream.md": "What dreaming is worth", "any-env.md": "Envs that nobody here wrote"}
+"""Pages of results beside this one, and their titles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,8 +175,10 @@ def _head(made: Sequence[Made], folder: Path) -> str:
     contents = "\n".join(f"- [{each.name}: {each.title}](#{_anchor(each)})" for each in made)
     missing = [name for name in JOBS if name not in {each.name for each in made}]
     rest = f"\nNot made yet: {', '.join(missing)}.\n" if missing else ""
-    dreams = "What dreaming is worth" if (folder / "dream.md").is_file() else ""
-    more = f"\n[{dreams}]({folder.name}/dream.md) has a page of its own.\n" if dreams else ""
+    pages = [
+        f"- [{title}]({folder.name}/{name})" for name, title in PAGES.items() if (folder / name).is_file()
+    ]
+    more = "\nOther pages:\n\n" + "\n".join(pages) + "\n" if pages else ""
     return (
         "# Results\n\n"
         "Chapter IV of the thesis again, each table and figure beside what was printed. `relgym reproduce` wrote this "

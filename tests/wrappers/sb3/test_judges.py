@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -11,6 +12,7 @@ import pytest
 import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
 from relgym.envs.scripted import ball_home, push_knowing
+from relgym.errors import ModelFileError
 from relgym.scene.objects import ObjectType, SceneSchema, Target, Transition
 from relgym.wrappers.sb3.judges import LearnedTask
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
@@ -152,6 +154,38 @@ def test_a_few_ends_show_what_an_end_is_paid_for() -> None:
     assert len(fresh) >= 5
     assert np.mean(right) > 0.5
     assert not any(v.terminated[:-1].any() for v in said)
+
+
+def test_saved_and_loaded_it_goes_on_as_if_never_saved(rng: np.random.Generator, tmp_path: Path) -> None:
+    steps = [*pushes(200, 0.0, rng), *pushes(500, 0.9, rng)]
+    judge = LearnedTask(steps[0].start.schema, MOVING)
+    for step in steps[:600]:
+        judge.learn_step(step.transition, step.reward, terminated=step.terminated)
+    judge.save(tmp_path / "task.relgym")
+    again = LearnedTask.load(tmp_path / "task.relgym")
+    for each in (judge, again):
+        for step in steps[600:]:
+            each.learn_step(step.transition, step.reward, terminated=step.terminated)
+    fresh = pushes(100, 0.9, rng)
+    one, two = verdicts(judge, fresh), verdicts(again, fresh)
+    assert np.isfinite(one.rewards).any()
+    np.testing.assert_array_equal(one.rewards, two.rewards)
+    np.testing.assert_array_equal(one.terminated, two.terminated)
+    for number, each in enumerate((judge, again)):
+        each.save(tmp_path / f"{number}.relgym")
+    assert (tmp_path / "0.relgym").read_bytes() == (tmp_path / "1.relgym").read_bytes()
+    assert relgym.WorldModel.load(tmp_path / "0.relgym").describe() == judge.model.describe()
+
+
+def test_other_files_are_no_learned_task(tmp_path: Path) -> None:
+    schema = gym.make("relgym/TruckPush-v0").unwrapped.schema  # type: ignore[attr-defined]
+    relgym.WorldModel(schema).save(tmp_path / "world.relgym")
+    with pytest.raises(ModelFileError, match=r"no learned task: expected what LearnedTask\.save wrote"):
+        LearnedTask.load(tmp_path / "world.relgym")
+    judge = LearnedTask(schema, MOVING)
+    judge.model.save(tmp_path / "half.relgym", history=True, extra={"learned_task": {"ends": []}})
+    with pytest.raises(ModelFileError, match="a part of the learned task is missing or malformed"):
+        LearnedTask.load(tmp_path / "half.relgym")
 
 
 def test_dreams_are_judged_by_what_was_learned(rng: np.random.Generator) -> None:
