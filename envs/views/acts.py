@@ -25,7 +25,8 @@ class Acts:
 
     Continuous actions are properties in the env's own units. A discrete one is a number, for functions that are
     linear in it, and from three choices on (up to `MOST_CHOICES`) as many *indicators*, 1 for the choice taken
-    and 0 for the others: clauses test them, and functions use them where the number's order means nothing.
+    and 0 for the others: to clauses they are relations (``action.left``), and functions use them where the number's
+    order means nothing.
 
     Parameters
     ----------
@@ -63,7 +64,9 @@ class Acts:
         if discrete and self.names is not None:
             identifiers("names of the choices", self.names, self._counts[0])
             labels = [list(self.names)]
-        self.properties = (*given, *(label for part in labels for label in part))
+        indicators = tuple(label for part in labels for label in part)
+        self.properties = (*given, *indicators)
+        self._flags = given if isinstance(space, spaces.MultiBinary) else indicators
         self._indicated = [k for k, part in enumerate(labels) if part]
 
     def check(self, space: spaces.Space[Any]) -> None:
@@ -81,7 +84,7 @@ class Acts:
     @cached_property
     def type(self) -> ObjectType:
         """The type of the action object."""
-        return ObjectType(ACTION, self.properties)
+        return ObjectType(ACTION, self.properties, flags=self._flags)
 
     def values(self, action: Any) -> Float1D:
         """Properties of the action object, shape ``(len(properties),)``, for a legal action."""

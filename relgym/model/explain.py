@@ -14,7 +14,7 @@ from relgym.classification.views import View
 from relgym.clustering.mode import Mode
 from relgym.logic.csp import solutions, world_of
 from relgym.model.prediction import Prediction
-from relgym.model.text import amount
+from relgym.model.text import amount, as_relations
 from relgym.scene.objects import Scene
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def _reasons(
         # Where a mode ranked higher can't fill its roles, its own pair with the chosen mode says why it led.
         rival = verdict.rival if verdict.winner == chosen else verdict.winner
         objects = _objects(part, example, values, verdict, names or [scene.layout.names[index]])
-        clause = "" if verdict.clause is None else str(verdict.clause)
+        clause = "" if verdict.clause is None else as_relations(str(verdict.clause), part.flags)
         counts = (verdict.correct, verdict.incorrect)
         reasons.append(Reason(rival, by_mode[rival], clause, objects, verdict.tree, verdict.winner, *counts))
     return tuple(reasons)

@@ -148,6 +148,12 @@ class PropertyModel(Answers):
             self.guesses.compare(said - y, binding.value(row) - y)
 
     @property
+    def flags(self) -> frozenset[str]:
+        """Names, as clauses use them, of the numbers that are 1 or 0 as something holds or not."""
+        others = {f"{t.name}.{prop}" for t in self.schema.types for prop in t.flags}
+        return frozenset(others.union(self.schema.type(self.target.type).flags))
+
+    @property
     def base_features(self) -> int:
         """Number of own features that classifiers are shown, next values left aside."""
         return len(self._base.own)

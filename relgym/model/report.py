@@ -14,7 +14,7 @@ from relgym.model.advice import Advice
 from relgym.model.report_tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
 from relgym.model.spread import ROUNDING
 from relgym.model.spread_text import spread_text
-from relgym.model.text import Cell, table
+from relgym.model.text import Cell, as_relations, table
 from relgym.scene.objects import ACTION
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
 
 def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> TargetReport:
     modes = tuple(ModeRow(m.id, m.examples, _function(part, m, digits), _spread(part, m)) for m in part.modes)
-    pairs = tuple(_pair_table(c) for c in part.classifier.classifiers)
+    pairs = tuple(_pair_table(c, part.flags) for c in part.classifier.classifiers)
     return TargetReport(
         str(part.target),
         part.target.type,
@@ -138,12 +138,12 @@ def _spread(part: PropertyModel, mode: Mode) -> str:
     return spread_text(known, names)
 
 
-def _pair_table(classifier: BinaryClassifier) -> PairTable:
+def _pair_table(classifier: BinaryClassifier, flags: frozenset[str]) -> PairTable:
     trees = (*classifier.clause_trees, classifier.fall_through_tree)
-    rows = [
-        ClauseRow(name, right, wrong, () if tree is None else tree.rules())
-        for (name, right, wrong, _), tree in zip(classifier.describe(), trees, strict=True)
-    ]
+    rows = []
+    for (name, right, wrong, _), tree in zip(classifier.describe(), trees, strict=True):
+        tests = [as_relations(rule, flags) for rule in (() if tree is None else tree.rules())]
+        rows.append(ClauseRow(as_relations(name, flags), right, wrong, tuple(tests)))
     rows[-1] = ClauseRow(_OTHERWISE, rows[-1].correct, rows[-1].incorrect, rows[-1].tests)
     # §3.4.5: a negated definition's clauses describe mode j.
     rival = classifier.i if classifier.positive == classifier.j else classifier.j

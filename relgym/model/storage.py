@@ -196,6 +196,7 @@ def _type_to_json(t: ObjectType) -> dict[str, Any]:
         "exogenous": list(t.exogenous),
         "optional": t.optional,
         "angles": list(t.angles),
+        **({"flags": list(t.flags)} if t.flags else {}),
     }
 
 
@@ -210,6 +211,7 @@ def _type_from_json(data: dict[str, Any]) -> ObjectType:
         exogenous=tuple(data["exogenous"]),
         optional=data["optional"],
         angles=tuple(data.get("angles", ())),
+        flags=tuple(data.get("flags", ())),
     )
 
 

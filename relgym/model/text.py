@@ -5,15 +5,16 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeAlias
 
-__all__ = ["Cell", "amount", "indented", "plain", "table", "wrapped"]
+__all__ = ["Cell", "amount", "as_relations", "indented", "plain", "table", "wrapped"]
 
 Cell: TypeAlias = str | int | float
 """Integers get thousands separators, floats six significant digits."""
 
 _GAP = "  "
+_HALF = re.compile(r"(?P<name>[\w.]+) (?P<sign>>|<=) 0\.5(?![\d.e])")
 
 
 def table(heading: Sequence[str], rows: Sequence[Sequence[Cell] | str]) -> str:
@@ -49,6 +50,30 @@ def table(heading: Sequence[str], rows: Sequence[Sequence[Cell] | str]) -> str:
 def indented(text: str, by: int = 2) -> str:
     """The text with every line that isn't empty moved to the right."""
     return "\n".join(" " * by + line if line else line for line in text.split("\n"))
+
+
+def as_relations(text: str, flags: Collection[str]) -> str:
+    """Clauses or tests in which flags are told as relations are.
+
+    Parameters
+    ----------
+    text
+        What tests numbers against thresholds.
+    flags
+        Names of those that are 1 or 0.
+
+    Examples
+    --------
+    >>> as_relations("action.left > 0.5 ∧ x <= 0.5 ∧ action.up <= 0.5", {"action.left", "action.up"})
+    'action.left ∧ x <= 0.5 ∧ ¬action.up'
+    """
+
+    def told(test: re.Match[str]) -> str:
+        if test["name"] not in flags:
+            return test[0]
+        return test["name"] if test["sign"] == ">" else "¬" + test["name"]
+
+    return _HALF.sub(told, text) if flags else text
 
 
 def wrapped(text: str, width: int, signs: str) -> list[str]:

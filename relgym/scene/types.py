@@ -68,6 +68,9 @@ class ObjectType:
         Properties redrawn from outside the world; the model never predicts them (they persist in roll-outs).
     optional
         Whether objects of the type may be absent from a scene.
+    flags
+        Properties that are 1 or 0 as something holds or not: which choice was made. Tests of them are written as
+        relations are, ``action.left`` and ``¬action.left``. Types that differ in nothing else are equal.
     """
 
     name: str
@@ -79,16 +82,17 @@ class ObjectType:
     exogenous: tuple[str, ...] = ()
     optional: bool = False
     angles: tuple[str, ...] = ()
+    flags: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         if len(set(self.properties)) != len(self.properties):
             raise SchemaError(f"type {self.name!r}: property names must differ, got {self.properties}")
-        named = [*self.pose.values(), *(v for v in self.velocity if v), *self.exogenous, *self.angles]
-        for name in named:
+        named = [*self.pose.values(), *(v for v in self.velocity if v), *self.exogenous]
+        for name in (*named, *self.angles, *self.flags):
             if name not in self.properties:
                 raise SchemaError(
-                    f"type {self.name!r}: {name!r} is named as a pose, velocity, angle or exogenous property but "
-                    f"is not among its properties {self.properties}; add it or correct the name"
+                    f"type {self.name!r}: {name!r} is named as a pose, velocity, angle, flag or exogenous property "
+                    f"but is not among its properties {self.properties}; add it or correct the name"
                 )
         for component in self.pose:
             if component not in POSE:

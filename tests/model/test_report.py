@@ -6,13 +6,14 @@ import math
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from relgym.experiments.data import truck_blocks
 from relgym.model.explain import explanations
 from relgym.model.report import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport, report
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import ACTION, ObjectType, Scene, SceneSchema, Target, Transition
 
 BALL = ObjectType("ball", ("v",))
 SCHEMA = SceneSchema((BALL,), (("b", "ball"),), targets=(Target("ball", "v"),))
@@ -195,6 +196,30 @@ def test_open_roles_have_no_value_until_they_are_filled(truck: tuple[WorldModel,
     rivals = [r for r in explanations(model, scene)[0].reasons if math.isnan(r.rival_value)]
     assert rivals
     assert "roles would have to be filled" in model.explain(scene)
+
+
+def test_choices_are_told_as_relations(tmp_path: Path) -> None:
+    # Left and right move it, and nothing else does: functions may use the choices, clauses may test them.
+    types = (
+        ObjectType("cart", ("x", "v")),
+        ObjectType(ACTION, ("stay", "left", "right"), flags=("stay", "left", "right")),
+    )
+    schema = SceneSchema(types, tuple((t.name, t.name) for t in types), targets=(Target("cart", "v"),))
+    model, rng = WorldModel(schema), np.random.default_rng(0)
+    for _ in range(150):
+        v, choice = float(rng.normal()), int(rng.integers(3))
+        act = np.eye(3)[choice].tolist()
+        following = (v, 0.5 * v + 1.0, -2.0 * v)[choice]
+        before, after = ({"cart": [0.0, w], ACTION: act} for w in (v, following))
+        model.learn_one(Transition(schema.scene(before), schema.scene(after)))
+    model.finish()
+    text = model.describe()
+    assert "action.stay" in text or "action.left" in text or "action.right" in text
+    assert "> 0.5" not in text and "<= 0.5" not in text
+    scene = schema.scene({"cart": [0.0, 1.0], ACTION: [0.0, 1.0, 0.0]})
+    assert "action." in model.explain(scene) and "0.5 holds" not in model.explain(scene)
+    model.save(tmp_path / "cart.relgym")
+    assert WorldModel.load(tmp_path / "cart.relgym").describe() == text
 
 
 def test_saving_changes_no_word(truck: tuple[WorldModel, Scene], tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ SCHEMA = SceneSchema(
         ObjectType("ramp", ("px",), Wedge()),
         ObjectType("roof", ("px",), Prism(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))),
         ObjectType("rock", ("px",), ConvexPolyhedron(((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)))),
-        ObjectType("action", ("force",), exogenous=("force",)),
+        ObjectType("action", ("force", "brake"), exogenous=("force",), flags=("brake",)),
     ),
     (("b", "ball"), ("action", "action")),
     up="z",
@@ -46,6 +46,7 @@ def test_a_schema_comes_back_whole() -> None:
     again = schema_from_json(json.loads(json.dumps(schema_to_json(SCHEMA))))
     assert again == SCHEMA
     assert again.types == SCHEMA.types
+    assert [t.flags for t in again.types] == [t.flags for t in SCHEMA.types]
     assert again.targets == SCHEMA.targets
 
 

@@ -42,6 +42,10 @@ def test_every_flat_action_has_properties(space: Any, action: Any, properties: A
 def test_choices_and_numbers_may_have_names() -> None:
     assert Acts(spaces.Discrete(2), ("left", "right")).type.properties == ("a", "left", "right")
     assert Acts(spaces.Box(-1, 1, (2,)), ("steer", "gas")).type.properties == ("steer", "gas")
+    assert Acts(spaces.Discrete(2), ("left", "right")).type.flags == ("left", "right")
+    assert Acts(spaces.MultiDiscrete([3, 9_999])).type.flags == ("a0_is_0", "a0_is_1", "a0_is_2")
+    assert Acts(spaces.MultiBinary(2)).type.flags == ("a0", "a1")
+    assert Acts(spaces.Box(-1, 1, (2,)), ("steer", "gas")).type.flags == ()
     with pytest.raises(ConfigError, match="names of the choices: expected 3"):
         Acts(spaces.Discrete(3), ("left", "right"))
     with pytest.raises(ConfigError, match="expected 2 different"):
