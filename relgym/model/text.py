@@ -14,7 +14,8 @@ Cell: TypeAlias = str | int | float
 """Integers get thousands separators, floats six significant digits."""
 
 _GAP = "  "
-_HALF = re.compile(r"(?P<name>[\w.]+) (?P<sign>>|<=) 0\.5(?![\d.e])")
+_HALF = re.compile(r"(?<![\w.])(?<!- )(?P<name>[\w.]+) (?P<sign>>|<=) 0\.5(?![\d.e])")
+"""A number that is compared with a half, and is no difference's end."""
 
 
 def table(heading: Sequence[str], rows: Sequence[Sequence[Cell] | str]) -> str:
@@ -66,6 +67,8 @@ def as_relations(text: str, flags: Collection[str]) -> str:
     --------
     >>> as_relations("action.left > 0.5 ∧ x <= 0.5 ∧ action.up <= 0.5", {"action.left", "action.up"})
     'action.left ∧ x <= 0.5 ∧ ¬action.up'
+    >>> as_relations("F1 - action.up > 0.5 ∧ action.up > 0.55", {"action.up"})
+    'F1 - action.up > 0.5 ∧ action.up > 0.55'
     """
 
     def told(test: re.Match[str]) -> str:
