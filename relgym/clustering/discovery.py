@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,6 +111,7 @@ def find_mode(
     rng: np.random.Generator,
     needed: int | None = None,
     counting: bool = False,
+    differences: Callable[[NDArray[np.intp]], NDArray[np.integer]] | None = None,
 ) -> Consensus | None:
     """Search rows of one slot signature for a function that enough of them obey.
 
@@ -126,10 +128,14 @@ def find_mode(
         Examples that found a mode; default: `least_examples` of these responses.
     counting
         Whether the target counts something (`counts`).
+    differences
+        Gives in how many facts the relational states of some rows differ, for states with few rows.
     """
     needed = least_examples(y, scale, config) if needed is None else needed
     rows = _recent(len(y), fresh, rng)
     simple = [SIMPLE] if counting else []
+    several = differences is not None and len(np.unique(strata[rows])) > 1
+    apart = differences(rows) if differences is not None and several else None
     completed = 0  # columns among which terms that were missing have been looked for
     for number, (columns, terms, size) in enumerate([*simple, *plans(stages, config)]):
         if simple and number:
@@ -146,6 +152,7 @@ def find_mode(
             draws=max(32, config.draws // (1 if columns == stages[0] else 3 if columns <= WIDE else 12)),
             rng=rng,
             strata=strata[rows],
+            apart=apart,
             anchors=np.flatnonzero(rows >= len(y) - fresh),
             limit=48 if columns <= WIDE else 6,
             misfit=scale.misfit,

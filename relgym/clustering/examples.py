@@ -64,6 +64,20 @@ class ExampleTable:
         """The how-manieth each row was that came, shape ``(n,)``."""
         return self._serial[: self._size]
 
+    def differences(self, rows: NDArray[np.intp]) -> NDArray[np.int64]:
+        """In how many facts the relational states of some rows of one signature differ, shape ``(n, n)``.
+
+        Cost O(states^2 * bytes of a key).
+        """
+        states, which = np.unique(self.strata[rows], return_inverse=True)
+        known = self.stratum_keys
+        keys = [known[state] for state in states.tolist()]
+        width = max(map(len, keys))
+        facts = np.stack([np.frombuffer(key.ljust(width, b"\0"), dtype=np.uint8) for key in keys])
+        apart = np.stack([np.bitwise_count(facts ^ one).sum(axis=1, dtype=np.int64) for one in facts])
+        found: NDArray[np.int64] = apart[np.ix_(which, which)]
+        return found
+
     @property
     def stratum_keys(self) -> list[bytes]:
         """Key of each relational state, by its number in `strata`."""

@@ -141,6 +141,7 @@ class Prospector(Population):
             rng=self._rng,
             needed=self._needed,
             counting=counts(self.y, self.scale),
+            differences=lambda chosen: table.differences(rows[chosen]),
         )
         if found is None:
             return False

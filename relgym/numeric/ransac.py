@@ -57,20 +57,27 @@ def draw_samples(
     *,
     rng: np.random.Generator,
     strata: NDArray[np.integer] | None = None,
+    apart: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
 ) -> NDArray[np.intp]:
     """Row numbers of `draws` samples of `size` distinct rows, shape ``(draws, size)``.
 
     The first row of each sample comes from `anchors` (default: any row). A third of the samples takes the
     others from anywhere, a third from the first row's stratum, a third from the rows nearest to it in time:
-    contiguous examples and examples in the same relational state tend to share a mode (§3.2.3).
+    contiguous examples and examples in the same relational state tend to share a mode (§3.2.3). Where a state has too
+    few rows for a sample, those of the most similar states follow, if `apart` says how far states are apart, shape
+    ``(n, n)``: among many objects hardly two rows are in the same one.
     """
     first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
     keys = rng.random((draws, n))
     style = np.arange(draws) % 3
     if strata is not None:
         other = strata[None, :] != strata[first][:, None]
-        keys += np.where((style == 1)[:, None], 2.0 * other, 0.0)
+        further = 2.0 * other
+        if apart is not None:
+            few = n - other.sum(axis=1) < size
+            further[few] = np.where(other[few], 1.0 + apart[first[few]], 0.0)
+        keys += np.where((style == 1)[:, None], further, 0.0)
     age = np.abs(np.arange(n)[None, :] - first[:, None])
     keys += np.where((style == 2)[:, None], age // (2 * size), 0.0)
     keys[np.arange(draws), first] = -1.0
@@ -88,6 +95,7 @@ def consensus(
     draws: int,
     rng: np.random.Generator,
     strata: NDArray[np.integer] | None = None,
+    apart: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
     limit: int = 48,
     misfit: bool = False,
@@ -106,7 +114,7 @@ def consensus(
         Rows in a sample; at least ``terms + 2``, so that one degree of freedom verifies the fit.
     draws
         Number of samples.
-    strata, anchors
+    strata, apart, anchors
         See `draw_samples`.
     limit
         Most samples that are tried on all rows.
@@ -122,7 +130,7 @@ def consensus(
         return None
     loose = LOOSE if misfit else min(LOOSE, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
     columns = varying_columns(x)
-    samples = draw_samples(n, size, draws, rng=rng, strata=strata, anchors=anchors)
+    samples = draw_samples(n, size, draws, rng=rng, strata=strata, apart=apart, anchors=anchors)
     chosen = _forward_batch(x[:, columns][samples], y[samples], terms=terms, sigma=sigma, loose=loose)
     best: Consensus | None = None
     for sample, picked in _distinct(samples, chosen, limit):

@@ -101,6 +101,23 @@ def test_a_third_of_the_samples_stays_in_the_anchors_stratum(rng: np.random.Gene
     assert not pure[0::3].all()
 
 
+def test_where_a_state_has_few_rows_those_of_similar_states_follow(rng: np.random.Generator) -> None:
+    # Rows 0 and 20 share a state; so do 3 and 23, and so on. States are the further apart the more their numbers are.
+    strata = np.arange(40) % 20
+    apart = np.abs(strata[:, None] - strata[None])
+    samples = draw_samples(40, 5, 300, rng=rng, strata=strata, apart=apart, anchors=np.array([0]))
+    near = [set(s.tolist()) for s in samples[1::3]]
+    assert all({0, 20, 1, 21} <= s <= {0, 20, 1, 21, 2, 22} for s in near)
+    assert {0, 20, 1, 21, 2} in near and {0, 20, 1, 21, 22} in near
+    # Where there are enough, it is as ever, to the last draw.
+    many = np.arange(40) % 4
+    drawn = [
+        draw_samples(40, 5, 90, rng=np.random.default_rng(1), strata=many, apart=given)
+        for given in (None, np.abs(many[:, None] - many[None]))
+    ]
+    np.testing.assert_array_equal(*drawn)
+
+
 def test_a_third_of_the_samples_is_contiguous(rng: np.random.Generator) -> None:
     samples = draw_samples(1000, 5, 300, rng=rng, anchors=np.array([500]))
     assert (np.abs(samples[2::3] - 500) < 10).all()

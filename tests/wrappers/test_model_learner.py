@@ -334,3 +334,22 @@ def test_laws_that_are_rare_among_many_objects_are_found_though_nothing_was_expl
     laws = {mode.formula() for mode in part.modes if "force" in mode.formula()}
     assert len(laws) == 3
     assert (part.clusterer.labels[-300:] == 0).mean() < 0.05
+
+
+def test_a_bystander_makes_states_many_but_hides_no_law() -> None:
+    # Boxes' places and sizes beside one that isn't pushed: hardly two steps are in the same relational state.
+    env = ModelLearner(gym.make("relgym/TruckPush-v0", task="push", bystanders=1, disable_env_checker=True))
+    env.reset(seed=100)
+    env.action_space.seed(100)
+    for _ in range(250):
+        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        if terminated or truncated:
+            env.reset()
+    part = env.model.property_model("truck", "vx")
+    assert {mode.formula(4) for mode in part.modes} == {
+        "vx' = 0",
+        "vx' = vx + 0.025 action.force - 7.5 box.friction",
+        "vx' = vx + 0.025 action.force - 5 box_a.friction - 2.5 box_b.friction",
+        "vx' = vx + 0.025 action.force - 2.5 box_a.friction - 2.5 box_b.friction - 2.5 box_c.friction",
+    }
+    assert part.clusterer.noise_examples == 0
