@@ -153,12 +153,17 @@ class ModeClusterer(Prospector):
         self.floor = floor
         if self._log.seen in ESTIMATE_AT and 2 * self.noise_examples > self._log.seen:
             estimate = self._estimate(table, floor)
-            explained = 1.0 - self.noise_examples / self._log.seen
-            less = estimate < LESS * self.scale.sigma and not self.approximate
-            if less or refuted(self.scale.sigma, estimate, explained=explained, y=self.y):
+            if estimate is not None and self._refutes(estimate):
                 self._spread, self.approximate = estimate if estimate > floor else 0.0, False
                 self._start_over()
         self._assume(max(floor, self._spread))
+
+    def _refutes(self, estimate: float) -> bool:
+        """Whether an estimate of the noise refutes the one that is assumed: it is larger, or most was overrated."""
+        if estimate < LESS * self.scale.sigma and not self.approximate:
+            return True
+        explained = 1.0 - self.noise_examples / self._log.seen
+        return refuted(self.scale.sigma, estimate, explained=explained, y=self.y)
 
     def _assume(self, sigma: float) -> None:
         """Another noise: the tolerances follow."""
@@ -173,11 +178,12 @@ class ModeClusterer(Prospector):
                 self._assume(left)
         return super()._review(table)
 
-    def _estimate(self, table: ExampleTable, floor: float) -> float:
-        """Noise among examples of the newest example's signature."""
+    def _estimate(self, table: ExampleTable, floor: float) -> float | None:
+        """Noise among examples of the signature that holds most of the unexplained ones; none: they can't tell."""
         ids = table.signature_ids[self.rows]
-        part = np.flatnonzero(ids == ids[-1])
-        slots = table.signatures[ids[-1]]
+        most = int(np.bincount(ids[self.labels == NOISE], minlength=1).argmax())
+        part = np.flatnonzero(ids == most)
+        slots = table.signatures[most]
         order, stages = slots.preference(self.target)
         order = order[order < len(slots.columns)]
         rows = self.rows[part]

@@ -84,7 +84,7 @@ def estimate_noise(
     *,
     floor: float,
     own: int = WINDOW,
-) -> float:
+) -> float | None:
     """Noise of y about a locally linear function: lower quartile over windows of like examples.
 
     Consecutive examples in the same relational state mostly share a mode; the spread that a linear function leaves
@@ -104,10 +104,14 @@ def estimate_noise(
         Rounding noise; the estimate is never smaller, and equals it unless it is clearly larger.
     own
         How many of the leading columns are the target's own and bodiless objects'.
+
+    Returns
+    -------
+    The noise; none where there are too few examples of each relational state to tell.
     """
     windows = _windows(strata)
     if not windows:
-        return floor
+        return None
     simple = _quartile(
         [_spread(x[part], y[part], tuple(range(min(own, x.shape[1], TERMS)))) for part in windows]
     )

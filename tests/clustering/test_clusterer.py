@@ -160,6 +160,20 @@ def test_noise_that_the_first_few_examples_overrated_is_lowered(rng: np.random.G
     assert stream.counts() == {"v' = v + 0.2 w + 0.1 a": 636, "noise": 64}
 
 
+def test_one_example_of_a_rare_signature_tells_nothing_of_the_noise(rng: np.random.Generator) -> None:
+    stream = Stream()
+    among = SlotSignature((BALL, ObjectType("wall", ("k",))))
+    x = rng.normal(size=(600, 2))
+    lawful = np.arange(600) % 200 < 80  # most is unexplained when the noise is looked at again, at 512
+    y = np.where(lawful, 0.9 * x[:, 0] + rng.normal(scale=0.01, size=600), rng.normal(scale=3.0, size=600))
+    stream.feed(x[:511], y[:511])
+    known = stream.clusterer.scale.sigma
+    stream.signature = among
+    stream.feed([(*x[511], 1.0)], [y[511]])
+    assert stream.clusterer.scale.sigma == known
+    assert len(stream.clusterer.modes) == 1
+
+
 def test_float32_observations_are_no_noise_but_rounding(rng: np.random.Generator) -> None:
     x = states(rng, 200).astype(np.float32)
     y = (x[:, 0] * np.float32(-0.9)).astype(np.float32)
