@@ -41,7 +41,7 @@ MOST_FEATURES = 6_000
 """A library of more features is refused: every search would take minutes and gigabytes."""
 
 _DEGREES = {"squares": 2, "products": 2, "degree3": 3, "degree4": 4}
-_ENTRY = re.compile(r"(?:(?P<type>\w+):)?(?P<kind>\w+)(?:\((?P<names>[\w, ]+)\))?")
+_ENTRY = re.compile(r"(?:(?P<type>[^:]+):)?(?P<kind>\w+)(?:\((?P<names>[\w, ]+)\))?")
 
 Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 _functions: dict[str, Function] = {}
@@ -61,10 +61,23 @@ def register_function(name: str, function: Function) -> None:
     Raises
     ------
     ConfigError
-        The name is no identifier or means something already.
+        The name is no identifier or means something already, or the function doesn't map arrays.
     """
     if not name.isidentifier() or name in {"trig", "sin", "cos", *_DEGREES}:
         raise ConfigError(f"expected a new identifier as a function's name, got {name!r}; choose another one")
+    tried = np.array([0.25, 0.5])
+    try:
+        with np.errstate(all="ignore"):
+            shape = np.shape(function(tried))
+    except Exception as error:
+        raise ConfigError(
+            f"feature {name!r} can't be worked out for an array of numbers ({error!r}); write it with numpy, or "
+            f"register numpy.vectorize({name})"
+        ) from error
+    if shape != tried.shape:
+        raise ConfigError(
+            f"feature {name!r} gives shape {shape} for an array of shape {tried.shape}, expected that"
+        )
     _functions[name] = function
 
 
@@ -223,7 +236,8 @@ def library_of(entries: Iterable[str], type_name: str, angles: tuple[str, ...]) 
     Parameters
     ----------
     entries
-        Such as ``"trig"``, ``"trig(th)"`` (only of that property) or ``"cart:products"`` (only for that type).
+        Such as ``"trig"`` (of declared angles; if there are none, of all properties), ``"trig(th)"`` (only of that
+        property) or ``"cart:products"`` (only for that type).
     type_name, angles
         The type, and those of its properties that are declared angles.
 
@@ -232,14 +246,18 @@ def library_of(entries: Iterable[str], type_name: str, angles: tuple[str, ...]) 
     ConfigError
         An entry that is no known kind and no registered function.
     """
-    kinds: list[str] = []
-    named: list[str] = []
+    kinds: dict[str, None] = {}
+    named: dict[str, None] = {}
+    everywhere = False
     for entry in entries:
         owner, kind, properties = _parsed(entry)
         if owner in (None, type_name):
-            kinds.append(kind)
-            named += properties
-    return Library(tuple(dict.fromkeys(kinds)), tuple(dict.fromkeys(named)) or angles)
+            kinds[kind] = None
+            named |= dict.fromkeys(properties)
+            everywhere |= kind == "trig" and not properties
+    if not everywhere:
+        return Library(tuple(kinds), tuple(named) or angles)
+    return Library(tuple(kinds), tuple(dict.fromkeys((*angles, *named))) if angles else ())
 
 
 def offered(entries: Iterable[str], type_name: str) -> frozenset[str]:
@@ -248,16 +266,28 @@ def offered(entries: Iterable[str], type_name: str) -> frozenset[str]:
     return frozenset(kind for owner, kind, named in parsed if owner in (None, type_name) and not named)
 
 
-def switched_on(entries: Iterable[str], type_name: str, kinds: Iterable[str]) -> tuple[str, ...]:
-    """Entries that offer a type's targets these kinds as well, and everybody else what these entries do.
+def switched_on(
+    entries: Iterable[str], type_name: str, kinds: Iterable[str], *, alone: bool = False
+) -> tuple[str, ...]:
+    """These entries, and behind them what offers a type's targets these kinds as well.
+
+    Parameters
+    ----------
+    entries
+        What is on; it stays on, for other targets may need it.
+    type_name, kinds
+        Who is to be offered what.
+    alone
+        Whether there is no other type, and an entry needn't name this one.
 
     Examples
     --------
-    >>> switched_on(("car:trig", "ego:trig"), "ego", ("products",))
-    ('car:trig', 'ego:products')
+    >>> switched_on(("car:trig", "ego:trig"), "ego", ("trig", "products"))
+    ('car:trig', 'ego:trig', 'ego:products')
     """
-    kept = [entry for entry in entries if _parsed(entry)[0] != type_name]
-    return (*kept, *(f"{type_name}:{kind}" for kind in kinds if kind not in kept))
+    entries = tuple(entries)
+    known, owner = offered(entries, type_name), "" if alone else f"{type_name}:"
+    return (*entries, *(f"{owner}{kind}" for kind in kinds if kind not in known))
 
 
 def check_entries(entries: Iterable[str], types: Mapping[str, Collection[str]]) -> None:

@@ -58,8 +58,8 @@ class Advice:
     left
         Share of the change's standard deviation that the present modes leave; 1 if there are none.
     features
-        What to switch on (``ModelConfig(features=...)``), what is on for other types included; empty: nothing that
-        was tried explains it.
+        What to switch on (``ModelConfig(features=...)``), behind all that is on; empty: nothing that was tried explains
+        it.
     law
         The law that was found with these features, as text; empty without any.
     remains
@@ -84,9 +84,9 @@ class Advice:
             return now
         if not self.features:
             return f"{now}; no library of features that was tried explains it"
-        close = (
-            "explains it" if self.remains <= GOOD else f"comes closest, and leaves {_percent(self.remains)}"
-        )
+        close = f"comes closest, and leaves {_percent(self.remains)}"
+        if self.remains <= GOOD:
+            close = "explains it" + ("" if self.remains <= FINE else f" but for {_percent(self.remains)}")
         if self.remains > GOOD:
             now += "; no library of features that was tried explains it"
         return f"{now}; ModelConfig(features={self.features}) {close}: {self.law}"
@@ -155,23 +155,26 @@ def _lacks(model: PropertyModel, table: ExampleTable) -> Advice | None:
             return None  # the law is of the form that it has, and what it leaves is noise
         best = None
     if best is not None and (best.left <= GOOD or not covered):
-        return Advice(str(model.target), noise, left, _entries(model, best.features), best.law, best.left)
+        return Advice(str(model.target), noise, left, best.features, best.law, best.left)
     if noise <= UNEXPLAINED and not clusterer.approximate and not undecided:
         return None  # it is noise indeed
     return Advice(str(model.target), noise, left, (), "", 1.0)
 
 
 def _entries(model: PropertyModel, kinds: tuple[str, ...]) -> tuple[str, ...]:
-    """What to switch on; among several types for this one alone, since others' laws would only be blurred."""
+    """What is on and these kinds; among several types for this one alone, since others' laws would only be blurred."""
     others = {t.name for t in model.schema.types} - {ACTION, TASK, model.target.type}
-    return switched_on(model.config.features, model.target.type, kinds) if others else kinds
+    return switched_on(model.config.features, model.target.type, kinds, alone=not others)
 
 
 def _remains(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> float:
     """Standard deviation of what the modes leave of nearly all examples, whichever of them is taken."""
     c = model.clusterer
     parts = [k.errors(table, c.rows[rows], c.y[rows], c.scale)[0] for k in c.clusters.values()]
-    reach = float(np.quantile(np.min(parts, axis=0), NEARLY_ALL)) / NORMAL if parts else np.inf
+    if not parts:
+        return math.inf
+    # Where no mode applies the error is infinite, and between that and others there is no middle.
+    reach = float(np.quantile(np.min(parts, axis=0), NEARLY_ALL, method="higher")) / NORMAL
     return max(c.scale.sigma, reach)
 
 
@@ -198,10 +201,9 @@ def _try(
     clusterer = model.clusterer
     ids = table.signature_ids[clusterer.rows[rows]]
     rows = rows[ids == ids[-1]]
-    known = table.signatures[int(ids[-1])]
-    slots: SlotSignature = replace(
-        known, nonlinear=library_of(kinds, known.types[0].name, known.types[0].angles)
-    )
+    known, entries = table.signatures[int(ids[-1])], _entries(model, kinds)
+    library = library_of(entries, known.types[0].name, known.types[0].angles)
+    slots: SlotSignature = replace(known, nonlinear=library)
     if slots.feature_count > MOST_FEATURES:
         return None
     order, stages = slots.preference(model.target)
@@ -226,7 +228,7 @@ def _try(
     ]
     law = f"{model.target.property}' = {sum_text(text, found.fit.intercept, 4)}"
     bare = all(order[c] < len(slots.columns) for c in found.fit.columns)
-    return _Trial(kinds, found.sigma / change, law, len(order), bare)
+    return _Trial(entries, found.sigma / change, law, len(order), bare)
 
 
 def _present(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> NDArray[np.float64]:

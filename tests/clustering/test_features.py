@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,6 +19,7 @@ from relgym.clustering.features import (
     functions_of,
     library_of,
     register_function,
+    switched_on,
 )
 from relgym.clustering.mode import Mode, Role
 from relgym.clustering.roles import bind
@@ -103,11 +107,33 @@ def test_a_function_needs_a_name_of_its_own(name: str) -> None:
         register_function(name, np.abs)
 
 
+@pytest.mark.parametrize(
+    ("function", "message"), [(math.exp, "can't be worked out"), (np.sum, "gives shape")]
+)
+def test_a_function_maps_arrays(function: Any, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        register_function("broken", function)
+    with pytest.raises(ConfigError, match="'broken' is unknown"):
+        library_of(("broken",), "cart", ())
+
+
 def test_an_entry_may_be_for_one_type_or_one_property() -> None:
     entries = ("cart:products", "trig(th)")
     assert library_of(entries, "cart", ()) == Library(("products", "trig"), ("th",))
     assert library_of(entries, "pole", ()) == Library(("trig",), ("th",))
     assert library_of(("trig",), "pole", ("phi",)) == Library(("trig",), ("phi",))
+
+
+def test_an_entry_of_all_properties_is_not_narrowed_by_one_that_names_some() -> None:
+    assert library_of(("trig(th)", "pole:trig"), "pole", ()) == Library(("trig",))
+    assert library_of(("trig(th)", "pole:trig"), "cart", ()) == Library(("trig",), ("th",))
+    assert library_of(("trig(th)", "pole:trig"), "pole", ("phi",)) == Library(("trig",), ("phi", "th"))
+
+
+def test_switching_on_keeps_what_is_on() -> None:
+    on = ("trig(th)", "hill:degree3", "products")
+    assert switched_on(on, "hill", ("trig", "products")) == (*on, "hill:trig")
+    assert switched_on((), "hill", ("trig",), alone=True) == ("trig",)
 
 
 @pytest.mark.parametrize(

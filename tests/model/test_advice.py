@@ -11,7 +11,7 @@ from points import formulas, learned, schema_of, transitions
 from relgym.model.advice import LAST_RESORT, Advice, _choose, _Trial, _try
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, SceneSchema, Transition
+from relgym.scene.objects import ObjectType, SceneSchema, Target, Transition
 
 SCHEMA = schema_of(("x", "v"), ("a",))
 
@@ -86,6 +86,42 @@ def test_among_several_types_it_is_for_the_one_that_lacks_it() -> None:
     model = learned(schema, steps, features=advice.features)
     assert [m.formula(4) for m in model.modes("hill", "v")] == ["v' = v + 0.3 sin(2 x)"]
     assert model.advice() == ()
+
+
+def test_what_other_targets_need_stays_on() -> None:
+    types = (ObjectType("steep-hill", ("x", "v")), ObjectType("cart", ("w",)))
+    schema = SceneSchema(types, (("hill", "steep-hill"), ("cart", "cart")))
+    rng = np.random.default_rng(0)
+    steps = []
+    for x, v, w in rng.uniform(-3.0, 3.0, size=(300, 3)):
+        before = {"hill": [x, v], "cart": [w]}
+        after = {"hill": [x + 0.3 * np.sin(2.0 * x), v + 0.1 * x * v], "cart": [0.9 * w]}
+        steps.append(Transition(schema.scene(before), schema.scene(after)))
+    model = learned(schema, steps, features=("steep-hill:trig",))
+    (advice,) = model.advice()
+    assert advice.features == ("steep-hill:trig", "steep-hill:products")
+    model = learned(schema, steps, features=advice.features)
+    assert [m.formula(4) for m in model.modes("steep-hill", "x")] == ["x' = x + 0.3 sin(2 x)"]
+    assert [m.formula(4) for m in model.modes("steep-hill", "v")] == ["v' = v + 0.1 x v"]
+    assert model.advice() == ()
+
+
+def test_scenes_that_no_mode_applies_to_are_unexplained() -> None:
+    types = (ObjectType("ball", ("v",)), ObjectType("wall", ("k",), optional=True))
+    schema = SceneSchema(types, (("ball", "ball"), ("wall", "wall")), targets=(Target("ball", "v"),))
+    rng = np.random.default_rng(0)
+    steps = []
+    for n, (v, k, noise) in enumerate(rng.uniform(-3.0, 3.0, size=(400, 3))):
+        wall = {"wall": [k]} if n % 10 < 6 else {}
+        after = 0.5 * v + k if wall else v + 0.8 * np.sin(2.0 * v)
+        steps.append(
+            Transition(
+                schema.scene({"ball": [v], **wall}), schema.scene({"ball": [after + 5e-4 * noise], **wall})
+            )
+        )
+    (advice,) = learned(schema, steps).advice()
+    assert advice.features == ("ball:trig",)
+    assert advice.unexplained == 0.4
 
 
 def test_a_linear_law_wins_where_it_is_enough() -> None:
