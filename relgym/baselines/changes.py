@@ -21,6 +21,7 @@ from relgym.baselines.recipes import batch, lazily, stream
 from relgym.baselines.regressors import REGRESSORS
 from relgym.baselines.rls import RecursiveLeastSquares
 from relgym.baselines.streaming import StreamingRegressor
+from relgym.errors import ConfigError
 
 __all__ = ["CHANGES", "ONLINE", "LastChange", "NoChange", "along", "fitted_once", "rivals", "titles"]
 
@@ -135,7 +136,8 @@ def rivals(
     Parameters
     ----------
     x, change
-        Rows of numbers, shape ``(n, d)``, and what changed, shape ``(n, m)``, in the order in which they came.
+        Rows of numbers, shape ``(n, d)``, and what changed, shape ``(n, m)``, in the order in which they came; at least
+        two.
     once
         Whether also those speak that are fitted once: to the first half, of the second (NaN in the first).
     seed
@@ -145,17 +147,25 @@ def rivals(
 
     Returns
     -------
-    By name, arrays of shape ``(n, m)``; of the first row 0 is said.
+    By name, arrays of shape ``(n, m)``. Of the first row those that learn online say 0.
+
+    Raises
+    ------
+    ConfigError
+        Fewer than two rows: there is nothing to be said before what came.
     """
+    if len(x) < 2:
+        raise ConfigError(
+            f"a stream of {len(x)} rows: expected at least two, one to learn from and one to foretell"
+        )
     found = {}
     for name in installed(CHANGES):
+        if not once and name not in ONLINE:
+            continue
         known = CHANGES[name]
         half: dict[str, Any] = {"train_every": len(x) // 2} if name == "ensemble" else {}
         learner = known.make({**known.settings[0], **half}, Columns(()), np.random.default_rng(seed))
-        if name in ONLINE:
-            found[name] = along(learner, x, change)
-        elif once:
-            found[name] = fitted_once(learner, x, change)
+        found[name] = (along if name in ONLINE else fitted_once)(learner, x, change)
     return found if last is None else {**found, "constant-velocity": last}
 
 
@@ -166,7 +176,7 @@ def titles(names: Iterable[str]) -> list[str]:
 
 def along(learner: Regressor, x: Float2D, change: Float2D) -> Float2D:
     """What an online learner says of every row before it is shown what came; the first row teaches only."""
-    found = np.zeros_like(change)
+    found = np.zeros(change.shape)
     learner.learn_one(x[0], change[0])
     for k in range(1, len(x)):
         found[k] = learner.predict_one(x[k])

@@ -184,8 +184,9 @@ def _reasons(
         rival = verdict.rival if verdict.winner == chosen else verdict.winner
         objects = _objects(part, example, values, verdict, names or [scene.layout.names[index]])
         clause = "" if verdict.clause is None else as_relations(str(verdict.clause), part.flags)
+        tree = as_relations(verdict.tree, part.flags)
         counts = (verdict.correct, verdict.incorrect)
-        reasons.append(Reason(rival, by_mode[rival], clause, objects, verdict.tree, verdict.winner, *counts))
+        reasons.append(Reason(rival, by_mode[rival], clause, objects, tree, verdict.winner, *counts))
     return tuple(reasons)
 
 

@@ -8,7 +8,7 @@ import pytest
 from relgym.baselines.catalogue import installed
 from relgym.baselines.changes import CHANGES, ONLINE, LastChange, NoChange, along, fitted_once, rivals, titles
 from relgym.baselines.kinds import Columns
-from relgym.errors import QueryError
+from relgym.errors import ConfigError, QueryError
 
 RNG = np.random.default_rng(3)
 X = RNG.normal(size=(200, 3))
@@ -84,3 +84,17 @@ def test_a_tree_that_saw_nothing_says_so() -> None:
     tree = CHANGES["tree"].make(CHANGES["tree"].settings[0], Columns(()), np.random.default_rng(0))
     with pytest.raises(QueryError, match="nothing learned yet"):
         tree.predict_one(X[0])
+
+
+@pytest.mark.parametrize("once", [False, True])
+def test_a_stream_of_one_row_is_refused(once: bool) -> None:
+    for rows in (0, 1):
+        with pytest.raises(ConfigError, match=f"a stream of {rows} rows: expected at least two"):
+            rivals(X[:rows], CHANGE[:rows], once=once)
+
+
+def test_whole_numbers_may_change_by_fractions() -> None:
+    x = np.array([[0], [1], [2], [3], [4]])
+    change = np.array([[0], [1], [1], [2], [3]])
+    told = rivals(x, change, once=False)["rls"]
+    assert (told != np.round(told)).any()

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relgym.config import ModelConfig
 from relgym.experiments.data import truck_blocks
 from relgym.model.explain import explanations
 from relgym.model.report import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport, report
@@ -198,14 +199,15 @@ def test_open_roles_have_no_value_until_they_are_filled(truck: tuple[WorldModel,
     assert "roles would have to be filled" in model.explain(scene)
 
 
-def test_choices_are_told_as_relations(tmp_path: Path) -> None:
-    # Left and right move it, and nothing else does: functions may use the choices, clauses may test them.
+@pytest.mark.parametrize("config", [None, ModelConfig.thesis()], ids=["clauses", "trees"])
+def test_choices_are_told_as_relations(config: ModelConfig | None, tmp_path: Path) -> None:
+    # Left and right move it, and nothing else does: functions may use the choices, clauses and trees may test them.
     types = (
         ObjectType("cart", ("x", "v")),
         ObjectType(ACTION, ("stay", "left", "right"), flags=("stay", "left", "right")),
     )
     schema = SceneSchema(types, tuple((t.name, t.name) for t in types), targets=(Target("cart", "v"),))
-    model, rng = WorldModel(schema), np.random.default_rng(0)
+    model, rng = WorldModel(schema, config), np.random.default_rng(0)
     for _ in range(150):
         v, choice = float(rng.normal()), int(rng.integers(3))
         act = np.eye(3)[choice].tolist()
@@ -215,9 +217,10 @@ def test_choices_are_told_as_relations(tmp_path: Path) -> None:
     model.finish()
     text = model.describe()
     assert "action.stay" in text or "action.left" in text or "action.right" in text
-    assert "> 0.5" not in text and "<= 0.5" not in text
-    scene = schema.scene({"cart": [0.0, 1.0], ACTION: [0.0, 1.0, 0.0]})
-    assert "action." in model.explain(scene) and "0.5 holds" not in model.explain(scene)
+    told = [text]
+    told += [model.explain(schema.scene({"cart": [0.0, 1.0], ACTION: act})) for act in np.eye(3).tolist()]
+    assert any("action." in each for each in told[1:])
+    assert not any("> 0.5" in each or "<= 0.5" in each for each in told)
     model.save(tmp_path / "cart.relgym")
     assert WorldModel.load(tmp_path / "cart.relgym").describe() == text
 
