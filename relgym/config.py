@@ -92,6 +92,9 @@ class ClassificationConfig:
         Examples kept per mode and relational state, those that contradicted a classifier first. Default 10,
         range >= 1. Raising it makes early thresholds sharper and costs time and memory in proportion; on the
         ball data 6, 12 and 30 end equally well, because contradictions stay.
+    exemplars_alone
+        The same where objects have no bodies, and so there is but one relational state. Default 300, range >= 1. Few
+        examples of a mode leave thresholds blunt there.
     noise_per_state
         The same for noise, whose examples may still become a rare mode. Default 200, range >= 1.
     max_exemplars
@@ -126,6 +129,7 @@ class ClassificationConfig:
     tree_max_depth: int = 6
     class_balance: float = 0.0
     exemplars_per_state: int = 10
+    exemplars_alone: int = 300
     noise_per_state: int = 200
     max_exemplars: int = 6000
     repair: bool = True
@@ -136,7 +140,7 @@ class ClassificationConfig:
         _one_of(self, ambiguous=("drop", "keep"), literal_choice=("gain", "negatives"))
         _one_of(self, tree_errors=("class", "stage"))
         _at_least(self, 1, "max_literals", "max_clauses", "beam", "tree_min_leaf", "tree_max_depth")
-        _at_least(self, 1, "exemplars_per_state", "noise_per_state")
+        _at_least(self, 1, "exemplars_per_state", "exemplars_alone", "noise_per_state")
         _at_least(self, 0, "max_new_variables")
         _at_least(self, 100, "max_exemplars")
         _unit(self, "min_precision", "clause_tree_threshold", "fall_through_tree_threshold", "class_balance")

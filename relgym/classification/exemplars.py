@@ -259,7 +259,9 @@ class Exemplars:
         return number
 
     def _cap(self, cell: _Cell) -> int:
-        return self.config.noise_per_state if cell.assigned == NOISE else self.config.exemplars_per_state
+        if cell.assigned == NOISE:
+            return self.config.noise_per_state
+        return self.config.exemplars_per_state if cell.key else self.config.exemplars_alone
 
     def _room(self, cell: _Cell, hard: bool) -> int | None:
         """A slot for a new example of this cell, or none if the reservoir passes it over."""

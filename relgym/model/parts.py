@@ -82,7 +82,12 @@ class Parts:
         return self.__dict__ | {"_kin": {}}  # keyed by identity, which a copy doesn't share
 
     def check(self, scene: Scene) -> None:
-        """Raise `ObservationError` for NaN, infinity, or a scene of another schema."""
+        """Raise `ObservationError` for NaN, infinity, what is no scene, or one of another schema."""
+        if not isinstance(scene, Scene):
+            raise ObservationError(
+                f"expected a Scene, got {type(scene).__name__}; of an observation and an action a learner's "
+                "foretell(observation, action) makes one, or view.with_action(view.scene(observation), action)"
+            )
         schema = scene.schema
         if schema is not self.schema and id(schema) not in self._kin:
             difference = mismatch(schema, self.schema)
@@ -140,13 +145,16 @@ class Parts:
         )
 
     def discover_targets(self, before: Scene, after: Scene) -> None:
-        """Every property that changes becomes a target; it sees all transitions from its first change on."""
+        """Every property that changes becomes a target; it sees all transitions from its first change on.
+
+        What the task says is asked for, and a target at once: of ends, that most steps are none is half the story.
+        """
         derived = {(k.type, k.property) for k in self.schema.kinematics}
         for i, t in enumerate(before.layout.types):
             if t.name == ACTION or before.layout.names[i] not in after:
                 continue
             was, now = before.vector[before.layout.slice(i)], after[before.layout.names[i]].values
-            for k in np.flatnonzero(was != now):
+            for k in np.flatnonzero((was != now) | (t.name == TASK)):
                 prop = t.properties[k]
                 known = any(x.type == t.name and x.property == prop for x in self.targets)
                 if not known and (t.name, prop) not in derived and prop not in t.exogenous:
