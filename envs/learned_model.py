@@ -254,7 +254,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
 
     def _end(self, prediction: ScenePrediction, after: Scene) -> tuple[Cause, str] | None:
         """Why a prediction can't be followed; None if it can."""
-        if (told := explained(parts_of(prediction), self._min_margin)) is not None:
+        if (told := explained(parts_of(prediction), self._min_margin, self._judges.overruled)) is not None:
             return told
         left = self._setting.shown.outside(after)
         return (Cause.LEFT, left) if left else None

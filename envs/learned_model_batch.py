@@ -93,7 +93,7 @@ class DreamStep:
         acting = self.actions.joined(before, actions)
         prediction = self.setting.model.predict_batch(self.actions.layout, acting)
         after = self.actions.parted(prediction.vectors)
-        why = causes(prediction, self.setting.shown.inside(after), self.min_margin)
+        why = causes(prediction, self.setting.shown.inside(after), self.min_margin, self.judges.overruled)
         rewards, ended, success = self._judged(before, actions, after, why < 0)
         if (doubted := np.isnan(rewards)).any():
             why[doubted], rewards[doubted], ended[doubted] = _UNJUDGED, 0.0, False
@@ -130,7 +130,7 @@ class DreamStep:
             return horizon_reached(self.horizon)
         if stepped.causes[row] == _UNJUDGED:
             return Cause.UNJUDGED.value
-        told = explained(parts_of_row(stepped.prediction, row), self.min_margin)
+        told = explained(parts_of_row(stepped.prediction, row), self.min_margin, self.judges.overruled)
         if told is not None:
             return told[1]
         return self.setting.shown.outside(

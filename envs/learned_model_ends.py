@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,12 @@ _OF_OUTCOME = np.array(
 )
 
 
-def causes(prediction: BatchPrediction, inside: NDArray[np.bool_], min_margin: float) -> NDArray[np.int8]:
+def causes(
+    prediction: BatchPrediction,
+    inside: NDArray[np.bool_],
+    min_margin: float,
+    overruled: Collection[tuple[str, str]] = (),
+) -> NDArray[np.int8]:
     """Why each of n predictions can't be followed, as a position in `CAUSES`; -1 where it can.
 
     Parameters
@@ -51,6 +56,8 @@ def causes(prediction: BatchPrediction, inside: NDArray[np.bool_], min_margin: f
         Whether each next scene lies in the observation space, shape ``(n,)``.
     min_margin
         Least margin, in log-odds, of a prediction that is followed.
+    overruled
+        (object, property) pairs that don't matter.
 
     Notes
     -----
@@ -59,18 +66,24 @@ def causes(prediction: BatchPrediction, inside: NDArray[np.bool_], min_margin: f
     """
     n = len(inside)
     found = np.where(inside, -1, CAUSES.index(Cause.LEFT)).astype(np.int8)
-    if prediction.margins.shape[1] and min_margin > 0.0:
-        found[(prediction.margins < min_margin).any(axis=1)] = CAUSES.index(Cause.LOW_MARGIN)
-    silent = prediction.outcomes != _FOLLOWED
+    margins, outcomes = prediction.margins, prediction.outcomes
+    if overruled:
+        heeded = np.array([part not in overruled for part in prediction.parts], dtype=bool)
+        margins, outcomes = margins[:, heeded], outcomes[:, heeded]
+    if margins.shape[1] and min_margin > 0.0:
+        found[(margins < min_margin).any(axis=1)] = CAUSES.index(Cause.LOW_MARGIN)
+    silent = outcomes != _FOLLOWED
     some = silent.any(axis=1)
     if some.any():
-        first = prediction.outcomes[np.arange(n), silent.argmax(axis=1)]
+        first = outcomes[np.arange(n), silent.argmax(axis=1)]
         found[some] = _OF_OUTCOME[first[some]]
     return found
 
 
 def explained(
-    parts: Iterable[tuple[str, str, Outcome, float]], min_margin: float
+    parts: Iterable[tuple[str, str, Outcome, float]],
+    min_margin: float,
+    overruled: Collection[tuple[str, str]] = (),
 ) -> tuple[Cause, str] | None:
     """Why one prediction can't be followed, and the sentence that names objects and properties; None if it can.
 
@@ -80,10 +93,10 @@ def explained(
     ----------
     parts
         Object, property, outcome and margin of every part of the prediction, in causal order.
-    min_margin
+    min_margin, overruled
         As for `causes`.
     """
-    parts = tuple(parts)
+    parts = tuple(part for part in parts if part[:2] not in overruled)
     silent = [(name, prop, outcome) for name, prop, outcome, _ in parts if outcome is not Outcome.PREDICTED]
     if silent:
         told = "; ".join(f"{name}.{prop}: {outcome.value}" for name, prop, outcome in silent)

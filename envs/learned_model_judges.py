@@ -157,10 +157,20 @@ class Judges:
             reward is None and _doubts(task),
         )
 
+    @property
+    def overruled(self) -> frozenset[tuple[str, str]]:
+        """(object, property) pairs that another than the model judges, whatever it says of them."""
+        return _overruled(self.reward, self.terminated)
+
     def __call__(self, before: Scene, action: Any, after: Scene) -> tuple[float, bool]:
         """Reward of a step and whether it ends the episode; `ConfigError` where either is no finite number."""
         reward = _verdict("reward", self.reward, before, action, after, doubts=self.doubts)
         return reward, _verdict("termination", self.terminated, before, action, after) > _ENDED
+
+
+def _overruled(reward: Any, terminated: Any) -> frozenset[tuple[str, str]]:
+    judges = {"reward": reward, "terminated": terminated}
+    return frozenset((TASK, prop) for prop, judge in judges.items() if callable(judge))
 
 
 def _verdict(
@@ -213,6 +223,11 @@ class BatchJudges:
             _chosen(terminated, own[1], model, layout, "terminated"),
             reward is None and _doubts(task),
         )
+
+    @property
+    def overruled(self) -> frozenset[tuple[str, str]]:
+        """As of `Judges`."""
+        return _overruled(self.reward, self.terminated)
 
     def __call__(self, before: Float2D, actions: Any, after: Float2D) -> tuple[Float1D, NDArray[np.bool_]]:
         """Rewards and ends of n steps, shape ``(n,)`` each.

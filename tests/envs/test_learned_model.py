@@ -26,9 +26,10 @@ from dreams import (
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
+from plain_envs import Drifter
 from worlds import ROOM_TARGETS, room, scene, schema_of
 
-from relgym.envs import LearnedModelEnv
+from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views import NumbersView
@@ -362,6 +363,34 @@ def test_reward_and_end_can_be_learned() -> None:
         assert terminated is (way > 0.5)
         ends.append(terminated)
     assert ends == [False, True, True, True]
+
+
+def test_what_the_model_says_of_a_reward_that_is_given_does_not_matter() -> None:
+    # The rewards that it was shown are dice.
+    env = ModelLearner(Drifter((0.5, 0.0)), view=plain_numbers, learn_reward=True, predict=False)
+    env.action_space.seed(0)
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(120):
+        env.unwrapped.reward = float(rng.normal())
+        env.step(env.action_space.sample())
+    push = np.array([0.05])
+    blind = LearnedModelEnv(env.model)
+    blind.reset(seed=0)
+    *_, truncated, info = blind.step(push)
+    assert truncated and info["reason"].startswith("task.reward")
+    dream = LearnedModelEnv(env.model, reward=lambda before, action, after: 7.0)
+    dream.reset(seed=0)
+    _, reward, _, truncated, _ = dream.step(push)
+    assert (reward, truncated) == (7.0, False)
+    dreams = LearnedModelVectorEnv(env.model, 2, reward=lambda layout, before, *_: np.full(len(before), 7.0))
+    dreams.reset(seed=0)
+    _, rewards, _, truncations, _ = dreams.step(np.stack([push, push]))
+    assert (rewards.tolist(), truncations.tolist()) == ([7.0, 7.0], [False, False])
+
+
+def plain_numbers(space: Any, actions: Any) -> NumbersView:
+    return NumbersView(space, actions, angles=())
 
 
 @pytest.mark.parametrize("told", [None, "much", np.nan, np.inf])
