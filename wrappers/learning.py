@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from typing import Any
 
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, View
+from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.observer import Observer
 from relgym.wrappers.prequential import Prequential
@@ -36,6 +39,26 @@ class Learning:
     def model(self) -> WorldModel:
         """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``."""
         return self._observer.study.model
+
+    def foretell(
+        self, observation: Any, action: Any, info: Mapping[str, Any] | None = None
+    ) -> ScenePrediction:
+        """What the model says would follow an observation and an action.
+
+        Parameters
+        ----------
+        observation, action
+            As the env gives and takes them; of a vector env those of one of its envs.
+        info
+            What came with the observation, for views that read it.
+
+        Raises
+        ------
+        ObservationError
+            It is no scene.
+        """
+        model, view = self.model, self.view
+        return model.predict_one(view.with_action(view.scene(observation, info), action))
 
     @property
     def prequential(self) -> Prequential:

@@ -22,7 +22,7 @@ from relgym.wrappers.follower import BadObservations, Follower, Look
 from relgym.wrappers.prequential import StepReport
 from relgym.wrappers.settings import PlainTarget, config_of, model_of, target_of
 from relgym.wrappers.study import NOTHING, Study
-from relgym.wrappers.views import is_open, settled, upheld
+from relgym.wrappers.views import is_open, remembered, settled, upheld
 
 __all__ = ["STARTS", "First", "Observer", "Step"]
 
@@ -110,7 +110,7 @@ class Observer:
         self._spaces = (observation_space, action_space)
         self._metadata = {name: value for name, value in (metadata or {}).items() if value is not None}
         self._starts: list[Scene] = []
-        self.view = view
+        self.view = view = view if model is None else remembered(view, model)
         names = [""] if envs == 1 else [f"env {k}: " for k in range(envs)]
         self.followers = [Follower(view, bad_observations, name=name) for name in names]
         self.withdrawn: tuple[Angle, ...] = ()

@@ -8,9 +8,10 @@ from typing import Any, TypeAlias
 
 from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
 from relgym.errors import ConfigError
+from relgym.model.scenes import mismatch
 from relgym.model.storage import target_from_json
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import SceneSchema, Target
+from relgym.scene.objects import TASK, SceneSchema, Target
 
 __all__ = ["PlainTarget", "config_of", "model_of", "target_of"]
 
@@ -71,8 +72,20 @@ def model_of(
         raise ConfigError("a loaded model keeps its targets and config: pass either model or those")
     model = WorldModel.load(path)
     if model.schema != schema:
-        raise ConfigError(
-            f"{path}: the model was learned in another world (objects {list(model.schema.order)}) than the env's "
-            f"(objects {list(schema.order)}); make the env with the arguments it was learned with"
-        )
+        raise ConfigError(_another_world(path, schema, model.schema))
     return model
+
+
+def _another_world(path: str | os.PathLike[str], schema: SceneSchema, known: SceneSchema) -> str:
+    """What differs, and what to do about it."""
+    if set(known.order) ^ set(schema.order) == {TASK}:
+        then, now = ("with", "without") if TASK in known.order else ("without", "with")
+        return (
+            f"{path}: the model was learned {then} reward or termination, and the env is wrapped {now}: in another "
+            "world; pass the learn_reward and learn_termination that it was learned with"
+        )
+    difference = mismatch(schema, known) or f"objects {list(schema.order)}, expected {list(known.order)}"
+    return (
+        f"{path}: the model was learned in another world than the env's: {difference}; make and wrap the env with the "
+        "arguments it was learned with"
+    )

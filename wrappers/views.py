@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -12,6 +13,7 @@ from gymnasium import spaces
 from relgym.envs.arguments import checked_action
 from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
+from relgym.model.world_model import WorldModel
 
 __all__ = [
     "SceneView",
@@ -21,6 +23,7 @@ __all__ = [
     "is_open",
     "readable",
     "recordable",
+    "remembered",
     "settled",
     "upheld",
     "view_of",
@@ -117,6 +120,30 @@ def settled(view: View, observations: Sequence[Any]) -> View:
 def upheld(view: View, observation: Any) -> View:
     """The view without guessed angles that an observation refutes; itself where it refutes none."""
     return view.upheld(observation) if isinstance(view, (NumbersView, TaskView)) else view
+
+
+def remembered(view: View, path: str | os.PathLike[str]) -> View:
+    """The view that a model file holds, where it differs from an open one in its angles at most.
+
+    What was guessed of these when the model was learned stands, and so does what was taken back.
+
+    Parameters
+    ----------
+    view
+        The view of the env.
+    path
+        The model's file.
+    """
+    if not is_open(view):
+        return view
+    held = WorldModel.load_with_extra(path)[1].get("view")
+    return view_from_json(held) if held and _but_angles(held) == _but_angles(view.to_json()) else view
+
+
+def _but_angles(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: _but_angles(part) if name == "view" else part for name, part in data.items() if name != "angles"
+    }
 
 
 def recordable(given: ViewLike) -> ViewLike:

@@ -114,6 +114,16 @@ def test_who_names_the_angle_has_declared_it(tmp_path: Path) -> None:
     assert again.model is before
 
 
+@pytest.mark.parametrize("reward", [False, True])
+def test_a_model_goes_on_without_the_angle_that_it_had_to_take_back(reward: bool, tmp_path: Path) -> None:
+    env = ModelLearner(Drifter(), learn_reward=reward, predict=False)
+    run(env, 60, block=60)
+    env.save(tmp_path / "drifter.json", history=True)
+    again = ModelLearner(Drifter(), model=tmp_path / "drifter.json", learn_reward=reward, predict=False)
+    run(again, 5, block=5)
+    assert (properties(again), again.withdrawn, again.model.seen) == (PLAIN, (), env.model.seen + 5)
+
+
 def test_learning_stays_paused_and_starts_stay_known(tmp_path: Path) -> None:
     env = ModelLearner(Drifter(), predict=False)
     env.pause()  # before the first reset, too

@@ -312,12 +312,29 @@ def test_a_model_without_history_is_only_asked(tmp_path: Path) -> None:
         env.learning = True
 
 
+def test_what_would_follow_an_observation_and_an_action_can_be_asked() -> None:
+    env = learned()
+    observation, _ = env.reset(seed=3)
+    action = env.action_space.sample()
+    told = env.foretell(observation, action)
+    assert told.ok
+    following, *_ = env.step(action)
+    said = env.view.observation(told.scene)
+    np.testing.assert_allclose(np.concatenate(list(said.values())), np.concatenate(list(following.values())))
+    with pytest.raises(
+        ObservationError, match=r"expected a Scene, got ndarray.*foretell\(observation, action\)"
+    ):
+        env.model.predict_one(np.zeros(3))
+
+
 def test_a_model_of_another_world_is_refused(tmp_path: Path) -> None:
     learned().save(tmp_path / "cart.json", history=True)
     with pytest.raises(ConfigError, match="another world"):
         ModelLearner(gym.make("relgym/BallBoxRamp-v0"), model=tmp_path / "cart.json")
     with pytest.raises(ConfigError, match="keeps its targets and config"):
         ModelLearner(CartEnv(), model=tmp_path / "cart.json", config={"seed": 1})
+    with pytest.raises(ConfigError, match=r"without reward or termination.*pass the learn_reward"):
+        ModelLearner(CartEnv(), model=tmp_path / "cart.json", learn_reward=True)
 
 
 def test_laws_that_are_rare_among_many_objects_are_found_though_nothing_was_explained_at_first() -> None:
