@@ -35,7 +35,8 @@ class DynaConfig:
         the algorithm was made for.
     burst
         Gradient steps at once, in fresh dreams all the while, the first time that the model is trusted and the
-        algorithm's random steps are over; 0: none. A model of few objects is often exact long before real steps at
+        algorithm's random steps are over, and again whenever a learned judge has come to know of another reward or end
+        (`LearnedTask.verdicts`); 0: none. A model of few objects is often exact long before real steps at
         `updates` each have trained a policy: raising it trades computing for real steps. Should hold `updates` *
         `every`, a round of dreams, many times.
     permute

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+import warnings
 from time import perf_counter
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -23,6 +24,9 @@ from relgym.wrappers.sb3.replay import MixedNStepReplayBuffer, Mixing
 from relgym.wrappers.sb3.stock import DreamModel
 
 __all__ = ["Dyna", "check_algorithm", "judge_of", "lens_of"]
+
+_SHORT: Final = 500
+"""A model that isn't trusted after fewer steps may be yet."""
 
 
 class Dyna(BaseCallback):  # type: ignore[misc]
@@ -91,7 +95,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self._like = like
         self._rng = np.random.default_rng([self.config.seed, 0])
         self._dreamed_at = 0
-        self._made_up = False
+        self._made_up = -1  # verdicts that were known when it was last trained in a burst
         self._known = 0.0
         self._mixed: Any = None
         self._apprentice: Apprentice | None = None
@@ -138,7 +142,24 @@ class Dyna(BaseCallback):  # type: ignore[misc]
 
     def _on_training_end(self) -> None:
         self.apprentice.catch_up()
+        self._complain()
         self.model.gradient_steps = self._usual
+
+    def _complain(self) -> None:
+        """Warn where no dream was ever trusted, with what the learners lack: else it would go unnoticed."""
+        gate = self.apprentice.gate
+        if gate.switches or self.num_timesteps < _SHORT:
+            return
+        parts: tuple[Any, ...] = (self.world, getattr(self.apprentice.judge, "model", None))
+        lacks = [f"{each.target}: {each}." for p in parts if hasattr(p, "advice") for each in p.advice()]
+        warnings.warn(
+            f"the model was never trusted in {self.num_timesteps:,} steps, and nothing was dreamed: its error was "
+            f"{gate.error:.2g}, to be trusted it must fall to {gate.open_at:g}, and it spoke of {gate.known:.0%} of "
+            f"the latest steps. {' '.join(lacks) or 'Give it more steps.'} Features of the model are switched on in "
+            "its ModelConfig, those of reward and termination in that of judge=LearnedTask(...)",
+            UserWarning,
+            stacklevel=2,
+        )
 
     # ------------------------------------------------------------------ dreams
     @property
@@ -160,10 +181,19 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         return each * int(self.training_env.num_envs * self.model.train_freq.frequency)
 
     def _catch_up(self, trusted: bool) -> None:
-        """Train at once, the first time that the model is trusted, as much as many real steps would have brought."""
-        if not trusted or self._made_up or self.num_timesteps <= self.model.learning_starts:
+        """Train at once as much as many real steps would have brought: when the model is first trusted.
+
+        And again when the judge has learned of something else that is paid for or ends episodes: what was dreamed
+        before didn't know of it, nor does the policy that was trained in it.
+        """
+        if not trusted or self.num_timesteps <= self.model.learning_starts:
             return
-        self._made_up = True
+        known = getattr(self.apprentice.judge, "verdicts", 0)
+        if known <= self._made_up:
+            return
+        if self._made_up >= 0 and self.config.burst:
+            self.buffer.hold(self.config.capacity)
+        self._made_up = known
         each = self.config.updates * self.config.every  # per round of dreams, as later on
         for done in range(0, self.config.burst, each):
             self._dream()

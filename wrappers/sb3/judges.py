@@ -11,7 +11,7 @@ from typing import Any, Final, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
+from relgym.config import ClusteringConfig, ModelConfig
 from relgym.envs.tasks import Judgement, Judging
 from relgym.errors import ConfigError, ModelFileError, SchemaError
 from relgym.model.prediction import BatchPrediction
@@ -43,10 +43,8 @@ _RIGHT: Final = 1e-6  # how far a right verdict may be off
 _EXACT: Final = ModelConfig(
     frames="world",
     clustering=ClusteringConfig(min_examples=4),
-    classification=ClassificationConfig(exemplars_per_state=100),
 )
-"""What a task says is free of noise, and success is rare at first: four examples found a mode. Without bodies there is
-but one relational state, in which a few examples of each mode would leave thresholds blunt."""
+"""What a task says is free of noise, and success is rare at first: four examples found a mode."""
 
 _REMEMBERED: Final = 500
 """It is looked up which modes were right together: of so many of the latest real steps, of as many of those before, and
@@ -159,7 +157,7 @@ class LearnedTask(Judging):
             "together": sorted(map(list, self._together)),
             "reviewed": self._reviewed,
         }
-        self.model.save(path, history=True, extra={_FILE: data})
+        self.model.save(path, history=True, extra={**self.model.extra, _FILE: data})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, acting: Acting | None = None) -> LearnedTask:
@@ -198,20 +196,34 @@ class LearnedTask(Judging):
             raise ModelFileError(
                 f"{path}: a part of the learned task is missing or malformed ({error!r}); save it again"
             ) from None
-        judge.model, model.extra = model, {}
+        judge.model, model.extra = model, {name: part for name, part in extra.items() if name != _FILE}
         return judge
 
     def _small_schema(self) -> SceneSchema:
+        kinds = {name: self.schema.type(t) for name, t in self.schema.objects}
+
         def named(pairs: list[tuple[str, str]]) -> tuple[str, ...]:
             return tuple(f"{name}_{prop}" for name, prop in pairs)
 
-        parts = {_NOW: named(self._now), _NEXT: named(self._next), ACTION: self._action}
-        types = [ObjectType(name, properties) for name, properties in parts.items() if properties]
+        def flags(pairs: list[tuple[str, str]]) -> tuple[str, ...]:
+            return named([(name, prop) for name, prop in pairs if prop in kinds[name].flags])
+
+        parts = {
+            _NOW: (named(self._now), flags(self._now)),
+            _NEXT: (named(self._next), flags(self._next)),
+            ACTION: (self._action, self.schema.type(ACTION).flags if self._action else ()),
+        }
+        types = [ObjectType(name, own, flags=known) for name, (own, known) in parts.items() if own]
         types.append(ObjectType(TASK, _TOLD))
         # Whether a step ends an episode is what it is most often paid for.
         ended = Target(TASK, "terminated")
         targets = (ended, Target(TASK, "reward", given=((TASK, "terminated"),)))
         return SceneSchema(tuple(types), tuple((t.name, t.name) for t in types), targets=targets)
+
+    @property
+    def verdicts(self) -> int:
+        """How many modes of reward and termination are known."""
+        return sum(len(self.model.modes(TASK, prop)) for prop in _TOLD)
 
     def learn_step(self, transition: Transition, reward: float, *, terminated: bool) -> None:
         """Take up what the task said of a real step."""

@@ -11,7 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 
 from relgym.envs.arguments import checked_action
 from relgym.scene.objects import Scene, Transition
-from relgym.wrappers.views import view_of
+from relgym.wrappers.views import ViewLike, recordable, view_of
 
 __all__ = ["Experience", "TransitionRecorder"]
 
@@ -46,13 +46,16 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
     """Keeps the latest steps until somebody takes them; what the env returns stays as it is.
 
     It goes directly round an env, inside all wrappers that change observations or actions: what these hide, scale or
-    repeat, the model sees as it is. Where observations aren't scenes they are seen as `relgym.wrappers.ModelLearner`
-    sees them by default: one object of numbers, or one per key.
+    repeat, the model sees as it is. Where observations aren't scenes they are seen as one object of numbers, or one per
+    key, or as `view` says.
 
     Parameters
     ----------
     env
         As for `relgym.wrappers.ModelLearner`.
+    view
+        How observations and actions become scenes, as for `relgym.wrappers.ModelLearner`; but angles aren't guessed
+        here: ``NumbersView(..., angles=[("x0", "x1")])``.
 
     Attributes
     ----------
@@ -65,10 +68,10 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
         Observations that need a view of the user's (images, tables, nested spaces), or changed spaces.
     """
 
-    def __init__(self, env: gym.Env[Any, Any]) -> None:
-        RecordConstructorArgs.__init__(self)
+    def __init__(self, env: gym.Env[Any, Any], *, view: ViewLike = None) -> None:
+        RecordConstructorArgs.__init__(self, view=recordable(view))
         gym.Wrapper.__init__(self, env)
-        self.view = view_of(env)
+        self.view = view_of(env, view)
         self._scene: Scene | None = None
         self._first = True
         self._taken: list[Experience] = []
@@ -78,7 +81,7 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._scene, self._first = self.view.scene(observation), True
+        self._scene, self._first = self.view.scene(observation, info), True
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
@@ -87,7 +90,7 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
             raise ResetNeeded("no current scene: call reset() first")
         checked = checked_action(self.env.action_space, action)
         observation, reward, terminated, truncated, info = self.env.step(action)
-        after = self.view.scene(observation)
+        after = self.view.scene(observation, info, last=self._scene)
         transition = Transition(self.view.with_action(self._scene, checked), after)
         self._taken.append(
             Experience(transition, self._scene, checked, float(reward), bool(terminated), self._first)

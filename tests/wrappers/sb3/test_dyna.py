@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium as gym
@@ -13,6 +14,7 @@ from gymnasium import spaces
 
 import relgym
 from relgym.envs.tasks import Judgement
+from relgym.envs.views import NumbersView
 from relgym.errors import ConfigError, QueryError
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
@@ -251,6 +253,29 @@ def test_what_a_trusted_model_could_have_taught_is_made_up_for_once() -> None:
     assert shut._n_updates == 10
 
 
+def test_it_trains_again_when_more_has_become_known_of_the_task() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    env, counts = flat(), []
+    judge = SimpleNamespace(judge=env.get_wrapper_attr("task").judge, verdicts=2)
+    algorithm = agent("SAC", env)
+    dyna = Dyna(LineModel(), DynaConfig(**QUICK, burst=30), judge=judge)
+    for verdicts in (2, 3, 3, 2):
+        judge.verdicts = verdicts
+        before, steps = getattr(algorithm, "_n_updates", 0), 20 if not counts else 10
+        algorithm.learn(steps, callback=dyna, reset_num_timesteps=False)
+        counts.append(algorithm._n_updates - before)
+    assert counts == [10 * 2 + 30, 10 * 2 + 30, 10 * 2, 10 * 2]
+
+
+def test_a_model_that_was_never_trusted_is_complained_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    monkeypatch.setattr("relgym.wrappers.sb3.dyna._SHORT", 30)
+    with pytest.warns(UserWarning, match=r"never trusted in 40 steps.*its error was 0.*Give it more steps"):
+        agent("SAC", flat()).learn(40, callback=Dyna(LineModel(off=1.0), DynaConfig(**QUICK)))
+
+
 def test_refusals_name_the_remedy() -> None:
     import stable_baselines3
 
@@ -426,3 +451,15 @@ def test_a_vector_env_is_still_made_as_it_was() -> None:
     algorithm.learn(2)
     assert algorithm._last_obs.shape == (2, 1)  # what a callback sees first
     assert algorithm.train_freq.unit.value == "step"
+
+
+def test_the_recorder_takes_the_view_that_it_is_given() -> None:
+    env = gym.make("Pendulum-v1")
+    view = NumbersView(env.observation_space, env.action_space, angles=[("x0", "x1")])
+    recorder = TransitionRecorder(env, view=view)
+    recorder.reset(seed=0)
+    recorder.step(np.array([0.5], dtype=np.float32))
+    (step,) = recorder.take()
+    assert step.transition.before["self"].type.properties == ("angle_x0", "x2")
+    assert recorder.spec is not None
+    assert gym.make(recorder.spec).get_wrapper_attr("view").to_json() == view.to_json()
