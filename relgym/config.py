@@ -93,8 +93,9 @@ class ClassificationConfig:
         range >= 1. Raising it makes early thresholds sharper and costs time and memory in proportion; on the
         ball data 6, 12 and 30 end equally well, because contradictions stay.
     exemplars_alone
-        The same where objects have no bodies, and so there is but one relational state. Default 300, range >= 1. Few
-        examples of a mode leave thresholds blunt there.
+        The same where objects have no bodies, and so there is but one relational state; at most a twentieth of the
+        history (`ModelConfig.history`), which they are part of. Default 300, range >= 1. Few examples of a mode leave
+        thresholds blunt there.
     noise_per_state
         The same for noise, whose examples may still become a rare mode. Default 200, range >= 1.
     max_exemplars
@@ -298,6 +299,12 @@ class ModelConfig:
         features: object = self.features
         if not isinstance(features, (tuple, list)) or not all(isinstance(entry, str) for entry in features):
             raise ConfigError(f"features must be a tuple of names, such as ('trig',), got {features!r}")
+
+    @property
+    def classifying(self) -> ClassificationConfig:
+        """`classification`, with no more examples of a mode than a short history has room for: a twentieth of it."""
+        most = max(self.classification.exemplars_per_state, self.history // 20)
+        return replace(self.classification, exemplars_alone=min(self.classification.exemplars_alone, most))
 
     @classmethod
     def thesis(cls, **changes: Any) -> ModelConfig:

@@ -72,7 +72,7 @@ class PropertyModel(Answers):
         conditions = Conditions(schema, target)
         super().__init__(
             ModeClusterer(target, config.clustering, seed=config.seed),
-            ModeClassifier(conditions.vocabulary(vocabulary, ()), config.classification),
+            ModeClassifier(conditions.vocabulary(vocabulary, ()), config.classifying),
             Casting(vocabulary, config.classification),
             conditions,
             config,
@@ -278,7 +278,7 @@ class PropertyModel(Answers):
         self._unexplained = bool(data["unexplained"])
         self.guesses = Guesses.from_json(self.target, data.get("guess", {}))
         self.spreads = Spreads.from_json(data["spreads"])
-        self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classification)
+        self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))
         self.stops = Stops.from_json(data.get("stops", {}))
