@@ -228,7 +228,7 @@ def _legend(targets: tuple[TargetReport, ...]) -> str:
     if pairs:
         lines = [
             "mode i rather than j: the first clause that holds speaks for i; if none does, it is j.",
-            "correct, incorrect: training examples that only one of the two modes explains, reckoned from those kept.",
+            "correct, incorrect: training examples that only one of the two modes explains, estimated.",
             "A is the object whose property is predicted; another letter says that there is such an object.",
         ]
     if "*" in text:
