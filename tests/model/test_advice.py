@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +25,23 @@ def hills(n: int, seed: int = 0) -> list[Transition]:
     return transitions(
         SCHEMA, lambda s, u: [s[0] + 1.0, s[1] + 0.1 * u[0] + 0.3 * np.sin(2.0 * s[0])], starts, actions
     )
+
+
+def beside_a_cart(
+    kind: str, after: Callable[[float, float], list[float]]
+) -> tuple[SceneSchema, list[Transition]]:
+    """Object *hill* of such a type, by the law given, and one of another type whose law is linear; 300 steps."""
+    types = (ObjectType(kind, ("x", "v")), ObjectType("cart", ("w",)))
+    schema = SceneSchema(types, (("hill", kind), ("cart", "cart")))
+    rng = np.random.default_rng(0)
+    steps = [
+        Transition(
+            schema.scene({"hill": [x, v], "cart": [w]}),
+            schema.scene({"hill": after(x, v), "cart": [0.9 * w]}),
+        )
+        for x, v, w in rng.uniform(-3.0, 3.0, size=(300, 3))
+    ]
+    return schema, steps
 
 
 def dice(n: int) -> list[Transition]:
@@ -71,14 +89,7 @@ def test_taken_it_gives_the_law() -> None:
 
 def test_among_several_types_it_is_for_the_one_that_lacks_it() -> None:
     # Of the other type's linear laws features would only make worse ones.
-    types = (ObjectType("hill", ("x", "v")), ObjectType("cart", ("w",)))
-    schema = SceneSchema(types, (("hill", "hill"), ("cart", "cart")))
-    rng = np.random.default_rng(0)
-    steps = []
-    for x, v, w in rng.uniform(-3.0, 3.0, size=(300, 3)):
-        before = {"hill": [x, v], "cart": [w]}
-        after = {"hill": [x + 1.0, v + 0.3 * np.sin(2.0 * x)], "cart": [0.9 * w]}
-        steps.append(Transition(schema.scene(before), schema.scene(after)))
+    schema, steps = beside_a_cart("hill", lambda x, v: [x + 1.0, v + 0.3 * np.sin(2.0 * x)])
     model = learned(schema, steps, features=("cart:products",))
     (advice,) = model.advice()
     assert advice.features == ("cart:products", "hill:trig")
@@ -89,14 +100,7 @@ def test_among_several_types_it_is_for_the_one_that_lacks_it() -> None:
 
 
 def test_what_other_targets_need_stays_on() -> None:
-    types = (ObjectType("steep-hill", ("x", "v")), ObjectType("cart", ("w",)))
-    schema = SceneSchema(types, (("hill", "steep-hill"), ("cart", "cart")))
-    rng = np.random.default_rng(0)
-    steps = []
-    for x, v, w in rng.uniform(-3.0, 3.0, size=(300, 3)):
-        before = {"hill": [x, v], "cart": [w]}
-        after = {"hill": [x + 0.3 * np.sin(2.0 * x), v + 0.1 * x * v], "cart": [0.9 * w]}
-        steps.append(Transition(schema.scene(before), schema.scene(after)))
+    schema, steps = beside_a_cart("steep-hill", lambda x, v: [x + 0.3 * np.sin(2.0 * x), v + 0.1 * x * v])
     model = learned(schema, steps, features=("steep-hill:trig",))
     (advice,) = model.advice()
     assert advice.features == ("steep-hill:trig", "steep-hill:products")
