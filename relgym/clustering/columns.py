@@ -208,9 +208,16 @@ class SlotSignature:
 
     def present(self, x: NDArray[np.float64], target: Target) -> NDArray[np.float64]:
         """What changes count from, shape ``(n,)``: the property's present value; 0 for reward and termination."""
+        return self.present_of(x, slice(None), target)
+
+    def present_of(
+        self, x: NDArray[np.float64], rows: NDArray[np.integer] | slice, target: Target
+    ) -> NDArray[np.float64]:
+        """`present` of some rows only; the others, and the other columns, aren't copied."""
         if target.type == TASK:
-            return np.zeros(len(x))
-        return x[:, self._index[0, target.property]]
+            return np.zeros(len(x[rows, 0]))
+        found: NDArray[np.float64] = x[rows, self._index[0, target.property]]
+        return found
 
     def _allowed(self, index: int, target: Target) -> bool:
         width = len(self.columns)

@@ -24,6 +24,7 @@ from relgym.model.hindsight import Hindsight
 from relgym.model.limits import Limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.model.scope import EVERYWHERE
 from relgym.model.spread import Spreads
 from relgym.model.stops import Stops
 
@@ -31,6 +32,9 @@ __all__ = ["Answers"]
 
 ROUGH = 4.0
 """So many times the rounding noise can't be rounding."""
+
+_BEYOND = -1
+"""In the place of a mode's id: the guess beyond the scope of approximations."""
 
 _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
     OUTCOMES.index(o)
@@ -60,6 +64,8 @@ class Answers(ModeFunctions):
         Which modes are walls at work: they take no part in the vote either.
     guesses
         The best guess, where nothing is explained.
+    scope
+        How far guesses and approximations go.
     hindsight
         How the latest predictions came out, if somebody looked back at them.
     leaned_on
@@ -82,6 +88,7 @@ class Answers(ModeFunctions):
         self.limits = Limits()
         self.stops = Stops()
         self.guesses = Guesses()
+        self.scope = EVERYWHERE
         self.hindsight = Hindsight()
         self.leaned_on = False
         self._unexplained = False
@@ -109,6 +116,18 @@ class Answers(ModeFunctions):
         return self.guesses.best if self._unexplained or self.inexact else None
 
     @property
+    def guess_beyond(self) -> Guess | None:
+        """What stands in where approximations don't speak, if it is known better than the best guess of all."""
+        return self.guesses.beyond if self.scope.tree is not None else None
+
+    def guess_at(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Guess | None:
+        """The guess that speaks of one object of a single scene; arguments as of `predict_one`."""
+        if self.guess_beyond is None:
+            return self.guess
+        x = percept.rows(index, following[None], ordered=False)[0].tolist()
+        return self.guess if self.scope.covers_one(x) else self.guess_beyond
+
+    @property
     def inexact(self) -> bool:
         """Whether modes are approximations, or leave more than rounding explains, and nobody said that they would."""
         rough = self.clusterer.scale.sigma > ROUGH * self.clusterer.floor
@@ -122,24 +141,29 @@ class Answers(ModeFunctions):
     def guessed(
         self, percept: Percept, index: int, following: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
-        """What the best guess says of one object of n scenes, shape ``(n,)``; None if there is none.
+        """What guesses say of one object of n scenes, shape ``(n,)``, NaN where nobody has one; None if there is none.
 
         Arguments as of `predict_batch`.
         """
-        binding = self._guessing(percept.situation(index).signature)
-        if binding is None:
+        signature = percept.situation(index).signature
+        whole, beyond = self._guessing(signature), self._guessing(signature, beyond=True)
+        if whole is None and beyond is None:
             return None
-        found: NDArray[np.float64] = binding.values(percept.rows(index, following, ordered=False))[:, 0]
-        return found
+        x = percept.rows(index, following, ordered=False)
+        target = self.clusterer.target
+        values = np.full(len(x), np.nan) if whole is None else whole.values(x)[:, 0]
+        if beyond is not None:
+            values = np.where(self.scope.covers(x), values, beyond.values(x)[:, 0])
+        return self.scope.within(values, signature, x, target)
 
-    def _guessing(self, signature: SlotSignature) -> Binding | None:
-        """The best guess over a signature's columns."""
-        best, key = self.guess, (id(signature), NOISE)
+    def _guessing(self, signature: SlotSignature, *, beyond: bool = False) -> Binding | None:
+        """A guess over a signature's columns: the best one of all, or that beyond the scope of approximations."""
+        best, key = (self.guess, NOISE) if not beyond else (self.guess_beyond, _BEYOND)
         if best is None:
             return None
-        known = self._bindings.get(key)
+        known = self._bindings.get((id(signature), key))
         if known is None or known[0] is not best.mode:
-            known = self._bindings[key] = (best.mode, bind(best.mode, signature))
+            known = self._bindings[id(signature), key] = (best.mode, bind(best.mode, signature))
         return None if known[1] is None or known[1].open else known[1]
 
     def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
@@ -184,12 +208,15 @@ class Answers(ModeFunctions):
             return nothing
         casts = self._casts(situation.signature)
         row = percept.rows(index, following[None], ordered=casts)
-        x, example = row[0].tolist(), self._shown(situation, row)
+        x = row[0].tolist()
+        if not self.scope.covers_one(x):
+            return replace(nothing, outcome=Outcome.UNEXPLAINED)
+        example = self._shown(situation, row)
         ranking = self.classifier.rank(
             example, self._values_one(situation.signature, x, self.classifier.modes)
         )
         if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
-            return self._leaning(ranking.modes[0], situation.signature, x)
+            return self._leaning(ranking.modes[0], situation.signature, row)
         layout, order = percept.layout, situation.order[0] if casts else situation.plain
         for place, mode in enumerate(ranking.modes):
             binding = self._binding(situation.signature, mode)
@@ -209,6 +236,7 @@ class Answers(ModeFunctions):
             margin = ranking.margin if place == 0 else 0.0
             outcome = Outcome.UNEXPLAINED if self.undecided else Outcome.PREDICTED
             found = Prediction("", "", binding.value(x, slots), outcome, mode, roles, margin)
+            found = replace(found, value=self._within(found.value, situation.signature, row))
             found = self._stopped(self.limits.cut_off(found), situation.signature, row)
             return replace(found, spread=self.spreads.at(found.mode, situation.signature, x))
         return replace(nothing, outcome=Outcome.NO_ROLES)
@@ -239,10 +267,10 @@ class Answers(ModeFunctions):
         ranking = self._rank_batch(situation, x)
         verdict.outcomes[:] = _NO_ROLES
         said = _UNEXPLAINED if self.undecided else _PREDICTED
-        waiting = np.ones(n, dtype=bool)
-        if self.config.abstain and len(modes) > 1:
-            waiting = ranking.seen.copy()
-            verdict.outcomes[~waiting] = _OUTSIDE
+        outside = ~ranking.seen if self.config.abstain and len(modes) > 1 else np.zeros(n, dtype=np.bool_)
+        beyond = ~self.scope.covers(x)
+        verdict.outcomes[outside], verdict.outcomes[beyond] = _OUTSIDE, _UNEXPLAINED
+        waiting = ~(outside | beyond)
         for place in range(len(modes)):
             for mode in np.unique(ranking.modes[waiting, place]):
                 binding = self._binding(situation.signature, int(mode))
@@ -259,19 +287,20 @@ class Answers(ModeFunctions):
                     waiting[part] = False
             if not waiting.any():
                 break
+        verdict.values[:] = self._all_within(verdict.values, situation.signature, x)
         self.limits.cut_off_all(verdict.values, verdict.modes)
         self.stops.apply(situation.signature, x, verdict.values, verdict.modes)
-        if self.config.abstain and len(modes) > 1:
-            self._lean(verdict, ranking.modes[:, 0], ~ranking.seen, situation.signature, x)
+        self._lean(verdict, ranking.modes[:, 0], outside & ~beyond, situation.signature, x)
         return verdict
 
-    def _leaning(self, mode: int, signature: SlotSignature, x: list[float]) -> Prediction:
+    def _leaning(self, mode: int, signature: SlotSignature, row: NDArray[np.float64]) -> Prediction:
         """Outside experience: no claim, but the value that the vote's winner gives, if none of its roles is open."""
         binding = self._binding(signature, mode)
         if binding is None or binding.open:
             return Prediction("", "", float("nan"), Outcome.OUTSIDE)
-        spread = self.spreads.at(mode, signature, x)
-        return Prediction("", "", binding.value(x), Outcome.OUTSIDE, spread=spread)
+        x = row[0].tolist()
+        value, spread = self._within(binding.value(x), signature, row), self.spreads.at(mode, signature, x)
+        return Prediction("", "", value, Outcome.OUTSIDE, spread=spread)
 
     def _lean(
         self,
@@ -286,7 +315,21 @@ class Answers(ModeFunctions):
             binding = self._binding(signature, int(mode))
             if binding is not None and not binding.open:
                 part = outside & (winners == mode)
-                verdict.values[part] = binding.values(x[part])[:, 0]
+                verdict.values[part] = self._all_within(binding.values(x[part])[:, 0], signature, x[part])
+
+    def _within(self, value: float, signature: SlotSignature, row: NDArray[np.float64]) -> float:
+        """What a mode says of a row ``(1, d)``, or as far as approximations go."""
+        if not self.clusterer.approximate:
+            return value
+        return float(self.scope.within(np.array([value]), signature, row, self.clusterer.target)[0])
+
+    def _all_within(
+        self, values: NDArray[np.float64], signature: SlotSignature, x: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """`_within` of rows ``(n, d)``, shape ``(n,)``."""
+        if not self.clusterer.approximate:
+            return values
+        return self.scope.within(values, signature, x, self.clusterer.target)
 
     def _stopped(self, found: Prediction, signature: SlotSignature, row: NDArray[np.float64]) -> Prediction:
         """The prediction, or the constant of a stop that it runs into."""

@@ -3,7 +3,8 @@
 Of a property that follows from what nobody sees (a driver's intentions) no mode speaks, and it would keep its value; of
 a car's position that is far off. A guess is a sparse function of what the target and bodiless objects have, features
 included, that foretells best what it wasn't fitted to. It has no modes, no conditions and no say about what is a law:
-its outcome stays `UNEXPLAINED`. An approximation that errs more gives way to it.
+its outcome stays `UNEXPLAINED`. An approximation that errs more gives way to it, and where it doesn't speak
+(`relgym.model.scope`) a guess fitted to what happens there stands in.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
+from relgym.model.scope import Scope, alike, spread_out
 from relgym.numeric.stepwise import LinearFit, forward_stepwise, least_squares
 from relgym.scene.objects import Target
 
@@ -80,6 +82,8 @@ class Guesses:
     ----------
     best
         The guess; None as long as none is needed, or none is better than that nothing changes.
+    beyond
+        The same of examples beyond an approximation's scope; None also where they are few.
     errors
         What the modes' and the guess's predictions were off by lately: discounted means of squares, and of square
         roots, which rare large errors hardly move, shape ``(2, 2)``.
@@ -87,6 +91,7 @@ class Guesses:
 
     def __init__(self) -> None:
         self.best: Guess | None = None
+        self.beyond: Guess | None = None
         self.errors = np.zeros((2, 2))
         self._due = LEAST
 
@@ -105,62 +110,57 @@ class Guesses:
         """Whether a new guess is due after so many examples."""
         return seen >= self._due
 
-    def renew(self, clusterer: ModeClusterer, table: ExampleTable) -> int:
-        """Guess anew; the work done, in units of classifiers' work.
+    def renew(self, clusterer: ModeClusterer, table: ExampleTable, scope: Scope) -> int:
+        """Guess anew, beyond the scope of approximations too; the work done, in units of classifiers' work.
 
         Cost O(rows * columns * terms) with at most `MOST_CELLS` for the first two, some 0.1 s.
         """
         self._due = int(GROWTH * max(LEAST, clusterer.seen))
-        numbers, slots = _alike(clusterer, table)
-        if len(numbers) < LEAST or slots.feature_count > MOST_FEATURES:
-            return 0
-        order, stages = slots.preference(clusterer.target)
-        order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
-        order = order[[slots.at(int(k)).property[-1:] != "'" for k in order]]
-        some = _spread(numbers, min(MOST_ROWS, max(LEAST, MOST_CELLS // len(order))))
-        x, change = _data(clusterer, table, slots, order, some)
-        cut = len(some) - int(HELD_OUT * len(some))
-        chosen, left = _chosen(x, change, cut)
-        if chosen is None:
-            self.best = None
-            return x.size
-        mode = _fitted(clusterer, table, slots, order, _spread(numbers, FITTED), chosen.columns)
-        self.best = Guess(mode, left)
-        return int(x.size)
+        numbers, slots = alike(clusterer, table)
+        self.best, work = _guessed(clusterer, table, slots, numbers)
+        beyond = numbers[~scope.covers(table.x[clusterer.rows[numbers]])]
+        self.beyond, more = _guessed(clusterer, table, slots, beyond)
+        return work + more
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
-        best = None if self.best is None else [self.best.mode.to_json(), self.best.left]
-        return {"best": best, "errors": self.errors.tolist(), "due": self._due}
+        known = {"best": self.best, "beyond": self.beyond}
+        told = {
+            name: None if each is None else [each.mode.to_json(), each.left] for name, each in known.items()
+        }
+        return {**told, "errors": self.errors.tolist(), "due": self._due}
 
     @classmethod
     def from_json(cls, target: Target, data: dict[str, Any]) -> Guesses:
         """Read what `to_json` wrote."""
         found = cls()
         if data:
-            best = data["best"]
-            found.best = None if best is None else Guess(Mode.from_json(target, best[0]), float(best[1]))
+            found.best, found.beyond = (_read(target, data.get(name)) for name in ("best", "beyond"))
             found.errors, found._due = np.array(data["errors"], dtype=np.float64), int(data["due"])
         return found
 
 
-def _alike(clusterer: ModeClusterer, table: ExampleTable) -> tuple[NDArray[np.intp], SlotSignature]:
-    """Numbers of the examples whose own and bodiless columns are the newest one's, and its signature."""
-    ids = table.signature_ids[clusterer.rows]
-    slots = table.signatures[int(ids[-1])]
-    core = [(slots.named(k), slots.at(k).slot) for k in range(slots.core)]
-    fitting = [
-        k
-        for k in np.unique(ids).tolist()
-        if [(s.named(c), s.at(c).slot) for s in [table.signatures[k]] for c in range(s.core)] == core
-    ]
-    return np.flatnonzero(np.isin(ids, fitting)), slots
+def _read(target: Target, data: list[Any] | None) -> Guess | None:
+    return None if data is None else Guess(Mode.from_json(target, data[0]), float(data[1]))
 
 
-def _spread(numbers: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    if len(numbers) <= most:
-        return numbers
-    return numbers[np.linspace(0, len(numbers) - 1, most).astype(np.intp)]
+def _guessed(
+    clusterer: ModeClusterer, table: ExampleTable, slots: SlotSignature, numbers: NDArray[np.intp]
+) -> tuple[Guess | None, int]:
+    """A guess from some examples, if they are enough and it is better than none; the work done."""
+    if len(numbers) < LEAST or slots.feature_count > MOST_FEATURES:
+        return None, 0
+    order, stages = slots.preference(clusterer.target)
+    order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
+    order = order[[slots.at(int(k)).property[-1:] != "'" for k in order]]
+    some = spread_out(numbers, min(MOST_ROWS, max(LEAST, MOST_CELLS // len(order))))
+    x, change = _data(clusterer, table, slots, order, some)
+    cut = len(some) - int(HELD_OUT * len(some))
+    chosen, left = _chosen(x, change, cut)
+    if chosen is None:
+        return None, int(x.size)
+    mode = _fitted(clusterer, table, slots, order, spread_out(numbers, FITTED), chosen.columns)
+    return Guess(mode, left), int(x.size)
 
 
 def _data(

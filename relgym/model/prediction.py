@@ -19,10 +19,10 @@ class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
     Only `PREDICTED` is a mode's word. With every other outcome the value is a stopgap, not a claim: what is unexplained
-    is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes, or, where modes cover the
-    examples but nothing tells which of them holds when, it is what the vote's winner says; outside experience it is
-    what the mode says that would win the vote; what depends on such a stopgap follows from it; else the property keeps
-    its value.
+    is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes, and so it is where an
+    approximation isn't good (`relgym.model.scope`); or, where modes cover the examples but nothing tells which of them
+    holds when, it is what the vote's winner says; outside experience it is what the mode says that would win the vote;
+    what depends on such a stopgap follows from it; else the property keeps its value.
     """
 
     PREDICTED = "predicted by a mode"

@@ -24,6 +24,7 @@ from relgym.model.guess import Guesses
 from relgym.model.hindsight import Hindsight
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Situation
+from relgym.model.scope import EVERYWHERE, Scope, find_scope
 from relgym.model.spread import Spreads, measure
 from relgym.model.stops import Stops, find_stops
 from relgym.scene.objects import SceneSchema, Target
@@ -117,7 +118,7 @@ class PropertyModel(Answers):
         report = self.clusterer.learn_one(table, row, y, turn)
         self._unexplained = self._judge()
         if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
-            self.spreads = measure(self.clusterer, table)
+            self._measure(table)
         x = table.x[row : row + 1]
         refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
         if report.changed or refuted or self.stops.contradicted(report.mode, situation.signature, x[0]):
@@ -137,9 +138,14 @@ class PropertyModel(Answers):
     def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
         """Let the guess and the modes foretell an example before it is learned from."""
         binding = self._guessing(situation.signature)
-        if binding is None or self._unexplained or not self.classifier.modes:
-            return
         row = x[: len(situation.signature.columns)].tolist()
+        if (
+            binding is None
+            or self._unexplained
+            or not self.classifier.modes
+            or not self.scope.covers_one(row)
+        ):
+            return
         values = self._values_one(situation.signature, row, self.classifier.modes)
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])
         first = self.classifier.rank(replace(example, own=own), values).modes[0]
@@ -161,7 +167,14 @@ class PropertyModel(Answers):
     def follow(self, table: ExampleTable) -> None:
         """The modes changed from outside: classifiers and spreads follow."""
         self._follow(table)
-        self.spreads, self._unexplained = measure(self.clusterer, table), self._judge()
+        self._unexplained = self._judge()
+        self._measure(table)
+
+    def _measure(self, table: ExampleTable) -> None:
+        """How far examples scatter, and how far approximations go."""
+        self.spreads = measure(self.clusterer, table)
+        rough = len(self.clusterer.rows) and (self._unexplained or self.inexact)
+        self.scope = find_scope(self.clusterer, table) if rough else EVERYWHERE
 
     def start_over(self, table: ExampleTable) -> None:
         """Learn all classifiers anew, of what they remember."""
@@ -204,7 +217,7 @@ class PropertyModel(Answers):
         wanted = self._unexplained or self.inexact
         if not wanted or not self.guesses.stale(self.clusterer.seen):
             return 0
-        return self.guesses.renew(self.clusterer, table)
+        return self.guesses.renew(self.clusterer, table, self.scope)
 
     def retarget(self, target: Target, table: ExampleTable) -> None:
         """Be given other next values: modes and classifiers are learned again, from what is remembered."""
@@ -262,6 +275,7 @@ class PropertyModel(Answers):
             "unexplained": self._unexplained,
             "guess": self.guesses.to_json(),
             "spreads": self.spreads.to_json(),
+            "scope": self.scope.to_json(),
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
             "limits": self.limits.to_json(),
@@ -278,6 +292,7 @@ class PropertyModel(Answers):
         self._unexplained = bool(data["unexplained"])
         self.guesses = Guesses.from_json(self.target, data.get("guess", {}))
         self.spreads = Spreads.from_json(data["spreads"])
+        self.scope = Scope.from_json(data.get("scope", {}))
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))

@@ -63,11 +63,12 @@ def _stopgap(
     one: Prediction,
 ) -> Prediction:
     """A prediction that no mode makes, with the best guess as its value, or else the present one."""
-    guessed, best = model.guessed(percept, index, following[None]), model.guess
-    if guessed is None or best is None or not np.isfinite(guessed[0]):
+    guessed = model.guessed(percept, index, following[None])
+    if guessed is None or not np.isfinite(guessed[0]):
         column = percept.layout.column(index, model.target.property)
         return replace(one, value=float(following[column]))
-    return replace(one, value=float(guessed[0]), spread=best.mode.sigma)
+    best = model.guess_at(percept, index, following)
+    return replace(one, value=float(guessed[0]), spread=one.spread if best is None else best.mode.sigma)
 
 
 def predict_many(

@@ -123,6 +123,8 @@ class TargetReport:
         The tables' rows. Roles without a body (the action) are left out: there is only one such object.
     advice
         What the target lacks, if modes don't explain it.
+    beyond
+        Tests of the places where approximations don't speak (`relgym.model.scope`).
     """
 
     target: str
@@ -132,6 +134,7 @@ class TargetReport:
     pairs: tuple[PairTable, ...]
     roles: tuple[RoleRow, ...]
     advice: Advice | None = None
+    beyond: tuple[str, ...] = ()
 
     @property
     def examples(self) -> int:
@@ -143,6 +146,12 @@ class TargetReport:
             return f"{self.target}: no mode learned yet, {amount(self.examples, 'example')}{self._advice()}"
         head = f"{self.target}: {amount(len(self.modes), 'mode')}, {amount(self.examples, 'example')}"
         parts = [head, indented(_mode_table(self))]
+        if self.beyond:
+            parts.append(
+                "\n".join(
+                    ["  where no mode speaks, and a guess stands in:", *(f"    {t}" for t in self.beyond)]
+                )
+            )
         if self.pairs:
             parts.append(indented(_clause_table(self.pairs)))
         if self.roles:

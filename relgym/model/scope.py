@@ -1,0 +1,151 @@
+"""How far an approximation goes: where it speaks, and the changes that it may foretell.
+
+An approximation is good for nearly all examples. Those that it isn't good for lie together more often than not: a
+lander's law of flight says nothing of its legs' touch, and far less of a crash, where features lead anywhere. A
+decision tree over the target's own numbers and the action's (§3.4.4) tells where; there it doesn't speak: the outcome
+is `UNEXPLAINED`, and the value a guess (`relgym.model.guess`). And since no law says how far either of them goes,
+neither goes beyond the changes that were seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.clusterer import ModeClusterer
+from relgym.clustering.columns import PRIME, SlotSignature
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.mode import NOISE
+from relgym.numeric.tree import DecisionTree, learn_tree
+from relgym.scene.objects import Target
+
+__all__ = ["EVERYWHERE", "Scope", "alike", "find_scope", "spread_out"]
+
+MOST_ROWS: Final = 4_000
+"""At most so many examples, evenly spread over time, teach the tree."""
+
+LEAF: Final = 5
+"""Fewest examples on either side of a test."""
+
+DEPTH: Final = 4
+"""Most tests in a row."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """How far what is said of a target goes.
+
+    Attributes
+    ----------
+    tree
+        Says yes where some mode explains what follows; None: everywhere.
+    columns
+        Columns of a row that the tree looks at; they mean the same in every signature of the target.
+    least, most
+        Smallest and largest change seen, in units of the target.
+    """
+
+    tree: DecisionTree | None = None
+    columns: tuple[int, ...] = ()
+    least: float = -np.inf
+    most: float = np.inf
+
+    def covers_one(self, x: Sequence[float]) -> bool:
+        """Whether modes speak of one row."""
+        return self.tree is None or self.tree.predict_one([x[k] for k in self.columns])
+
+    def covers(self, x: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether modes speak of rows ``(n, d)``, shape ``(n,)``; equal to `covers_one` of each."""
+        if self.tree is None:
+            return np.ones(len(x), dtype=np.bool_)
+        return self.tree.predict_batch(x[:, list(self.columns)])
+
+    def within(
+        self, values: NDArray[np.float64], signature: SlotSignature, x: NDArray[np.float64], target: Target
+    ) -> NDArray[np.float64]:
+        """Values foretold of rows ``(n, d)``, none further from the present ones than was seen; NaN stays."""
+        present = signature.present(x, target)
+        found: NDArray[np.float64] = np.clip(values, present + self.least, present + self.most)
+        return found
+
+    def beyond(self) -> tuple[str, ...]:
+        """Tests of the places where modes don't speak: ``py <= 0.1 ∧ left > 0.5``."""
+        if self.tree is None:
+            return ()
+        return tuple(self.tree.path(leaf) for leaf in self.tree.leaves if not self.tree.says_yes(leaf))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back."""
+        tree = None if self.tree is None else self.tree.to_dict()
+        reach = [self.least, self.most] if np.isfinite([self.least, self.most]).all() else None
+        return {"tree": tree, "columns": list(self.columns), "reach": reach}
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> Scope:
+        """Read what `to_json` wrote."""
+        if not data:
+            return EVERYWHERE
+        tree = None if data["tree"] is None else DecisionTree.from_dict(data["tree"])
+        return cls(tree, tuple(data["columns"]), *(data["reach"] or ()))
+
+
+EVERYWHERE: Final = Scope()
+"""The scope of a law."""
+
+
+def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
+    """How far approximations and guesses of a target go.
+
+    Parameters
+    ----------
+    clusterer
+        Modes and examples of the target, one or more.
+    table
+        The rows of the examples.
+
+    Notes
+    -----
+    The tree pays for its bits in examples explained, so what lies scattered has none. Cost
+    O(`MOST_ROWS` * columns * `DEPTH`), some 10 ms.
+    """
+    numbers, slots = alike(clusterer, table)
+    change = clusterer.y[numbers] - slots.present_of(table.x, clusterer.rows[numbers], clusterer.target)
+    reach = (float(change.min()), float(change.max()))
+    if not clusterer.clusters or not clusterer.noise_examples:
+        return Scope(None, (), *reach)
+    some = spread_out(numbers, MOST_ROWS)
+    columns = tuple(k for k in range(slots.core) if not slots.at(k).property.endswith(PRIME))
+    tree = learn_tree(
+        table.x[clusterer.rows[some]][:, list(columns)],
+        clusterer.labels[some] != NOISE,
+        columns=[slots.named(k) for k in columns],
+        min_leaf=LEAF,
+        max_depth=DEPTH,
+    )
+    if len({tree.says_yes(leaf) for leaf in tree.leaves}) == 1:
+        return Scope(None, (), *reach)
+    return Scope(tree, columns, *reach)
+
+
+def alike(clusterer: ModeClusterer, table: ExampleTable) -> tuple[NDArray[np.intp], SlotSignature]:
+    """Numbers of the examples whose own and bodiless columns are the newest one's, and its signature."""
+    ids = table.signature_ids[clusterer.rows]
+    slots = table.signatures[int(ids[-1])]
+    core = [(slots.named(k), slots.at(k).slot) for k in range(slots.core)]
+    fitting = [
+        k
+        for k in np.unique(ids).tolist()
+        if [(s.named(c), s.at(c).slot) for s in [table.signatures[k]] for c in range(s.core)] == core
+    ]
+    return np.flatnonzero(np.isin(ids, fitting)), slots
+
+
+def spread_out(numbers: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+    """At most so many of these examples, evenly spread over time."""
+    if len(numbers) <= most:
+        return numbers
+    return numbers[np.linspace(0, len(numbers) - 1, most).astype(np.intp)]

@@ -1,0 +1,129 @@
+"""How far approximations go: where they speak, and the changes that they may foretell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from points import learned, schema_of, transitions
+
+from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.scope import EVERYWHERE, Scope
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Transition
+
+SCHEMA = schema_of(("x", "v", "leg"), ("a",))
+
+
+def lander(n: int, seed: int = 0, *, steepest: float = 1.5) -> list[Transition]:
+    """Flight is a smooth curve that no feature offered fits exactly; a leg that touches is thrown about.
+
+    In what was thrown there is a law of its own, half of it noise.
+    """
+    rng = np.random.default_rng(seed)
+    kicks = rng.normal(size=n).tolist()
+
+    def moved(s: np.ndarray, u: np.ndarray) -> list[float]:
+        if s[2]:
+            return [s[0], 2.0 * s[0] + kicks.pop(), s[2]]
+        return [s[0], s[1] + 0.5 * np.tanh(1.5 * s[0]) + 0.1 * u[0], s[2]]
+
+    leg = (rng.random(n) < 0.095).astype(float)
+    starts = np.column_stack([rng.uniform(-steepest, steepest, n), rng.normal(size=n), leg])
+    return transitions(SCHEMA, moved, starts, rng.normal(size=(n, 1)))
+
+
+@pytest.fixture(scope="module")
+def model() -> WorldModel:
+    return learned(SCHEMA, lander(760), features=("trig(x)",))
+
+
+def test_an_approximation_speaks_where_it_is_good(model: WorldModel) -> None:
+    part = model.property_model("self", "v")
+    assert part.clusterer.approximate
+    assert part.scope.beyond() == ("leg > 0.5",)
+    for step in lander(100, seed=1):
+        said = model.predict_one(step.before)["self", "v"]
+        if step.before["self"]["leg"]:
+            assert (said.outcome, said.mode) == (Outcome.UNEXPLAINED, 0)
+        else:
+            assert said.ok
+            assert said.value == pytest.approx(step.after["self"]["v"], abs=0.1)
+
+
+def test_beyond_a_guess_of_what_happens_there_stands_in(model: WorldModel) -> None:
+    part = model.property_model("self", "v")
+    assert part.guess_beyond is not None
+    steps = [t for t in lander(1000, seed=2) if t.before["self"]["leg"]]
+    said = [model.predict_one(t.before)["self", "v"] for t in steps]
+    off = [one.value - t.after["self"]["v"] for one, t in zip(said, steps, strict=True)]
+    assert np.std(off) == pytest.approx(1.0, rel=0.3)  # what was thrown changes by 2.3
+    assert {one.spread for one in said} == {part.guess_beyond.mode.sigma}
+
+
+def test_far_off_nothing_changes_by_more_than_was_seen(model: WorldModel) -> None:
+    part = model.property_model("self", "v")
+    for step in lander(50, seed=3, steepest=100.0):
+        change = model.predict_one(step.before)["self", "v"].value - step.before["self"]["v"]
+        assert part.scope.least - 1e-9 <= change <= part.scope.most + 1e-9
+
+
+def test_one_by_one_and_in_batches_with_the_same_bits(model: WorldModel) -> None:
+    scenes = [t.before for t in lander(200, seed=4, steepest=20.0)]
+    batch = model.predict_batch(scenes[0].layout, np.stack([s.vector for s in scenes]))
+    for k, scene in enumerate(scenes):
+        said = model.predict_one(scene)
+        assert said.scene.vector.tobytes() == batch.vectors[k].tobytes()
+        assert [OUTCOMES.index(part.outcome) for part in said.parts] == batch.outcomes[k].tolist()
+        assert [part.mode for part in said.parts] == batch.modes[k].tolist()
+
+
+def test_the_report_tells_where(model: WorldModel) -> None:
+    text = str(model.describe())
+    assert "where no mode speaks, and a guess stands in:\n    leg > 0.5\n" in text
+
+
+def test_a_law_has_no_bounds() -> None:
+    rng = np.random.default_rng(0)
+    starts = np.column_stack([rng.normal(size=(200, 2)), np.zeros(200)])
+    steps = transitions(SCHEMA, lambda s, u: [s[0], s[1] + s[0], s[2]], starts, rng.normal(size=(200, 1)))
+    model = learned(SCHEMA, steps)
+    assert model.property_model("self", "v").scope is EVERYWHERE
+    far = SCHEMA.scene({"self": [1e6, 1.0, 0.0], "action": [0.0]})
+    assert model.predict_one(far)["self", "v"].value == pytest.approx(1e6 + 1.0)
+
+
+def test_what_lies_scattered_has_no_place() -> None:
+    rng = np.random.default_rng(0)
+    kicked = (rng.random(600) < 0.08).tolist()
+
+    def moved(s: np.ndarray, u: np.ndarray) -> list[float]:
+        kick = 3.0 * rng.normal() if kicked.pop() else 0.0
+        return [s[0], s[1] + 0.5 * np.tanh(1.5 * s[0]) + kick, s[2]]
+
+    starts = np.column_stack(
+        [rng.uniform(-1.5, 1.5, 600), rng.normal(size=600), rng.integers(2, size=600)]
+    )
+    model = learned(
+        SCHEMA, transitions(SCHEMA, moved, starts, rng.normal(size=(600, 1))), features=("trig(x)",)
+    )
+    part = model.property_model("self", "v")
+    assert part.clusterer.approximate and part.clusterer.noise_examples > 25
+    assert part.scope.tree is None
+
+
+def test_a_loaded_model_speaks_where_it_did(model: WorldModel, tmp_path: Path) -> None:
+    model.save(tmp_path / "lander.relgym")
+    again = WorldModel.load(tmp_path / "lander.relgym")
+    part, known = again.property_model("self", "v"), model.property_model("self", "v")
+    assert part.scope == known.scope
+    assert part.guesses.to_json() == known.guesses.to_json()
+    for step in lander(50, seed=5, steepest=10.0):
+        said, before = again.predict_one(step.before), model.predict_one(step.before)
+        assert said.scene.vector.tobytes() == before.scene.vector.tobytes()
+
+
+def test_scopes_of_older_files_are_everywhere() -> None:
+    assert Scope.from_json({}) is EVERYWHERE
+    assert Scope.from_json(EVERYWHERE.to_json()) == EVERYWHERE
