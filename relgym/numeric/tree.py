@@ -96,15 +96,18 @@ class DecisionTree:
         return tuple(node for node, column in enumerate(self.column) if column == _LEAF)
 
     def path(self, leaf: int) -> str:
-        """The tests that lead to a leaf: ``vx <= 0.5 ∧ vy > 1``; ``always`` if it is the root."""
-        tests: list[str] = []
+        """The tests that lead to a leaf, of each feature the closest: ``vx <= 0.5 ∧ vy > 1``; ``always`` at the root."""
+        tests: list[tuple[int, str, float]] = []
         node = leaf
         while node > 0:
             parent = next(p for p in range(node) if node in (self.below[p], self.above[p]))
             op = "<=" if self.below[parent] == node else ">"
-            tests.append(f"{self.columns[self.column[parent]]} {op} {self.threshold[parent]:.6g}")
+            tests.append((self.column[parent], op, self.threshold[parent]))
             node = parent
-        return " ∧ ".join(reversed(tests)) or "always"
+        # A test further down is closer, or it wouldn't part what came down to it.
+        closest = {(column, op): threshold for column, op, threshold in reversed(tests)}
+        told = (f"{self.columns[column]} {op} {threshold:.6g}" for (column, op), threshold in closest.items())
+        return " ∧ ".join(told) or "always"
 
     def rules(self) -> tuple[str, ...]:
         """One readable line per leaf, tests first: ``vy <= 0.25 -> yes (12 : 0)``."""
