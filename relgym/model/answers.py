@@ -65,7 +65,7 @@ class Answers(ModeFunctions):
     guesses
         The best guess, where nothing is explained.
     scope
-        How far guesses and approximations go.
+        Where modes speak, and how far guesses and approximations go.
     hindsight
         How the latest predictions came out, if somebody looked back at them.
     leaned_on

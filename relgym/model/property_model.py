@@ -24,7 +24,7 @@ from relgym.model.guess import Guesses
 from relgym.model.hindsight import Hindsight
 from relgym.model.limits import Limits, find_limits
 from relgym.model.perception import Situation
-from relgym.model.scope import EVERYWHERE, Scope, find_scope
+from relgym.model.scope import EVERYWHERE, LEAF, Scope, find_scope
 from relgym.model.spread import Spreads, measure
 from relgym.model.stops import Stops, find_stops
 from relgym.scene.objects import SceneSchema, Target
@@ -173,8 +173,10 @@ class PropertyModel(Answers):
     def _measure(self, table: ExampleTable) -> None:
         """How far examples scatter, and how far approximations go."""
         self.spreads = measure(self.clusterer, table)
-        rough = len(self.clusterer.rows) and (self._unexplained or self.inexact)
-        self.scope = find_scope(self.clusterer, table) if rough else EVERYWHERE
+        # Of bodies relations may tell what the numbers of a row don't.
+        bodiless = not self.schema.type(self.target.type).has_body
+        bounded = self._unexplained or self.inexact or (bodiless and self.clusterer.noise_examples >= LEAF)
+        self.scope = find_scope(self.clusterer, table) if bounded and len(self.clusterer.rows) else EVERYWHERE
 
     def start_over(self, table: ExampleTable) -> None:
         """Learn all classifiers anew, of what they remember."""

@@ -124,7 +124,7 @@ class TargetReport:
     advice
         What the target lacks, if modes don't explain it.
     beyond
-        Tests of the places where approximations don't speak (`relgym.model.scope`).
+        Tests of the places where modes don't speak (`relgym.model.scope`).
     """
 
     target: str
@@ -147,11 +147,7 @@ class TargetReport:
         head = f"{self.target}: {amount(len(self.modes), 'mode')}, {amount(self.examples, 'example')}"
         parts = [head, indented(_mode_table(self))]
         if self.beyond:
-            parts.append(
-                "\n".join(
-                    ["  where no mode speaks, and a guess stands in:", *(f"    {t}" for t in self.beyond)]
-                )
-            )
+            parts.append("\n".join(["  where no mode speaks:", *(f"    {t}" for t in self.beyond)]))
         if self.pairs:
             parts.append(indented(_clause_table(self.pairs)))
         if self.roles:

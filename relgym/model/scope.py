@@ -1,10 +1,11 @@
-"""How far an approximation goes: where it speaks, and the changes that it may foretell.
+"""How far modes go: where they speak, and the changes that an approximation may foretell.
 
-An approximation is good for nearly all examples. Those that it isn't good for lie together more often than not: a
-lander's law of flight says nothing of its legs' touch, and far less of a crash, where features lead anywhere. A
-decision tree over the target's own numbers and the action's (§3.4.4) tells where; there it doesn't speak: the outcome
-is `UNEXPLAINED`, and the value a guess (`relgym.model.guess`). And since no law says how far either of them goes,
-neither goes beyond the changes that were seen.
+Examples that no mode explains lie together more often than not: a lander's law of flight says nothing of its legs'
+touch, and far less of a crash, where features lead anywhere; of an end that was seen nine times no mode is known yet,
+and what is known of other ends would promise their prize. A decision tree over the target's own numbers and the
+action's (§3.4.4), of reward and termination over next values too, tells where; there modes don't speak: the outcome is
+`UNEXPLAINED`, and the value a guess (`relgym.model.guess`). And since no law says how far approximations and guesses
+go, they never go beyond the changes that were seen.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
 from relgym.numeric.tree import DecisionTree, learn_tree
-from relgym.scene.objects import Target
+from relgym.scene.objects import TASK, Target
 
-__all__ = ["EVERYWHERE", "Scope", "alike", "find_scope", "spread_out"]
+__all__ = ["EVERYWHERE", "LEAF", "Scope", "alike", "find_scope", "spread_out"]
 
 MOST_ROWS: Final = 4_000
 """At most so many examples, evenly spread over time, teach the tree."""
@@ -94,11 +95,11 @@ class Scope:
 
 
 EVERYWHERE: Final = Scope()
-"""The scope of a law."""
+"""The scope of laws that explain everything."""
 
 
 def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
-    """How far approximations and guesses of a target go.
+    """How far modes and guesses of a target go.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
     if not clusterer.clusters or not clusterer.noise_examples:
         return Scope(None, (), *reach)
     some = spread_out(numbers, MOST_ROWS)
-    columns = tuple(k for k in range(slots.core) if not slots.at(k).property.endswith(PRIME))
+    columns = tuple(k for k in range(slots.core) if _looked_at(slots, k, clusterer.target))
     tree = learn_tree(
         table.x[clusterer.rows[some]][:, list(columns)],
         clusterer.labels[some] != NOISE,
@@ -129,6 +130,15 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
     if len({tree.says_yes(leaf) for leaf in tree.leaves}) == 1:
         return Scope(None, (), *reach)
     return Scope(tree, columns, *reach)
+
+
+def _looked_at(slots: SlotSignature, index: int, target: Target) -> bool:
+    """Whether the tree may look at a column: next values only of what a step is worth, a matter of where it leads."""
+    column = slots.at(index)
+    if not column.property.endswith(PRIME):
+        return slots.types[column.slot].name != TASK
+    given = (slots.types[column.slot].name, column.property.rstrip(PRIME)) in target.given
+    return given and target.type == TASK
 
 
 def alike(clusterer: ModeClusterer, table: ExampleTable) -> tuple[NDArray[np.intp], SlotSignature]:

@@ -96,7 +96,7 @@ class DecisionTree:
         return tuple(node for node, column in enumerate(self.column) if column == _LEAF)
 
     def path(self, leaf: int) -> str:
-        """The tests that lead to a leaf, of each feature the closest: ``vx <= 0.5 ∧ vy > 1``; ``always`` at the root."""
+        """The tests that lead to a leaf, of each feature the closest: ``vx <= 0.5 ∧ vy > 1``; ``always`` if none."""
         tests: list[tuple[int, str, float]] = []
         node = leaf
         while node > 0:

@@ -1,4 +1,4 @@
-"""How far approximations go: where they speak, and the changes that they may foretell."""
+"""How far modes go: where they speak, and the changes that an approximation may foretell."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_one_by_one_and_in_batches_with_the_same_bits(model: WorldModel) -> None
 
 def test_the_report_tells_where(model: WorldModel) -> None:
     text = str(model.describe())
-    assert "where no mode speaks, and a guess stands in:\n    leg > 0.5\n" in text
+    assert "where no mode speaks:\n    leg > 0.5\n" in text
 
 
 def test_a_law_has_no_bounds() -> None:
@@ -94,6 +94,33 @@ def test_a_law_has_no_bounds() -> None:
     assert model.predict_one(far)["self", "v"].value == pytest.approx(1e6 + 1.0)
 
 
+def test_a_rare_end_is_not_foretold_as_the_others() -> None:
+    """Ends on the right are paid 1, those on the left cost 1; the latter were seen nine times, too few for a mode."""
+    schema = schema_of(("x",), ("a",), ("terminated", "reward"))
+    rng = np.random.default_rng(0)
+
+    def worth(s: np.ndarray, u: np.ndarray, y: np.ndarray) -> list[float]:
+        return [float(abs(y[0]) > 1.0), -0.01 if abs(y[0]) <= 1.0 else np.sign(y[0])]
+
+    starts = np.concatenate([rng.uniform(-0.8, 1.2, 391), rng.uniform(-1.3, -1.1, 9)])
+    starts = rng.permutation(starts)[:, None]
+    actions = rng.uniform(-1.0, 1.0, size=(400, 1))
+    steps = transitions(schema, lambda s, u: [s[0] + 0.1 * u[0]], starts, actions, worth)
+    model = learned(schema, steps)
+    assert len(model.modes("task", "reward")) == 1
+    (beyond,) = model.property_model("task", "reward").scope.beyond()
+    assert beyond.startswith("self.x") and " <= -" in beyond
+
+    def foretold(x: float) -> tuple[Outcome, float]:
+        scene = schema.scene({"self": [x], "action": [0.0], "task": [0.0, 0.0]})
+        one = model.predict_one(scene)["task", "reward"]
+        return one.outcome, round(one.value, 6)
+
+    assert foretold(1.2) == (Outcome.PREDICTED, 1.0)
+    assert foretold(0.0) == (Outcome.PREDICTED, -0.01)
+    assert foretold(-1.2)[0] is Outcome.UNEXPLAINED
+
+
 def test_what_lies_scattered_has_no_place() -> None:
     rng = np.random.default_rng(0)
     kicked = (rng.random(600) < 0.08).tolist()
@@ -102,9 +129,7 @@ def test_what_lies_scattered_has_no_place() -> None:
         kick = 3.0 * rng.normal() if kicked.pop() else 0.0
         return [s[0], s[1] + 0.5 * np.tanh(1.5 * s[0]) + kick, s[2]]
 
-    starts = np.column_stack(
-        [rng.uniform(-1.5, 1.5, 600), rng.normal(size=600), rng.integers(2, size=600)]
-    )
+    starts = np.column_stack([rng.uniform(-1.5, 1.5, 600), rng.normal(size=600), rng.integers(2, size=600)])
     model = learned(
         SCHEMA, transitions(SCHEMA, moved, starts, rng.normal(size=(600, 1))), features=("trig(x)",)
     )
