@@ -127,6 +127,11 @@ class Answers(ModeFunctions):
         x = percept.rows(index, following[None], ordered=False)[0].tolist()
         return self.guess if self.scope.covers_one(x) else self.guess_beyond
 
+    def beyond(self, percept: Percept, index: int, following: NDArray[np.float64]) -> str:
+        """Tests of the place where no mode speaks, if one object of a single scene lies in one; else empty."""
+        row = percept.rows(index, following[None], ordered=False)[0].tolist()
+        return "" if self.scope.covers_one(row) else self.scope.place(row)
+
     @property
     def inexact(self) -> bool:
         """Whether modes are approximations, or leave more than rounding explains, and nobody said that they would."""

@@ -77,6 +77,8 @@ class Explanation:
         contact.
     limit
         When the mode holds if it takes no part in the vote, a limit or a stop, where others would lead too far.
+    beyond
+        Tests of the place, if it is one where modes don't speak (`relgym.model.scope`).
     """
 
     prediction: Prediction
@@ -86,6 +88,7 @@ class Explanation:
     reasons: tuple[Reason, ...]
     laws: tuple[str, ...] = ()
     limit: str = ""
+    beyond: str = ""
 
     def __str__(self) -> str:
         p, d = self.prediction, self.digits
@@ -95,7 +98,11 @@ class Explanation:
             head = f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"
             return "\n".join([head, f"  laws      {first}", *(f"            {line}" for line in rest)])
         if self.mode is None:
-            return f"{name}: {self.now:.{d}g} kept for want of a prediction\n  outcome   {p.outcome.value}"
+            said = f"-> {p.value:.{d}g}, a guess" if p.informed else "kept for want of a prediction"
+            lines = [f"{name}: {self.now:.{d}g} {said}", f"  outcome   {p.outcome.value}"]
+            return "\n".join(
+                [*lines, f"  because   no mode speaks where {self.beyond}"] if self.beyond else lines
+            )
         lines = [f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"]
         examples = amount(self.mode.examples, "training example")
         lines.append(f"  mode      {self.mode.id}: {self.mode.formula(d)}  ({examples})")
@@ -159,7 +166,12 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
             if part.bounds(one.mode):
                 found.append(Explanation(one, now, mode, digits, (), limit=_limit(part, one.mode)))
                 continue
-            reasons = () if mode is None else _reasons(model, part, scene, index, prediction.scene, mode.id)
+            if mode is None:
+                tests = part.beyond(model.percept(scene), index, prediction.scene.vector)
+                beyond = as_relations(tests, part.flags)
+                found.append(Explanation(one, now, None, digits, (), beyond=beyond))
+                continue
+            reasons = _reasons(model, part, scene, index, prediction.scene, mode.id)
             found.append(Explanation(one, now, mode, digits, reasons))
     return tuple(found)
 

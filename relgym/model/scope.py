@@ -79,6 +79,10 @@ class Scope:
             return ()
         return tuple(self.tree.path(leaf) for leaf in self.tree.leaves if not self.tree.says_yes(leaf))
 
+    def place(self, x: Sequence[float]) -> str:
+        """The tree's tests that one row passes; empty without a tree."""
+        return "" if self.tree is None else self.tree.path(self.tree.leaf_one([x[k] for k in self.columns]))
+
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
         tree = None if self.tree is None else self.tree.to_dict()

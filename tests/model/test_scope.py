@@ -84,6 +84,14 @@ def test_the_report_tells_where(model: WorldModel) -> None:
     assert "where no mode speaks:\n    leg > 0.5\n" in text
 
 
+def test_an_explanation_calls_a_guess_a_guess(model: WorldModel) -> None:
+    scene = SCHEMA.scene({"self": [1.0, 0.0, 1.0], "action": [0.0]})
+    text = model.explain(scene)
+    value = model.predict_one(scene)["self", "v"].value
+    assert f"self.v: 0 -> {value:.7g}, a guess\n  outcome   unexplained" in text
+    assert "  because   no mode speaks where leg > 0.5" in text
+
+
 def test_a_law_has_no_bounds() -> None:
     rng = np.random.default_rng(0)
     starts = np.column_stack([rng.normal(size=(200, 2)), np.zeros(200)])
@@ -119,6 +127,8 @@ def test_a_rare_end_is_not_foretold_as_the_others() -> None:
     assert foretold(1.2) == (Outcome.PREDICTED, 1.0)
     assert foretold(0.0) == (Outcome.PREDICTED, -0.01)
     assert foretold(-1.2)[0] is Outcome.UNEXPLAINED
+    text = model.explain(schema.scene({"self": [-1.2], "action": [0.0], "task": [0.0, 0.0]}))
+    assert f"  because   no mode speaks where {beyond}" in text
 
 
 def test_what_lies_scattered_has_no_place() -> None:
