@@ -12,29 +12,21 @@ from relgym.classification.mode_classifier import ModeClassifier
 from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
-from relgym.clustering.mode import NOISE
-from relgym.clustering.roles import Binding, bind
+from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
 from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions
-from relgym.model.functions import ModeFunctions, Verdict
+from relgym.model.functions import Verdict
 from relgym.model.grouping import distinct, members
-from relgym.model.guess import Guess, Guesses
 from relgym.model.hindsight import Hindsight
 from relgym.model.limits import Limits
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
-from relgym.model.scope import EVERYWHERE
 from relgym.model.spread import Spreads
+from relgym.model.stand_ins import StandIns
 from relgym.model.stops import Stops
 
 __all__ = ["Answers"]
-
-ROUGH = 4.0
-"""So many times the rounding noise can't be rounding."""
-
-_BEYOND = -1
-"""In the place of a mode's id: the guess beyond the scope of approximations."""
 
 _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
     OUTCOMES.index(o)
@@ -42,7 +34,7 @@ _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
 )
 
 
-class Answers(ModeFunctions):
+class Answers(StandIns):
     """Predicts one target, in single scenes and in many, from what others have learned.
 
     Parameters
@@ -62,10 +54,6 @@ class Answers(ModeFunctions):
         Which modes are limits: they take no part in the vote but cut off what its winner predicts.
     stops
         Which modes are walls at work: they take no part in the vote either.
-    guesses
-        The best guess, where nothing is explained.
-    scope
-        Where modes speak, and how far guesses and approximations go.
     hindsight
         How the latest predictions came out, if somebody looked back at them.
     leaned_on
@@ -87,11 +75,8 @@ class Answers(ModeFunctions):
         self.spreads = Spreads()
         self.limits = Limits()
         self.stops = Stops()
-        self.guesses = Guesses()
-        self.scope = EVERYWHERE
         self.hindsight = Hindsight()
         self.leaned_on = False
-        self._unexplained = False
 
     def bounds(self, mode: int) -> bool:
         """Whether a mode takes no part in the vote, but stands in where the others would lead too far."""
@@ -111,65 +96,9 @@ class Answers(ModeFunctions):
         return len(self.classifier.modes) > 1 and self.hindsight.undecided
 
     @property
-    def guess(self) -> Guess | None:
-        """The best guess, where it stands in for what isn't explained: nothing is, or nothing exactly."""
-        return self.guesses.best if self._unexplained or self.inexact else None
-
-    @property
-    def guess_beyond(self) -> Guess | None:
-        """What stands in where approximations don't speak, if it is known better than the best guess of all."""
-        return self.guesses.beyond if self.scope.tree is not None else None
-
-    def guess_at(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Guess | None:
-        """The guess that speaks of one object of a single scene; arguments as of `predict_one`."""
-        if self.guess_beyond is None:
-            return self.guess
-        x = percept.rows(index, following[None], ordered=False)[0].tolist()
-        return self.guess if self.scope.covers_one(x) else self.guess_beyond
-
-    def beyond(self, percept: Percept, index: int, following: NDArray[np.float64]) -> str:
-        """Tests of the place where no mode speaks, if one object of a single scene lies in one; else empty."""
-        row = percept.rows(index, following[None], ordered=False)[0].tolist()
-        return "" if self.scope.covers_one(row) else self.scope.place(row)
-
-    @property
-    def inexact(self) -> bool:
-        """Whether modes are approximations, or leave more than rounding explains, and nobody said that they would."""
-        rough = self.clusterer.scale.sigma > ROUGH * self.clusterer.floor
-        return self.clusterer.approximate or (rough and self.clusterer.config.noise_std == "auto")
-
-    @property
     def _lost(self) -> bool:
         """Whether modes aren't asked: nothing is explained, or an approximation errs more than the guess."""
         return self._unexplained or (not self.leaned_on and self.guess is not None and self.guesses.superior)
-
-    def guessed(
-        self, percept: Percept, index: int, following: NDArray[np.float64]
-    ) -> NDArray[np.float64] | None:
-        """What guesses say of one object of n scenes, shape ``(n,)``, NaN where nobody has one; None if there is none.
-
-        Arguments as of `predict_batch`.
-        """
-        signature = percept.situation(index).signature
-        whole, beyond = self._guessing(signature), self._guessing(signature, beyond=True)
-        if whole is None and beyond is None:
-            return None
-        x = percept.rows(index, following, ordered=False)
-        target = self.clusterer.target
-        values = np.full(len(x), np.nan) if whole is None else whole.values(x)[:, 0]
-        if beyond is not None:
-            values = np.where(self.scope.covers(x), values, beyond.values(x)[:, 0])
-        return self.scope.within(values, signature, x, target)
-
-    def _guessing(self, signature: SlotSignature, *, beyond: bool = False) -> Binding | None:
-        """A guess over a signature's columns: the best one of all, or that beyond the scope of approximations."""
-        best, key = (self.guess, NOISE) if not beyond else (self.guess_beyond, _BEYOND)
-        if best is None:
-            return None
-        known = self._bindings.get((id(signature), key))
-        if known is None or known[0] is not best.mode:
-            known = self._bindings[id(signature), key] = (best.mode, bind(best.mode, signature))
-        return None if known[1] is None or known[1].open else known[1]
 
     def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
         """What every mode would predict, in the order of ``classifier.modes``; NaN where its roles are open.
@@ -241,7 +170,7 @@ class Answers(ModeFunctions):
             margin = ranking.margin if place == 0 else 0.0
             outcome = Outcome.UNEXPLAINED if self.undecided else Outcome.PREDICTED
             found = Prediction("", "", binding.value(x, slots), outcome, mode, roles, margin)
-            found = replace(found, value=self._within(found.value, situation.signature, row))
+            found = replace(found, value=self.within(found.value, situation.signature, row))
             found = self._stopped(self.limits.cut_off(found), situation.signature, row)
             return replace(found, spread=self.spreads.at(found.mode, situation.signature, x))
         return replace(nothing, outcome=Outcome.NO_ROLES)
@@ -292,7 +221,7 @@ class Answers(ModeFunctions):
                     waiting[part] = False
             if not waiting.any():
                 break
-        verdict.values[:] = self._all_within(verdict.values, situation.signature, x)
+        verdict.values[:] = self.all_within(verdict.values, situation.signature, x)
         self.limits.cut_off_all(verdict.values, verdict.modes)
         self.stops.apply(situation.signature, x, verdict.values, verdict.modes)
         self._lean(verdict, ranking.modes[:, 0], outside & ~beyond, situation.signature, x)
@@ -304,7 +233,7 @@ class Answers(ModeFunctions):
         if binding is None or binding.open:
             return Prediction("", "", float("nan"), Outcome.OUTSIDE)
         x = row[0].tolist()
-        value, spread = self._within(binding.value(x), signature, row), self.spreads.at(mode, signature, x)
+        value, spread = self.within(binding.value(x), signature, row), self.spreads.at(mode, signature, x)
         return Prediction("", "", value, Outcome.OUTSIDE, spread=spread)
 
     def _lean(
@@ -320,21 +249,7 @@ class Answers(ModeFunctions):
             binding = self._binding(signature, int(mode))
             if binding is not None and not binding.open:
                 part = outside & (winners == mode)
-                verdict.values[part] = self._all_within(binding.values(x[part])[:, 0], signature, x[part])
-
-    def _within(self, value: float, signature: SlotSignature, row: NDArray[np.float64]) -> float:
-        """What a mode says of a row ``(1, d)``, or as far as approximations go."""
-        if not self.clusterer.approximate:
-            return value
-        return float(self.scope.within(np.array([value]), signature, row, self.clusterer.target)[0])
-
-    def _all_within(
-        self, values: NDArray[np.float64], signature: SlotSignature, x: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """`_within` of rows ``(n, d)``, shape ``(n,)``."""
-        if not self.clusterer.approximate:
-            return values
-        return self.scope.within(values, signature, x, self.clusterer.target)
+                verdict.values[part] = self.all_within(binding.values(x[part])[:, 0], signature, x[part])
 
     def _stopped(self, found: Prediction, signature: SlotSignature, row: NDArray[np.float64]) -> Prediction:
         """The prediction, or the constant of a stop that it runs into."""

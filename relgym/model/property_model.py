@@ -175,7 +175,7 @@ class PropertyModel(Answers):
         self.spreads = measure(self.clusterer, table)
         # Of bodies relations may tell what the numbers of a row don't.
         bodiless = not self.schema.type(self.target.type).has_body
-        bounded = self._unexplained or self.inexact or (bodiless and self.clusterer.noise_examples >= LEAF)
+        bounded = self._guessable or (bodiless and self.clusterer.noise_examples >= LEAF)
         self.scope = find_scope(self.clusterer, table) if bounded and len(self.clusterer.rows) else EVERYWHERE
 
     def start_over(self, table: ExampleTable) -> None:
@@ -216,8 +216,7 @@ class PropertyModel(Answers):
 
     def reconsider(self, table: ExampleTable) -> int:
         """Guess anew where nothing is explained and it is time; returns the work spent."""
-        wanted = self._unexplained or self.inexact
-        if not wanted or not self.guesses.stale(self.clusterer.seen):
+        if not self._guessable or not self.guesses.stale(self.clusterer.seen):
             return 0
         return self.guesses.renew(self.clusterer, table, self.scope)
 

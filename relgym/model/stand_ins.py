@@ -1,0 +1,123 @@
+"""What stands in where modes don't speak: guesses, within what was seen."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.clusterer import ModeClusterer
+from relgym.clustering.columns import SlotSignature
+from relgym.clustering.mode import NOISE
+from relgym.clustering.roles import Binding, bind
+from relgym.config import ModelConfig
+from relgym.model.casting import Casting
+from relgym.model.functions import ModeFunctions
+from relgym.model.guess import Guess, Guesses
+from relgym.model.perception import Percept
+from relgym.model.scope import EVERYWHERE
+
+__all__ = ["StandIns"]
+
+ROUGH = 4.0
+"""So many times the rounding noise can't be rounding."""
+
+_BEYOND = -1
+"""In the place of a mode's id: the guess beyond the scope of approximations."""
+
+
+class StandIns(ModeFunctions):
+    """The guesses of one target, and how far they and its modes go.
+
+    Parameters
+    ----------
+    clusterer, casting, config
+        As of `ModeFunctions`.
+
+    Attributes
+    ----------
+    guesses
+        The best guess, where nothing is explained.
+    scope
+        Where modes speak, and how far guesses and approximations go.
+    """
+
+    def __init__(self, clusterer: ModeClusterer, casting: Casting, config: ModelConfig) -> None:
+        super().__init__(clusterer, casting, config)
+        self.guesses = Guesses()
+        self.scope = EVERYWHERE
+        self._unexplained = False
+
+    @property
+    def inexact(self) -> bool:
+        """Whether modes are approximations, or leave more than rounding explains, and nobody said that they would."""
+        rough = self.clusterer.scale.sigma > ROUGH * self.clusterer.floor
+        return self.clusterer.approximate or (rough and self.clusterer.config.noise_std == "auto")
+
+    @property
+    def _guessable(self) -> bool:
+        """Whether nothing is explained, or nothing exactly."""
+        return self._unexplained or self.inexact
+
+    @property
+    def guess(self) -> Guess | None:
+        """The best guess, where it stands in for what isn't explained: nothing is, or nothing exactly."""
+        return self.guesses.best if self._guessable else None
+
+    @property
+    def guess_beyond(self) -> Guess | None:
+        """What stands in where approximations don't speak, if it is known better than the best guess of all."""
+        return self.guesses.beyond if self._guessable and self.scope.tree is not None else None
+
+    def guess_at(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Guess | None:
+        """The guess that speaks of one object of a single scene; arguments as of `predict_one`."""
+        if self.guess_beyond is None:
+            return self.guess
+        x = percept.rows(index, following[None], ordered=False)[0].tolist()
+        return self.guess if self.scope.covers_one(x) else self.guess_beyond
+
+    def beyond(self, percept: Percept, index: int, following: NDArray[np.float64]) -> str:
+        """Tests of the place where no mode speaks, if one object of a single scene lies in one; else empty."""
+        row = percept.rows(index, following[None], ordered=False)[0].tolist()
+        return "" if self.scope.covers_one(row) else self.scope.place(row)
+
+    def guessed(
+        self, percept: Percept, index: int, following: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """What guesses say of one object of n scenes, shape ``(n,)``, NaN where nobody has one; None if there is none.
+
+        Arguments as of `predict_batch`.
+        """
+        signature = percept.situation(index).signature
+        whole, beyond = self._guessing(signature), self._guessing(signature, beyond=True)
+        if whole is None and beyond is None:
+            return None
+        x = percept.rows(index, following, ordered=False)
+        target = self.clusterer.target
+        values = np.full(len(x), np.nan) if whole is None else whole.values(x)[:, 0]
+        if beyond is not None:
+            values = np.where(self.scope.covers(x), values, beyond.values(x)[:, 0])
+        return self.scope.within(values, signature, x, target)
+
+    def _guessing(self, signature: SlotSignature, *, beyond: bool = False) -> Binding | None:
+        """A guess over a signature's columns: the best one of all, or that beyond the scope of approximations."""
+        best, key = (self.guess, NOISE) if not beyond else (self.guess_beyond, _BEYOND)
+        if best is None:
+            return None
+        known = self._bindings.get((id(signature), key))
+        if known is None or known[0] is not best.mode:
+            known = self._bindings[id(signature), key] = (best.mode, bind(best.mode, signature))
+        return None if known[1] is None or known[1].open else known[1]
+
+    def within(self, value: float, signature: SlotSignature, row: NDArray[np.float64]) -> float:
+        """What a mode says of a row ``(1, d)``, or as far as approximations go."""
+        if not self.clusterer.approximate:
+            return value
+        return float(self.scope.within(np.array([value]), signature, row, self.clusterer.target)[0])
+
+    def all_within(
+        self, values: NDArray[np.float64], signature: SlotSignature, x: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """`within` of rows ``(n, d)``, shape ``(n,)``."""
+        if not self.clusterer.approximate:
+            return values
+        return self.scope.within(values, signature, x, self.clusterer.target)
