@@ -176,7 +176,8 @@ class PropertyModel(Answers):
         # Of bodies relations may tell what the numbers of a row don't.
         bodiless = not self.schema.type(self.target.type).has_body
         bounded = self._guessable or (bodiless and self.clusterer.noise_examples >= LEAF)
-        self.scope = find_scope(self.clusterer, table) if bounded and len(self.clusterer.rows) else EVERYWHERE
+        asked = self.config.abstain and bounded and len(self.clusterer.rows)
+        self.scope = find_scope(self.clusterer, table) if asked else EVERYWHERE
 
     def start_over(self, table: ExampleTable) -> None:
         """Learn all classifiers anew, of what they remember."""

@@ -14,6 +14,7 @@ from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
 SCHEMA = schema_of(("x", "v", "leg"), ("a",))
+ROOM = schema_of(("x",), ("a",), ("terminated", "reward"))
 
 
 def lander(n: int, seed: int = 0, *, steepest: float = 1.5) -> list[Transition]:
@@ -32,6 +33,19 @@ def lander(n: int, seed: int = 0, *, steepest: float = 1.5) -> list[Transition]:
     leg = (rng.random(n) < 0.095).astype(float)
     starts = np.column_stack([rng.uniform(-steepest, steepest, n), rng.normal(size=n), leg])
     return transitions(SCHEMA, moved, starts, rng.normal(size=(n, 1)))
+
+
+def strolls() -> list[Transition]:
+    """Ends on the right are paid 1, those on the left cost 1; the latter were seen nine times, too few for a mode."""
+    rng = np.random.default_rng(0)
+
+    def worth(s: np.ndarray, u: np.ndarray, y: np.ndarray) -> list[float]:
+        return [float(abs(y[0]) > 1.0), -0.01 if abs(y[0]) <= 1.0 else np.sign(y[0])]
+
+    starts = np.concatenate([rng.uniform(-0.8, 1.2, 391), rng.uniform(-1.3, -1.1, 9)])
+    starts = rng.permutation(starts)[:, None]
+    actions = rng.uniform(-1.0, 1.0, size=(400, 1))
+    return transitions(ROOM, lambda s, u: [s[0] + 0.1 * u[0]], starts, actions, worth)
 
 
 @pytest.fixture(scope="module")
@@ -103,32 +117,28 @@ def test_a_law_has_no_bounds() -> None:
 
 
 def test_a_rare_end_is_not_foretold_as_the_others() -> None:
-    """Ends on the right are paid 1, those on the left cost 1; the latter were seen nine times, too few for a mode."""
-    schema = schema_of(("x",), ("a",), ("terminated", "reward"))
-    rng = np.random.default_rng(0)
-
-    def worth(s: np.ndarray, u: np.ndarray, y: np.ndarray) -> list[float]:
-        return [float(abs(y[0]) > 1.0), -0.01 if abs(y[0]) <= 1.0 else np.sign(y[0])]
-
-    starts = np.concatenate([rng.uniform(-0.8, 1.2, 391), rng.uniform(-1.3, -1.1, 9)])
-    starts = rng.permutation(starts)[:, None]
-    actions = rng.uniform(-1.0, 1.0, size=(400, 1))
-    steps = transitions(schema, lambda s, u: [s[0] + 0.1 * u[0]], starts, actions, worth)
-    model = learned(schema, steps)
+    model = learned(ROOM, strolls())
     assert len(model.modes("task", "reward")) == 1
     (beyond,) = model.property_model("task", "reward").scope.beyond()
     assert beyond.startswith("self.x") and " <= -" in beyond
 
     def foretold(x: float) -> tuple[Outcome, float]:
-        scene = schema.scene({"self": [x], "action": [0.0], "task": [0.0, 0.0]})
+        scene = ROOM.scene({"self": [x], "action": [0.0], "task": [0.0, 0.0]})
         one = model.predict_one(scene)["task", "reward"]
         return one.outcome, round(one.value, 6)
 
     assert foretold(1.2) == (Outcome.PREDICTED, 1.0)
     assert foretold(0.0) == (Outcome.PREDICTED, -0.01)
     assert foretold(-1.2)[0] is Outcome.UNEXPLAINED
-    text = model.explain(schema.scene({"self": [-1.2], "action": [0.0], "task": [0.0, 0.0]}))
+    text = model.explain(ROOM.scene({"self": [-1.2], "action": [0.0], "task": [0.0, 0.0]}))
     assert f"  because   no mode speaks where {beyond}" in text
+
+
+def test_who_always_answers_has_no_scope() -> None:
+    model = learned(ROOM, strolls(), abstain=False)
+    scene = ROOM.scene({"self": [-1.2], "action": [0.0], "task": [0.0, 0.0]})
+    one = model.predict_one(scene)["task", "reward"]
+    assert one.ok and one.value == pytest.approx(1.0)  # as of the ends that are known
 
 
 def test_what_lies_scattered_has_no_place() -> None:
