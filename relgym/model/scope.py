@@ -5,7 +5,7 @@ touch, and far less of a crash, where features lead anywhere; of an end that was
 and what is known of other ends would promise their prize. A decision tree over the target's own numbers and the
 action's (§3.4.4), of reward and termination over next values too, tells where; there modes don't speak: the outcome is
 `UNEXPLAINED`, and the value a guess (`relgym.model.guess`). And since no law says how far approximations and guesses
-go, they never go beyond the changes that were seen.
+go, they never go far beyond the changes that were seen.
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ LEAF: Final = 5
 DEPTH: Final = 4
 """Most tests in a row."""
 
+BEYOND: Final = 0.5
+"""Changes may go beyond those that were seen by so much of their range: on other days somebody flies faster."""
+
 
 @dataclass(frozen=True, slots=True)
 class Scope:
@@ -47,7 +50,7 @@ class Scope:
     columns
         Columns of a row that the tree looks at; they mean the same in every signature of the target.
     least, most
-        Smallest and largest change seen, in units of the target.
+        Smallest and largest change that approximations and guesses may foretell, in units of the target.
     """
 
     tree: DecisionTree | None = None
@@ -68,7 +71,7 @@ class Scope:
     def within(
         self, values: NDArray[np.float64], signature: SlotSignature, x: NDArray[np.float64], target: Target
     ) -> NDArray[np.float64]:
-        """Values foretold of rows ``(n, d)``, none further from the present ones than was seen; NaN stays."""
+        """Values foretold of rows ``(n, d)``, none further from the present ones than is allowed; NaN stays."""
         present = signature.present(x, target)
         found: NDArray[np.float64] = np.clip(values, present + self.least, present + self.most)
         return found
@@ -119,7 +122,8 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
     """
     numbers, slots = alike(clusterer, table)
     change = clusterer.y[numbers] - slots.present_of(table.x, clusterer.rows[numbers], clusterer.target)
-    reach = (float(change.min()), float(change.max()))
+    least, most = float(change.min()), float(change.max())
+    reach = (least - BEYOND * (most - least), most + BEYOND * (most - least))
     if not clusterer.clusters or not clusterer.noise_examples:
         return Scope(None, (), *reach)
     some = spread_out(numbers, MOST_ROWS)

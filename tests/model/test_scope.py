@@ -76,8 +76,10 @@ def test_beyond_a_guess_of_what_happens_there_stands_in(model: WorldModel) -> No
     assert {one.spread for one in said} == {part.guess_beyond.mode.sigma}
 
 
-def test_far_off_nothing_changes_by_more_than_was_seen(model: WorldModel) -> None:
+def test_far_off_nothing_changes_by_far_more_than_was_seen(model: WorldModel) -> None:
     part = model.property_model("self", "v")
+    changes = [t.after["self"]["v"] - t.before["self"]["v"] for t in lander(760)]
+    assert part.scope.most - part.scope.least == pytest.approx(2.0 * np.ptp(changes), rel=0.2)
     for step in lander(50, seed=3, steepest=100.0):
         change = model.predict_one(step.before)["self", "v"].value - step.before["self"]["v"]
         assert part.scope.least - 1e-9 <= change <= part.scope.most + 1e-9
