@@ -174,7 +174,7 @@ class PropertyModel(Answers):
         """How far examples scatter, and how far approximations go."""
         self.spreads = measure(self.clusterer, table)
         # Of bodies relations may tell what the numbers of a row don't.
-        bodiless = not self.schema.type(self.target.type).has_body
+        bodiless = not any(t.has_body for t in self.schema.types)
         bounded = self._guessable or (bodiless and self.clusterer.noise_examples >= LEAF)
         asked = self.config.abstain and bounded and len(self.clusterer.rows)
         self.scope = find_scope(self.clusterer, table) if asked else EVERYWHERE
