@@ -177,7 +177,7 @@ class PropertyModel(Answers):
         bodiless = not any(t.has_body for t in self.schema.types)
         bounded = self._guessable or (bodiless and self.clusterer.noise_examples >= LEAF)
         asked = self.config.abstain and bounded and len(self.clusterer.rows)
-        self.scope = find_scope(self.clusterer, table) if asked else EVERYWHERE
+        self.scope = find_scope(self.clusterer, table, guessing=self._guessable) if asked else EVERYWHERE
 
     def start_over(self, table: ExampleTable) -> None:
         """Learn all classifiers anew, of what they remember."""

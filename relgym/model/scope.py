@@ -105,7 +105,7 @@ EVERYWHERE: Final = Scope()
 """The scope of laws that explain everything."""
 
 
-def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
+def find_scope(clusterer: ModeClusterer, table: ExampleTable, *, guessing: bool) -> Scope:
     """How far modes and guesses of a target go.
 
     Parameters
@@ -114,6 +114,9 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
         Modes and examples of the target, one or more.
     table
         The rows of the examples.
+    guessing
+        Whether a guess stands in where modes don't speak. Without one they are silent only where it is closer to say
+        that nothing changes: a law that is slightly off there is better than none.
 
     Notes
     -----
@@ -130,7 +133,7 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
     columns = tuple(k for k in range(slots.core) if _looked_at(slots, k, clusterer.target))
     tree = learn_tree(
         table.x[clusterer.rows[some]][:, list(columns)],
-        clusterer.labels[some] != NOISE,
+        ~_lost(clusterer, table, slots, some, guessing=guessing),
         columns=[slots.named(k) for k in columns],
         min_leaf=LEAF,
         max_depth=DEPTH,
@@ -138,6 +141,25 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable) -> Scope:
     if len({tree.says_yes(leaf) for leaf in tree.leaves}) == 1:
         return Scope(None, (), *reach)
     return Scope(tree, columns, *reach)
+
+
+def _lost(
+    clusterer: ModeClusterer,
+    table: ExampleTable,
+    slots: SlotSignature,
+    numbers: NDArray[np.intp],
+    *,
+    guessing: bool,
+) -> NDArray[np.bool_]:
+    """Which examples no mode explains; where nobody guesses, only those that no mode comes close to."""
+    lost: NDArray[np.bool_] = clusterer.labels[numbers] == NOISE
+    if guessing or not lost.any():
+        return lost
+    rows, y = clusterer.rows[numbers[lost]], clusterer.y[numbers[lost]]
+    errors = [c.errors(table, rows, y, clusterer.scale)[0] for c in clusterer.clusters.values()]
+    change = np.abs(y - slots.present(table.x[rows], clusterer.target))
+    lost[lost] = np.min(errors, axis=0) > change
+    return lost
 
 
 def _looked_at(slots: SlotSignature, index: int, target: Target) -> bool:

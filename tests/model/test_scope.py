@@ -174,3 +174,19 @@ def test_a_loaded_model_speaks_where_it_did(model: WorldModel, tmp_path: Path) -
 def test_scopes_of_older_files_are_everywhere() -> None:
     assert Scope.from_json({}) is EVERYWHERE
     assert Scope.from_json(EVERYWHERE.to_json()) == EVERYWHERE
+
+
+def test_a_law_that_is_slightly_off_speaks_where_nobody_guesses() -> None:
+    """Beyond x = 1 the step is a hundredth shorter than elsewhere, by some amount that nothing tells."""
+    rng = np.random.default_rng(0)
+
+    def moved(s: np.ndarray, u: np.ndarray) -> list[float]:
+        return [s[0], s[1] + u[0] * (1.0 if s[0] < 1.0 else rng.uniform(0.97, 0.99)), s[2]]
+
+    starts = np.column_stack([rng.uniform(-1.0, 1.1, 400), rng.normal(size=400), np.zeros(400)])
+    model = learned(SCHEMA, transitions(SCHEMA, moved, starts, rng.normal(size=(400, 1))))
+    part = model.property_model("self", "v")
+    assert part.clusterer.noise_examples >= 10 and not part.inexact
+    assert part.scope.tree is None
+    one = model.predict_one(SCHEMA.scene({"self": [1.05, 0.0, 0.0], "action": [2.0]}))["self", "v"]
+    assert one.value == pytest.approx(2.0)
