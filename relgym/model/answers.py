@@ -169,8 +169,8 @@ class Answers(StandIns):
             roles = tuple(layout.names[order[s]] for s in played)
             margin = ranking.margin if place == 0 else 0.0
             outcome = Outcome.UNEXPLAINED if self.undecided else Outcome.PREDICTED
-            found = Prediction("", "", binding.value(x, slots), outcome, mode, roles, margin)
-            found = replace(found, value=self.within(found.value, situation.signature, row))
+            value = self.within(binding.value(x, slots), situation.signature, row)
+            found = Prediction("", "", value, outcome, mode, roles, margin)
             found = self._stopped(self.limits.cut_off(found), situation.signature, row)
             return replace(found, spread=self.spreads.at(found.mode, situation.signature, x))
         return replace(nothing, outcome=Outcome.NO_ROLES)
