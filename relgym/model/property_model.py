@@ -138,13 +138,10 @@ class PropertyModel(Answers):
     def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
         """Let the guess and the modes foretell an example before it is learned from."""
         binding = self._guessing(situation.signature)
+        if binding is None or self._unexplained or not self.classifier.modes:
+            return
         row = x[: len(situation.signature.columns)].tolist()
-        if (
-            binding is None
-            or self._unexplained
-            or not self.classifier.modes
-            or not self.scope.covers_one(row)
-        ):
+        if not self.scope.covers_one(row):
             return
         values = self._values_one(situation.signature, row, self.classifier.modes)
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])
