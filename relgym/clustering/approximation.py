@@ -4,11 +4,17 @@ Where no function is exact, because the true law isn't among the features offere
 be very good. It is taken if it leaves little of what changes, and its residuals then count as the target's noise. Where
 what it leaves is noise, because rows that lie close together have residuals that are not alike, it may be more: an
 engine that fires as it likes can't be foretold any better.
+
+A few rows that follow no law at all, a lander's touches, carry most of the squares, and squares are what selects
+terms. So a term that serves few rows must be their law, or it goes and they count no longer. And a second search sees
+changes no larger than most to begin with. Among many features a series stands in for what a line would do: linear
+columns are searched alone, too. What was found first gives way to a shorter function that is as good.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +23,17 @@ from relgym.clustering.discovery import likeness
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, forward_stepwise
 
-__all__ = ["LEFT", "LEFT_LINEAR", "NEARLY_ALL", "NORMAL", "Approximation", "approximate", "terms_of"]
+__all__ = [
+    "EQUAL",
+    "LEFT",
+    "LEFT_LINEAR",
+    "NEARLY_ALL",
+    "NORMAL",
+    "Approximation",
+    "approximate",
+    "reach",
+    "terms_of",
+]
 
 LEFT, LEFT_LINEAR = 0.1, 0.01
 """Largest share of the change's standard deviation that an approximation may leave: with features that were asked
@@ -38,19 +54,38 @@ MANY_FEATURES = (200, 800)
 ROUNDS = 3
 """Fits, each to what the one before was good for."""
 
+TAIL: Final = 0.05
+"""Share of the changes, on either side, that the second search cuts off to begin with."""
+
+SERVED: Final = 0.7
+"""Of the rows that a term serves, by more than noise, so large a share must be explained where they are few, fewer than
+may be left unexplained: else it isn't their law."""
+
+CLEANED: Final = 4
+"""Terms that aren't laws are taken out at most so many times."""
+
+EQUAL: Final = 1.1
+"""A shorter function may err more by this factor."""
+
 
 @dataclass(frozen=True, slots=True)
 class Approximation:
-    """A function, the rows it is good for, and the standard deviation of its residuals there."""
+    """A function, the rows it is good for, the standard deviation of its residuals there, and its `reach`."""
 
     fit: LinearFit
     inliers: NDArray[np.bool_]
     sigma: float
+    reach: float
 
 
 def terms_of(columns: int, config: ClusteringConfig) -> int:
     """Largest number of weights of an approximation among so many columns."""
     return config.max_terms * (1 + sum(columns > many for many in MANY_FEATURES))
+
+
+def reach(errors: NDArray[np.float64], floor: float = 0.0) -> float:
+    """The error, in units of y, that nearly all rows stay below; errors as small as rounding are all alike."""
+    return max(float(np.quantile(errors, NEARLY_ALL)), NORMAL * floor)
 
 
 def approximate(
@@ -81,36 +116,109 @@ def approximate(
     left
         Largest share of the change's standard deviation that may be left.
     noisy
-        Whether up to `NOISY` of it may be left if that is noise, and then the number of leading columns that say how
-        close rows lie. Noise need not be normal: it may come with some actions only.
+        Whether up to `NOISY` of it may be left if that is noise, and then the number of leading columns that are no
+        features: they say how close rows lie. Noise need not be normal: it may come with some actions only.
 
     Notes
     -----
-    Cost O(n d terms), three times over.
+    Cost O(n d terms), some six times over, and as often again where terms go.
     """
-    kept = np.ones(len(y), dtype=bool)
     change = y - present
-    for _ in range(ROUNDS):
-        fit = forward_stepwise(x[kept], y[kept], sigma=floor, max_terms=terms, eliminate=False)
-        error = np.abs(y - fit.predict(x))
-        spread = 1.4826 * float(np.median(error))  # of a normal distribution, whatever the outliers
-        kept = error <= stds * max(spread, floor)
-        if noisy and kept.mean() < NEARLY_ALL:
-            kept = error <= stds * float(np.quantile(error, NEARLY_ALL)) / NORMAL
-    if kept.mean() < NEARLY_ALL:
-        return None
-    sigma = max(float(np.sqrt(np.square(error[kept]).mean())), floor)
-    share = sigma / max(float(change[kept].std()), floor)
-    if share > left and not (noisy and share <= NOISY and _is_noise(x, y, fit, kept, noisy)):
-        return None
-    return Approximation(eliminate_backward(x[kept], y[kept], fit, sigma=sigma), kept, sigma)
+    tamed = present + np.clip(change, *np.quantile(change, [TAIL, 1.0 - TAIL]))
+    widths = (x.shape[1], noisy) if 0 < noisy < x.shape[1] else (x.shape[1],)
+    best: Approximation | None = None
+    for width in widths:
+        search = _Search(x[:, :width], y, change, floor, terms, stds, left, noisy)
+        for found in (*search.run(y), *search.run(tamed)):
+            if best is None or _shorter(found, best):
+                best = found
+    return best
 
 
-def _is_noise(
-    x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, kept: NDArray[np.bool_], own: int
-) -> bool:
-    """Whether a function's residuals are not alike between neighbours, and take as many values as noise does."""
-    left = (y - fit.predict(x))[kept]
-    if len(np.unique(y[kept])) < 0.5 * len(left):
-        return False  # a choice among few values is no noise
-    return likeness(x[kept][:, :own], left) <= ALIKE
+def _shorter(one: Approximation, other: Approximation) -> bool:
+    """Whether a function is shorter than another one, and as good."""
+    return one.fit.terms < other.fit.terms and one.reach <= EQUAL * other.reach
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """What searches among the same columns share; attributes as the parameters of `approximate`."""
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    change: NDArray[np.float64]
+    floor: float
+    terms: int
+    stds: float
+    left: float
+    noisy: int
+
+    def run(self, first: NDArray[np.float64]) -> list[Approximation]:
+        """What is found from these responses to begin with, and what is left of it without terms that are no laws."""
+        counted = np.ones(len(self.y), dtype=np.bool_)
+        fit = self._fit(first, counted)
+        for _ in range(ROUNDS - 1):
+            fit = self._fit(self.y, self._explained(fit))
+        whole = fit
+        for _ in range(CLEANED):
+            lawless = counted & self._lawless(fit, self._explained(fit))
+            if not lawless.any() or (counted & ~lawless).mean() < NEARLY_ALL:
+                break
+            counted &= ~lawless
+            for _ in range(ROUNDS - 1):
+                fit = self._fit(self.y, self._explained(fit) & counted)
+        every = np.ones(len(self.y), dtype=np.bool_)
+        fits = [(whole, every)] if fit is whole else [(whole, every), (fit, counted)]
+        return [found for each in fits if (found := self._approximation(*each)) is not None]
+
+    def _approximation(self, fit: LinearFit, counted: NDArray[np.bool_]) -> Approximation | None:
+        """A function as an approximation, of which some rows count; None if it leaves too much, or too many."""
+        explained = self._explained(fit)
+        if explained.mean() < NEARLY_ALL:
+            return None
+        kept = explained & counted
+        sigma = self._sigma(fit, kept)
+        share = sigma / max(float(self.change[kept].std()), self.floor)
+        if share > self.left and not (self.noisy and share <= NOISY and self._is_noise(fit, kept)):
+            return None
+        shorter = eliminate_backward(self.x[kept], self.y[kept], fit, sigma=sigma)
+        return Approximation(shorter, explained, sigma, reach(self._errors(shorter), self.floor))
+
+    def _fit(self, y: NDArray[np.float64], rows: NDArray[np.bool_]) -> LinearFit:
+        return forward_stepwise(
+            self.x[rows], y[rows], sigma=self.floor, max_terms=self.terms, eliminate=False
+        )
+
+    def _errors(self, fit: LinearFit) -> NDArray[np.float64]:
+        found: NDArray[np.float64] = np.abs(self.y - fit.predict(self.x))
+        return found
+
+    def _sigma(self, fit: LinearFit, rows: NDArray[np.bool_]) -> float:
+        return max(float(np.sqrt(np.square(self._errors(fit)[rows]).mean())), self.floor)
+
+    def _explained(self, fit: LinearFit) -> NDArray[np.bool_]:
+        """Rows that a function is good for, shape ``(n,)``."""
+        errors = self._errors(fit)
+        spread = 1.4826 * float(np.median(errors))  # of a normal distribution, whatever the outliers
+        explained: NDArray[np.bool_] = errors <= self.stds * max(spread, self.floor)
+        if self.noisy and explained.mean() < NEARLY_ALL:
+            explained = errors <= self.stds * reach(errors) / NORMAL
+        return explained
+
+    def _lawless(self, fit: LinearFit, explained: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Rows served by terms that serve few rows and are not their law, shape ``(n,)``."""
+        least = self._sigma(fit, explained)
+        found = np.zeros(len(self.y), dtype=np.bool_)
+        for column, weight in zip(fit.columns, fit.weights, strict=True):
+            values = self.x[:, column]
+            served = np.abs(weight * (values - np.median(values))) > least
+            if 0.0 < served.mean() < 1.0 - NEARLY_ALL and explained[served].mean() < SERVED:
+                found |= served
+        return found
+
+    def _is_noise(self, fit: LinearFit, kept: NDArray[np.bool_]) -> bool:
+        """Whether residuals are not alike between neighbours, and take as many values as noise does."""
+        rest = (self.y - fit.predict(self.x))[kept]
+        if len(np.unique(self.y[kept])) < 0.5 * len(rest):
+            return False  # a choice among few values is no noise
+        return likeness(self.x[kept][:, : self.noisy], rest) <= ALIKE

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.approximation import LEFT, LEFT_LINEAR, NEARLY_ALL, approximate, terms_of
+from relgym.clustering.approximation import EQUAL, LEFT, LEFT_LINEAR, approximate, reach, terms_of
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.population import Population
 from relgym.clustering.unification import reordered
@@ -25,7 +25,7 @@ MOST_ROWS = 1500
 """At most so many rows, the newest, determine an approximation."""
 
 BETTER = 0.95
-"""An approximation gives way to one whose errors are smaller by this factor."""
+"""An approximation gives way to one whose errors are smaller by this factor, or to a shorter one that is as good."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +81,17 @@ def last_resort(
     if found is None:
         return None
     if again and slots.features:  # few examples choose among many features badly
-        modes = [c.errors(table, rows, y, population.scale)[0] for c in population.clusters.values()]
-        if modes and _reach(np.abs(y - found.fit.predict(x))) > BETTER * _reach(np.min(modes, axis=0)):
+        modes = list(population.clusters.values())
+        errors = [c.errors(table, rows, y, population.scale)[0] for c in modes]
+        shorter = found.fit.terms < sum(c.mode.parameters for c in modes)
+        allowed = EQUAL if shorter else BETTER
+        if modes and found.reach > allowed * reach(np.min(errors, axis=0), floor):
             return None
-    elif 2 * population.noise_examples <= population.seen and found.sigma > 0.5 * population.scale.sigma:
-        return None
+    elif 2 * population.noise_examples <= population.seen:
+        # So many modes that merely slice noise leave that much less of it; one alone explains what it explains.
+        count = len(population.clusters)
+        if found.sigma > (count if count > 1 else 0.5) * population.scale.sigma:
+            return None
     return LastResort(signature, reordered(found.fit, order), found.sigma)
 
 
@@ -94,7 +100,3 @@ def _recent(population: Population, table: ExampleTable) -> tuple[int, NDArray[n
     recent = np.arange(max(0, len(population.y) - MOST_ROWS), len(population.y))
     signature = int(table.signature_ids[population.rows[-1]])
     return signature, recent[table.signature_ids[population.rows[recent]] == signature]
-
-
-def _reach(errors: NDArray[np.float64]) -> float:
-    return float(np.quantile(errors, NEARLY_ALL))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.clustering.approximation import approximate, terms_of
+from relgym.clustering.approximation import NORMAL, approximate, reach, terms_of
 from relgym.clustering.discovery import Scale, is_law, likeness
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus
@@ -92,6 +92,53 @@ def test_a_choice_among_few_values_is_no_noise(rng: np.random.Generator) -> None
     x = rng.normal(size=(800, 1))
     y = np.round(x[:, 0] * 3.0) + rng.integers(-1, 2, 800)
     assert approximate(x, y, np.zeros(800), floor=1e-9, terms=1, stds=4.0, left=0.1, noisy=1) is None
+
+
+def touches(n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Flight, in which gravity and an engine pull, and rare touches, which throw by as much as they like.
+
+    Columns: v, engine, leg; then leg times v, leg times engine, and the cosine of leg.
+    """
+    plain = np.column_stack([rng.normal(size=n), rng.random(n) < 0.3, rng.random(n) < 0.04]).astype(float)
+    v, engine, leg = plain.T
+    y = v - 0.1 + 0.3 * engine + 0.01 * rng.normal(size=n) + leg * (5.0 + 5.0 * rng.normal(size=n))
+    return np.column_stack([plain, leg * v, leg * engine, np.cos(leg)]), y
+
+
+def test_rare_rows_without_a_law_get_no_terms(rng: np.random.Generator) -> None:
+    x, y = touches(1_000, rng)
+    found = approximate(x, y, x[:, 0], floor=1e-9, terms=6, stds=4.0, left=0.1, noisy=3)
+    assert found is not None
+    assert found.fit.columns == (0, 1)
+    assert found.fit.weights == pytest.approx((1.0, 0.3), abs=0.01)
+    assert found.fit.intercept == pytest.approx(-0.1, abs=0.01)
+    assert found.inliers[x[:, 2] == 0.0].mean() > 0.99
+    assert found.inliers[x[:, 2] == 1.0].mean() < 0.1
+
+
+def test_rare_rows_with_a_law_keep_their_term(rng: np.random.Generator) -> None:
+    x, _ = touches(1_000, rng)
+    y = x[:, 0] - 0.1 + 2.0 * x[:, 2] + 0.01 * rng.normal(size=1_000)
+    found = approximate(x, y, x[:, 0], floor=1e-9, terms=6, stds=4.0, left=0.1, noisy=3)
+    assert found is not None
+    assert found.fit.columns == (0, 2)
+    assert found.inliers.mean() > 0.99
+
+
+def test_a_line_is_no_series(rng: np.random.Generator) -> None:
+    w = rng.normal(size=500) * np.where(rng.random(500) < 0.1, 10.0, 1.0)
+    x = np.column_stack([rng.normal(size=500), w, np.sin(w), np.sin(2.0 * w), w * np.cos(w)])
+    y = x[:, 0] + 0.05 * w + np.where(np.arange(500) % 20 == 0, rng.normal(size=500), 0.0)
+    found = approximate(x, y, x[:, 0], floor=1e-7, terms=5, stds=4.0, left=0.1, noisy=2)
+    assert found is not None
+    assert found.fit.columns == (0, 1)
+    assert found.fit.weights == pytest.approx((1.0, 0.05), abs=1e-6)
+
+
+def test_errors_as_small_as_rounding_are_alike() -> None:
+    errors = np.linspace(0.0, 1.0, 11)
+    assert reach(errors) == pytest.approx(0.9)
+    assert reach(errors, 1.0) == reach(errors / 2.0, 1.0) == NORMAL
 
 
 def test_the_wider_the_library_the_more_terms() -> None:
