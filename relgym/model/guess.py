@@ -37,16 +37,20 @@ MOST_ROWS, MOST_CELLS = 3_000, 1_000_000
 FITTED = 12_000
 """At most so many determine the weights of the terms chosen."""
 
-SIZES = (1, 2, 4, 8, 16)
-"""Numbers of terms tried."""
+SIZES = (0, 1, 2, 4, 8, 16)
+"""Numbers of terms tried; with none it is what changes in the mean."""
 
-HELD_OUT = 1.0 / 3.0
-"""Share of the examples, the newest, on which sizes are compared."""
+FOLDS = 4
+"""Sizes are compared on stretches of time, each foretold by what is fitted to all others."""
+
+SURE = 2.0
+"""A guess must be better than that nothing changes by so many standard errors: where a handful of examples makes most
+of the squares, it may be luck."""
 
 WORSE = 1.01
 """A smaller function may be worse by this factor than the best."""
 
-TYPICAL = 1.5
+TYPICAL = 1.2
 """A guess whose typical error (its mean root) is larger by more than this factor doesn't replace an approximation: rare
 large errors must not decide over what is mostly right."""
 
@@ -151,16 +155,22 @@ def _guessed(
     if len(numbers) < LEAST or slots.feature_count > MOST_FEATURES:
         return None, 0
     order, stages = slots.preference(clusterer.target)
-    order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
-    order = order[[slots.at(int(k)).property[-1:] != "'" for k in order]]
-    some = spread_out(numbers, min(MOST_ROWS, max(LEAST, MOST_CELLS // len(order))))
-    x, change = _data(clusterer, table, slots, order, some)
-    cut = len(some) - int(HELD_OUT * len(some))
-    chosen, left = _chosen(x, change, cut)
-    if chosen is None:
-        return None, int(x.size)
-    mode = _fitted(clusterer, table, slots, order, spread_out(numbers, FITTED), chosen.columns)
-    return Guess(mode, left), int(x.size)
+    present = np.array([slots.at(int(k)).property[-1:] != "'" for k in order])
+    widths = [int(present[:stage].sum()) for stage in (stages[:2] if slots.features else stages[:1])]
+    order = order[present]
+    best: tuple[int, ...] | None = None
+    left, work = 1.0, 0
+    for width in widths:  # few examples choose among many features badly
+        some = spread_out(numbers, min(MOST_ROWS, max(LEAST, MOST_CELLS // width)))
+        x, change = _data(clusterer, table, slots, order[:width], some)
+        work += int(x.size)
+        terms, leaves = _terms(x, change)
+        if terms is not None and (best is None or leaves < left):
+            best, left = _guess(x, change, terms).columns, leaves
+    if best is None:
+        return None, work
+    mode = _fitted(clusterer, table, slots, order, spread_out(numbers, FITTED), best)
+    return Guess(mode, left), work
 
 
 def _data(
@@ -176,23 +186,31 @@ def _data(
     return slots.matrix(rows, order), clusterer.y[numbers] - present
 
 
-def _chosen(x: NDArray[np.float64], change: NDArray[np.float64], cut: int) -> tuple[LinearFit | None, float]:
-    """A function fitted to the first rows, of the smallest size that foretells the others well; what it leaves of them.
+def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> tuple[int | None, float]:
+    """The smallest number of terms that foretells well what it wasn't fitted to.
 
-    None if it is no better to say that nothing changes.
+    Returns
+    -------
+    The number, and what it leaves of the change; None if it is no better to say that nothing changes.
     """
-    still = _size(change[cut:])
-    fits = [
-        forward_stepwise(x[:cut], change[:cut], sigma=1e-12, max_terms=k, eliminate=False)
-        for k in SIZES
-        if k < cut // 4
-    ]
-    errors = [_size(change[cut:] - fit.predict(x[cut:])) for fit in fits]
-    least = min(errors, default=np.inf)
-    if not least < still:
+    n = len(change)
+    sizes = [k for k in SIZES if k < n // FOLDS]
+    squares = np.empty((len(sizes), n))
+    for part in np.array_split(np.arange(n), FOLDS):
+        others = np.setdiff1d(np.arange(n), part)
+        fits = [_guess(x[others], change[others], k) for k in sizes]
+        squares[:, part] = [np.square(change[part] - fit.predict(x[part])) for fit in fits]
+    gain = np.square(change) - squares
+    sure = gain.mean(axis=1) > SURE * gain.std(axis=1) / np.sqrt(n)
+    if not sure.any():
         return None, 1.0
-    first = next(k for k, error in enumerate(errors) if error <= WORSE * least)
-    return fits[first], errors[first] / max(float(change[cut:].std()), 1e-300)
+    errors = np.where(sure, np.sqrt(squares.mean(axis=1)), np.inf)
+    first = int(np.argmax(errors <= WORSE * errors.min()))
+    return sizes[first], float(errors[first]) / max(float(change.std()), 1e-300)
+
+
+def _guess(x: NDArray[np.float64], change: NDArray[np.float64], terms: int) -> LinearFit:
+    return forward_stepwise(x, change, sigma=1e-12, max_terms=terms, eliminate=False)
 
 
 def _fitted(
@@ -214,7 +232,3 @@ def _fitted(
     roles = identify_roles(reordered(whole, order), slots)
     sigma = float(np.sqrt(fit.rss / len(numbers)))
     return Mode(NOISE, clusterer.target, roles, fit.intercept, sigma=sigma)
-
-
-def _size(left: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.square(left).mean()))

@@ -27,7 +27,6 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
     layout, following = scene.layout, scene.vector.copy()
     found: list[Prediction] = []
     lost: set[tuple[str, str]] = set()
-    blind: set[tuple[str, str]] = set()  # of what is lost what nobody guesses either
     motion = None if parts.laws is None else parts.laws.speak(percept)
     for target in parts.targets:
         for index in layout.of_type(target.type):
@@ -36,16 +35,13 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
             else:
                 one = parts.models[target].predict_one(percept, index, following)
             if not lost.isdisjoint(target.given) and not lost.isdisjoint(parts.models[target].needs):
-                value = one.value if blind.isdisjoint(parts.models[target].needs) else np.nan
-                one = Prediction("", "", value, Outcome.DEPENDS, spread=one.spread)
+                one = Prediction("", "", one.value, Outcome.DEPENDS, spread=one.spread)
             column = layout.column(index, target.property)
             if not np.isfinite(one.value):
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
                 one = replace(one, outcome=outcome, mode=0, spread=np.nan)
                 one = _stopgap(parts.models[target], percept, index, following, one)
-                if not one.informed:
-                    blind.add((target.type, target.property))
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
@@ -79,7 +75,6 @@ def predict_many(
     keys: list[tuple[str, str]] = []
     verdicts: list[Verdict] = []
     lost: dict[tuple[str, str], NDArray[np.bool_]] = {}
-    blind: dict[tuple[str, str], NDArray[np.bool_]] = {}
     nowhere = np.zeros(len(vectors), dtype=bool)
     motion = None if parts.laws is None else parts.laws.speak(percept)
     for target in parts.targets:
@@ -89,24 +84,20 @@ def predict_many(
             else:
                 verdict = parts.models[target].predict_batch(percept, index, following)
             for pair in parts.models[target].needs if lost else ():
-                verdict.values[blind.get(pair, nowhere)] = np.nan
                 verdict.outcomes[lost.get(pair, nowhere)] = _DEPENDS
             told = np.isfinite(verdict.values)
-            bare = ~told
             known = told & (verdict.outcomes == _PREDICTED)
             column = layout.column(index, target.property)
             guessed = None if told.all() else parts.models[target].guessed(percept, index, following)
             if guessed is not None:
                 rest = ~told & np.isfinite(guessed)
                 following[rest, column] = guessed[rest]
-                bare &= ~rest
             following[told, column] = verdict.values[told]
             verdict.outcomes[~told & (verdict.outcomes == _PREDICTED)] = _OUTSIDE
             # What is unexplained has a value only if a mode gave it, one that is too often the wrong one.
             verdict.modes[~(known | told & (verdict.outcomes == _UNEXPLAINED))] = 0
             key = (target.type, target.property)
             lost[key] = lost.get(key, nowhere) | ~known
-            blind[key] = blind.get(key, nowhere) | bare
             keys.append((layout.names[index], target.property))
             verdicts.append(verdict)
     _derive(parts.schema, layout, vectors, following)

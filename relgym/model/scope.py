@@ -35,6 +35,9 @@ LEAF: Final = 5
 DEPTH: Final = 4
 """Most tests in a row."""
 
+CLOSE: Final = 0.5
+"""A mode that errs by no more than so much of what changes (root mean square) is as good as a guess."""
+
 BEYOND: Final = 0.5
 """Changes may go beyond those that were seen by so much of their range: on other days somebody flies faster."""
 
@@ -115,8 +118,9 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable, *, guessing: bool)
     table
         The rows of the examples.
     guessing
-        Whether a guess stands in where modes don't speak. Without one they are silent only where it is closer to say
-        that nothing changes: a law that is slightly off there is better than none.
+        Whether a guess stands in where modes don't speak. Then they are silent where they err by more than `CLOSE` of
+        what mostly changes; without one only where it is closer to say that nothing changes: a law that is off there is
+        better than none.
 
     Notes
     -----
@@ -151,14 +155,18 @@ def _lost(
     *,
     guessing: bool,
 ) -> NDArray[np.bool_]:
-    """Which examples no mode explains; where nobody guesses, only those that no mode comes close to."""
+    """Which examples no mode explains or comes close to."""
     lost: NDArray[np.bool_] = clusterer.labels[numbers] == NOISE
-    if guessing or not lost.any():
+    if not lost.any():
         return lost
+    change = np.abs(
+        clusterer.y[numbers] - slots.present_of(table.x, clusterer.rows[numbers], clusterer.target)
+    )
     rows, y = clusterer.rows[numbers[lost]], clusterer.y[numbers[lost]]
-    errors = [c.errors(table, rows, y, clusterer.scale)[0] for c in clusterer.clusters.values()]
-    change = np.abs(y - slots.present(table.x[rows], clusterer.target))
-    lost[lost] = np.min(errors, axis=0) > change
+    errors = np.min(
+        [c.errors(table, rows, y, clusterer.scale)[0] for c in clusterer.clusters.values()], axis=0
+    )
+    lost[lost] = errors > (CLOSE * float(np.sqrt(np.square(change).mean())) if guessing else change[lost])
     return lost
 
 

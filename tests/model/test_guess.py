@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from points import formulas, learned, schema_of, transitions
 
-from relgym.model.guess import Guesses
+from relgym.model.guess import Guesses, _terms
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Target, Transition
@@ -75,6 +75,23 @@ def test_a_guess_that_is_no_better_than_no_change_is_none() -> None:
     assert not one.informed and one.value == strollers(1)[0].before["self"]["v"]
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_few_large_changes_make_no_guess(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(100, 8))
+    change = np.where(np.arange(100) % 10 == 0, 5.0 * rng.normal(size=100), 0.0)
+    assert _terms(x, change) == (None, 1.0)
+
+
+def test_of_nearly_as_good_guesses_the_shortest() -> None:
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(400, 8))
+    assert _terms(x, 300.0 + rng.normal(size=400))[0] == 0  # what changes in the mean
+    terms, left = _terms(x, x[:, 0] - x[:, 1] + rng.normal(size=400))
+    assert terms == 2
+    assert left == pytest.approx(np.sqrt(1.0 / 3.0), rel=0.1)
+
+
 def test_guesses_come_alone_and_in_batches_with_the_same_bits(model: WorldModel) -> None:
     scenes = [t.before for t in drivers(20, seed=2)]
     batch = model.predict_batch(scenes[0].layout, np.stack([s.vector for s in scenes]))
@@ -123,6 +140,26 @@ def test_a_guess_takes_no_place_of_modes_that_other_laws_read(tmp_path: Path) ->
     assert WorldModel.load(tmp_path / "model.json").predict_one(scene).ok
     part.leaned_on = False
     assert model.predict_one(scene)["self", "v"].outcome is Outcome.UNEXPLAINED
+
+
+def test_what_depends_on_what_is_kept_follows_from_it() -> None:
+    rng = np.random.default_rng(0)
+    whims = rng.normal(size=400).tolist()
+
+    def moved(s: list[float], u: list[float]) -> list[float]:
+        v = s[1] + whims.pop()
+        return [s[0] + v, v]
+
+    steps = transitions(SCHEMA, moved, rng.normal(size=(400, 2)), rng.normal(size=(400, 1)))
+    model = learned(SCHEMA, steps)
+    assert formulas(model, "x") == ["x' = x + v'"]
+    assert model.property_model("self", "v").guess is None
+    scene = SCHEMA.scene({"self": [2.0, 3.0], "action": [0.0]})
+    said = model.predict_one(scene)
+    assert said["self", "x"].outcome is Outcome.DEPENDS
+    assert said.scene["self"].values.tolist() == pytest.approx([5.0, 3.0])
+    batch = model.predict_batch(scene.layout, scene.vector[None])
+    assert batch.vectors[0].tobytes() == said.scene.vector.tobytes()
 
 
 def test_a_loaded_model_guesses_the_same(model: WorldModel, tmp_path: Path) -> None:
