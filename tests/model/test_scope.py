@@ -76,6 +76,22 @@ def test_beyond_a_guess_of_what_happens_there_stands_in(model: WorldModel) -> No
     assert {one.spread for one in said} == {part.guess_beyond.mode.sigma}
 
 
+def test_where_an_approximation_is_nearly_right_it_speaks() -> None:
+    """Touched by the leg the curve is off by a tenth of what changes: too much for the law, too little for a guess."""
+    rng = np.random.default_rng(0)
+
+    def moved(s: np.ndarray, u: np.ndarray) -> list[float]:
+        return [s[0], s[1] + 0.5 * np.tanh(1.5 * s[0]) + 0.1 * u[0] + 0.05 * s[2] * rng.normal(), s[2]]
+
+    leg = (rng.random(760) < 0.095).astype(float)
+    starts = np.column_stack([rng.uniform(-1.5, 1.5, 760), rng.normal(size=760), leg])
+    steps = transitions(SCHEMA, moved, starts, rng.normal(size=(760, 1)))
+    part = learned(SCHEMA, steps, features=("trig(x)",)).property_model("self", "v")
+    assert part.clusterer.approximate
+    assert part.clusterer.noise_examples > 30
+    assert part.scope.beyond() == ()
+
+
 def test_far_off_nothing_changes_by_far_more_than_was_seen(model: WorldModel) -> None:
     part = model.property_model("self", "v")
     changes = [t.after["self"]["v"] - t.before["self"]["v"] for t in lander(760)]
