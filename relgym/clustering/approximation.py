@@ -98,6 +98,7 @@ def approximate(
     stds: float,
     left: float,
     noisy: int = 0,
+    lines: bool = True,
 ) -> Approximation | None:
     """The best sparse function of nearly all rows, if it leaves little of the change; else None.
 
@@ -118,6 +119,8 @@ def approximate(
     noisy
         Whether up to `NOISY` of it may be left if that is noise, and then the number of leading columns that are no
         features: they say how close rows lie. Noise need not be normal: it may come with some actions only.
+    lines
+        Whether columns that are no features are searched alone, too.
 
     Notes
     -----
@@ -125,7 +128,7 @@ def approximate(
     """
     change = y - present
     tamed = present + np.clip(change, *np.quantile(change, [TAIL, 1.0 - TAIL]))
-    widths = (x.shape[1], noisy) if 0 < noisy < x.shape[1] else (x.shape[1],)
+    widths = (x.shape[1], noisy) if lines and 0 < noisy < x.shape[1] else (x.shape[1],)
     best: Approximation | None = None
     for width in widths:
         search = _Search(x[:, :width], y, change, floor, terms, stds, left, noisy)

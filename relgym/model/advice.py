@@ -219,10 +219,11 @@ def _try(
         stds=clusterer.scale.inlier_stds,
         left=LEFT,
         noisy=stages[0],
+        lines=False,  # what features add is the question
     )
     if found is None:
         return None
-    change = float((y - present)[found.inliers].std())
+    change = max(float((y - present).std()), 1e-300)  # of all, as what the modes leave is
     text = [
         (w, slots.named(int(order[c]))) for c, w in zip(found.fit.columns, found.fit.weights, strict=True)
     ]
