@@ -158,8 +158,8 @@ class _Search:
 
     def run(self, first: NDArray[np.float64]) -> list[Approximation]:
         """What is found from these responses to begin with, and what is left of it without terms that are no laws."""
-        counted = np.ones(len(self.y), dtype=np.bool_)
-        fit = self._fit(first, counted)
+        every = counted = np.ones(len(self.y), dtype=np.bool_)
+        fit = self._fit(first, every)
         for _ in range(ROUNDS - 1):
             fit = self._fit(self.y, self._explained(fit))
         whole = fit
@@ -167,10 +167,9 @@ class _Search:
             lawless = counted & self._lawless(fit, self._explained(fit))
             if not lawless.any() or (counted & ~lawless).mean() < NEARLY_ALL:
                 break
-            counted &= ~lawless
+            counted = counted & ~lawless
             for _ in range(ROUNDS - 1):
                 fit = self._fit(self.y, self._explained(fit) & counted)
-        every = np.ones(len(self.y), dtype=np.bool_)
         fits = [(whole, every)] if fit is whole else [(whole, every), (fit, counted)]
         return [found for each in fits if (found := self._approximation(*each)) is not None]
 

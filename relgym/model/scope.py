@@ -1,11 +1,11 @@
 """How far modes go: where they speak, and the changes that an approximation may foretell.
 
-Examples that no mode explains lie together more often than not: a lander's law of flight says nothing of its legs'
-touch, and far less of a crash, where features lead anywhere; of an end that was seen nine times no mode is known yet,
-and what is known of other ends would promise their prize. A decision tree over the target's own numbers and the
-action's (§3.4.4), of reward and termination over next values too, tells where; there modes don't speak: the outcome is
-`UNEXPLAINED`, and the value a guess (`relgym.model.guess`). And since no law says how far approximations and guesses
-go, they never go far beyond the changes that were seen.
+Examples that no mode explains, or comes close to, lie together more often than not: a lander's law of flight says
+nothing of its legs' touch, and far less of a crash, where features lead anywhere; of an end that was seen nine times no
+mode is known yet, and what is known of other ends would promise their prize. A decision tree over the target's own
+numbers and the action's (§3.4.4), of reward and termination over next values too, tells where; there modes don't speak:
+the outcome is `UNEXPLAINED`, and the value a guess (`relgym.model.guess`). And since no law says how far approximations
+and guesses go, they never go far beyond the changes that were seen.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Scope:
     Attributes
     ----------
     tree
-        Says yes where some mode explains what follows; None: everywhere.
+        Says yes where some mode explains what follows, or comes close to it; None: everywhere.
     columns
         Columns of a row that the tree looks at; they mean the same in every signature of the target.
     least, most

@@ -17,7 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LinearFit", "eliminate_backward", "forward_stepwise", "least_squares", "varying_columns"]
+__all__ = [
+    "LinearFit",
+    "eliminate_backward",
+    "forward_order",
+    "forward_stepwise",
+    "least_squares",
+    "varying_columns",
+]
 
 PIVOT = 1e-9
 """A column whose part orthogonal to the chosen ones is relatively smaller is collinear with them."""
@@ -181,14 +188,24 @@ def forward_stepwise(
     -----
     Cost O(n d p) for p chosen columns.
     """
+    fit = least_squares(x, y, forward_order(x, y, sigma=sigma, max_terms=max_terms))
+    return eliminate_backward(x, y, fit, sigma=sigma) if eliminate else fit
+
+
+def forward_order(
+    x: NDArray[np.float64], y: NDArray[np.float64], *, sigma: float, max_terms: int | None = None
+) -> tuple[int, ...]:
+    """Columns in the order in which `forward_stepwise` adds them; the first k are what it finds with k at most.
+
+    Parameters and cost as of `forward_stepwise`.
+    """
     n = len(y)
     limit = max(0, n - 2 if max_terms is None else min(max_terms, n - 2))
     candidates = varying_columns(x) if n else np.empty(0, dtype=np.intp)
     a = x[:, candidates] - x[:, candidates].mean(axis=0) if len(candidates) else np.empty((n, 0))
     choose = _choose_among_many if len(candidates) > MANY else _choose
     chosen = choose(a, y - y.mean(), sigma, limit) if n else []
-    fit = least_squares(x, y, tuple(int(candidates[c]) for c in chosen))
-    return eliminate_backward(x, y, fit, sigma=sigma) if eliminate else fit
+    return tuple(int(candidates[c]) for c in chosen)
 
 
 def _choose(a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int) -> list[int]:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from relgym.numeric.stepwise import (
     LinearFit,
     eliminate_backward,
+    forward_order,
     forward_stepwise,
     least_squares,
     varying_columns,
@@ -164,6 +165,16 @@ def test_predictions_are_the_same_bits_row_by_row(seed: int) -> None:
     x = np.random.default_rng(seed).normal(size=(9, 4))
     fit = LinearFit((0, 2, 3), (0.1, -1.7, 3.3), 0.7, 0.0)
     assert [float(fit.predict(row[None])[0]) for row in x] == fit.predict(x).tolist()
+
+
+@pytest.mark.parametrize("columns", [8, 80])
+def test_the_first_columns_are_what_fewer_terms_find(columns: int, rng: np.random.Generator) -> None:
+    x = rng.normal(size=(200, columns))
+    y = x[:, 0] - 2.0 * x[:, 3] + 0.5 * x[:, 5] + rng.normal(size=200)
+    order = forward_order(x, y, sigma=0.5, max_terms=6)
+    for k in range(len(order) + 1):
+        fewer = forward_stepwise(x, y, sigma=0.5, max_terms=k, eliminate=False)
+        assert fewer == least_squares(x, y, order[:k])
 
 
 @pytest.mark.parametrize("n", [50, 1000])
