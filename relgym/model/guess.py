@@ -50,10 +50,6 @@ of the squares, it may be luck."""
 WORSE = 1.01
 """A smaller function may be worse by this factor than the best."""
 
-TYPICAL = 1.2
-"""A guess whose typical error (its mean root) is larger by more than this factor doesn't replace an approximation: rare
-large errors must not decide over what is mostly right."""
-
 MEMORY = 300.0
 """Over about so many examples errors are averaged."""
 
@@ -101,9 +97,13 @@ class Guesses:
 
     @property
     def superior(self) -> bool:
-        """Whether the guess is better than what modes say, in root mean square, and mostly not much worse."""
+        """Whether the guess is better than what modes say.
+
+        Its root mean square error must be smaller, and by a greater factor than the typical error (the square of the
+        mean root) is larger: rare large errors must not decide over what is mostly right.
+        """
         (modes, typical_modes), (own, typical) = self.errors.tolist()
-        return self.best is not None and own < modes and typical <= TYPICAL * typical_modes
+        return self.best is not None and own < modes and own * typical**4 < modes * typical_modes**4
 
     def compare(self, modes: float, own: float) -> None:
         """Take in by how much the modes' prediction and the guess, made before the outcome was learned, were off."""
