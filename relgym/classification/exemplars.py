@@ -45,12 +45,30 @@ _COLUMNS: Final = {
 
 @dataclass(slots=True)
 class _Cell:
-    """All examples of one mode in one relational state."""
+    """All examples of one mode in one relational state: how many were seen, and the slots of those kept."""
 
     assigned: int
     key: bytes
     count: float = 0.0
-    members: list[int] = field(default_factory=list)
+    soft: list[int] = field(default_factory=list)
+    hard: list[int] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return len(self.soft) + len(self.hard)
+
+    @property
+    def members(self) -> list[int]:
+        """Slots, those of examples that contradicted a classifier last."""
+        return self.soft + self.hard
+
+    def keep(self, slot: int, hard: bool) -> None:
+        """Have the example in a slot."""
+        (self.hard if hard else self.soft).append(slot)
+
+    def give_up(self) -> int:
+        """Have an example no longer, one that isn't hard if there is any; its slot."""
+        candidates = self.soft or self.hard
+        return candidates.pop(_hash(self.key, self.count) % len(candidates))
 
 
 class Exemplars:
@@ -204,9 +222,10 @@ class Exemplars:
         if roles is not None:
             self.columns["roles"] = np.asarray(roles)
         self._cells, self._index = [], {}
+        hard = self.columns["hard"].tolist()
         for slot, key in enumerate(keys):
             cell = self._cells[number := self._cell(int(assigned[slot]), key)]
-            cell.members.append(slot)
+            cell.keep(slot, hard[slot])
             cell.count += float(weights[slot])
             self.columns["cell"][slot] = number
         self.version += 1
@@ -245,10 +264,12 @@ class Exemplars:
         """Restore what `to_dict` gave."""
         self.modes = tuple(data["modes"])
         self.columns.load(data["columns"])
-        cells = [
-            (assigned, bytes.fromhex(key), count, members) for assigned, key, count, members in data["cells"]
-        ]
-        self._cells = [_Cell(assigned, key, count, list(members)) for assigned, key, count, members in cells]
+        hard = self.columns["hard"].tolist()
+        self._cells = []
+        for assigned, key, count, members in data["cells"]:
+            self._cells.append(cell := _Cell(assigned, bytes.fromhex(key), count))
+            for slot in members:
+                cell.keep(slot, hard[slot])
         self._index = {(cell.assigned, cell.key): i for i, cell in enumerate(self._cells)}
         self.version += 1
 
@@ -265,42 +286,33 @@ class Exemplars:
 
     def _room(self, cell: _Cell, hard: bool) -> int | None:
         """A slot for a new example of this cell, or none if the reservoir passes it over."""
-        if len(cell.members) < self._cap(cell):
+        if len(cell) < self._cap(cell):
             if len(self) < self.config.max_exemplars:
-                cell.members.append(slot := self.columns.append())
+                cell.keep(slot := self.columns.append(), hard)
                 return slot
-            crowded = max(self._cells, key=lambda c: len(c.members))
-            if len(cell.members) < len(crowded.members):
-                slot = crowded.members.pop(self._victim(crowded))
-                cell.members.append(slot)
+            crowded = max(self._cells, key=len)
+            if len(cell) < len(crowded):
+                cell.keep(slot := crowded.give_up(), hard)
                 return slot
-        is_hard = self.columns["hard"]
-        soft = [i for i, slot in enumerate(cell.members) if not is_hard[slot]]
         if hard:
-            return cell.members[self._victim(cell)]
+            cell.keep(slot := cell.give_up(), hard)
+            return slot
         # Algorithm R, with a hash for a random number: the k-th example enters with probability size / k.
-        position = _hash(cell.key, cell.count) % max(int(cell.count) - (len(cell.members) - len(soft)), 1)
-        return cell.members[soft[position]] if position < len(soft) else None
-
-    def _victim(self, cell: _Cell) -> int:
-        """Position of the member to give up: any that isn't hard, or else any."""
-        is_hard = self.columns["hard"]
-        soft = [i for i, slot in enumerate(cell.members) if not is_hard[slot]]
-        candidates = soft or list(range(len(cell.members)))
-        return candidates[_hash(cell.key, cell.count) % len(candidates)]
+        position = _hash(cell.key, cell.count) % max(int(cell.count) - len(cell.hard), 1)
+        return cell.soft[position] if position < len(cell.soft) else None
 
     def _trim(self) -> NDArray[np.intp]:
         """Bring cells that grew by re-labelling (noise that became a mode) back to their bound; the slots left."""
         for cell in self._cells:
-            while len(cell.members) > self._cap(cell):
-                cell.members.pop(self._victim(cell))
+            while len(cell) > self._cap(cell):
+                cell.give_up()
         kept = sorted(slot for cell in self._cells for slot in cell.members)
         left = np.array(kept, dtype=np.intp)
         if len(kept) < len(self):
             new = {slot: i for i, slot in enumerate(kept)}
             self.columns.keep(left)
             for cell in self._cells:
-                cell.members = [new[slot] for slot in cell.members]
+                cell.soft, cell.hard = ([new[slot] for slot in some] for some in (cell.soft, cell.hard))
         return left
 
 
