@@ -88,7 +88,7 @@ def test_the_program_of_the_thesis() -> None:
     assert ClassificationConfig.original(tree_errors="class").tree_errors == "class"
 
 
-@pytest.mark.parametrize(("history", "examples"), [(200_000, 300), (6_000, 300), (1_000, 50), (100, 10)])
+@pytest.mark.parametrize(("history", "examples"), [(200_000, 3_000), (60_000, 3_000), (1_000, 50), (100, 10)])
 def test_a_short_history_bounds_what_is_remembered(history: int, examples: int) -> None:
     assert ModelConfig(history=history).classifying.exemplars_alone == examples
 
