@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import points
 import pytest
 from worlds import LINE_TARGETS, learned, line, room, scene, schema_of, transitions
 
@@ -13,8 +14,18 @@ from relgym.experiments.data import truck_blocks
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.property_model import bodies_of
 from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Transition
 
 TRIO = ("light", "heavy", "heavy")
+GROUND = points.schema_of(("height", "a", "b", "c", "touch"), ("u",))
+
+
+def touches(n: int, rng: np.random.Generator) -> list[Transition]:
+    """Below 0.3 a quarter of what comes touches a ground that nobody sees; all is drawn anew in each step."""
+    before = np.column_stack([rng.uniform(size=(n, 4)), np.zeros(n)])
+    touch = ((before[:, 0] < 0.3) & (rng.uniform(size=n) < 0.25)).astype(float)
+    after = iter(np.column_stack([rng.uniform(size=(n, 4)), touch]))
+    return points.transitions(GROUND, lambda s, u: next(after), before, rng.normal(size=(n, 1)))
 
 
 def test_classifiers_know_the_clusterers_modes_after_every_example() -> None:
@@ -86,6 +97,18 @@ def test_situations_never_seen_are_outside_experience() -> None:
         batch = careful.predict_batch(block.layout, block.scene(0).vector[None])
         assert batch.vectors[0].tobytes() == careful.predict_one(block.scene(0)).scene.vector.tobytes()
     assert set(outcomes) == {Outcome.PREDICTED, Outcome.OUTSIDE}
+
+
+def test_rare_events_are_not_foretold_where_they_are_unlikely() -> None:
+    # Among few remembered examples there are corners in which by chance only the rare event lies.
+    steps = touches(2000, np.random.default_rng(1))
+    model = WorldModel(GROUND)
+    foretold = 0
+    for each in steps:
+        foretold += model.predict_one(each.before).scene["self"]["touch"] > 0.5
+        model.learn_one(each)
+    assert points.formulas(model, "touch") == ["touch' = 0", "touch' = 1"]
+    assert foretold == 0
 
 
 def test_roles_name_the_objects_that_play_them(room_model: WorldModel) -> None:
