@@ -229,7 +229,7 @@ def envs(as_json: Json = False) -> None:
 @app.command()
 def dyna(
     out: Annotated[Path, typer.Option(help="Folder for the picture and the runs.")] = Path("out/dyna"),
-    steps: Annotated[int, typer.Option(help="Real steps of each agent.", min=1)] = 1000,
+    steps: Annotated[int, typer.Option(help="Real steps of each agent.", min=1)] = 750,
     seed: Seed = 0,
     learned: Annotated[bool, typer.Option(help="Learn reward and termination too.")] = False,
     as_json: Json = False,
