@@ -103,7 +103,9 @@ class Guesses:
         mean root) is larger: rare large errors must not decide over what is mostly right.
         """
         (modes, typical_modes), (own, typical) = self.errors.tolist()
-        return self.best is not None and own < modes and own * typical**4 < modes * typical_modes**4
+        # Squares are compared: so the typical error, itself a square of what is kept, counts to the fourth.
+        gains = own * typical**4 < modes * typical_modes**4
+        return self.best is not None and own < modes and gains
 
     def compare(self, modes: float, own: float) -> None:
         """Take in by how much the modes' prediction and the guess, made before the outcome was learned, were off."""
