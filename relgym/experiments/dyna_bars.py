@@ -27,16 +27,16 @@ from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.seeds import TRAINING_SEEDS
 
-__all__ = ["main", "page", "shown", "wanted"]
+__all__ = ["main", "page", "remarks", "shown", "wanted"]
 
 _HEAD: Final = """# What dreaming is worth
 
-`python -m relgym.experiments.dyna_bars` wrote this page; nothing on it is typed by hand. Each section is a row of
-bars. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than five, no more were run (*of* in the
-tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250 real steps; *each* lists the real
-steps to it, the smallest first. *time* is processor time, tests included (a run has one thread); *learning* and
-*dreaming* are wall time on a machine with two cores that did five other things too, and so may be longer. The
-[guide](../guides/dyna.md) says how it works."""
+`python -m relgym.experiments.dyna_bars` wrote this page, but for what stands below the tables, which it leaves alone.
+Each section is a row of bars. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than five, no
+more were run (*of* in the tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250 real
+steps; *each* lists the real steps to it, the smallest first. *time* is processor time, tests included (a run has one
+thread); *learning* and *dreaming* are wall time on a machine with two cores that did other things too, and so may be
+longer. The [guide](../guides/dyna.md) says how it works."""
 
 
 def wanted(row: Row, *, seeds: int, arms: Sequence[str]) -> list[Task]:
@@ -81,15 +81,25 @@ def shown(number: int, store: ResultStore, out: Path, command: str) -> Made:
 
 
 def page(out: Path, target: Path) -> None:
-    """Write the page of results from what rows have written, and copy their pictures beside it."""
+    """Write the page of results from what rows have written, and copy their pictures beside it.
+
+    What was written by hand below the tables of a page that is there already stays.
+    """
     made = list(_made(out))
+    kept = remarks(target.read_text(encoding="utf-8")) if target.is_file() else {}
     for each in made:
         if each.figure:
             write_atomically(target.parent / each.figure, (out / each.figure).read_bytes())
     missing = [f"row {n}, {row.title}" for n, row in ROWS.items() if f"row-{n}" not in {m.name for m in made}]
     rest = [f"Not made yet: {'; '.join(missing)}."] if missing else []
-    parts = [_HEAD, *rest, *(section(each, ".") for each in made), ""]
-    write_atomically(target, "\n\n".join(parts).encode())
+    sections = [part for each in made for part in (section(each, "."), kept.get(each.name, "")) if part]
+    write_atomically(target, "\n\n".join([_HEAD, *rest, *sections]).encode() + b"\n")
+
+
+def remarks(text: str) -> dict[str, str]:
+    """What stands below the tables of a page of results, by the name of the section."""
+    sections = text.split("\n## ")[1:]
+    return {own.split(":")[0]: own.rpartition("\n```\n")[2].strip() for own in sections}
 
 
 def _made(out: Path) -> Iterator[Made]:

@@ -93,7 +93,15 @@ def demonstrate(out: Path, *, steps: int, seed: int, learned: bool, bar: Progres
             bar.update(task, completed=at)
 
         found = run(
-            course, arm, seed=seed, steps=steps, testing=exam, to_the_end=True, heard=heard, met=met, dyna=_QUICK
+            course,
+            arm,
+            seed=seed,
+            steps=steps,
+            testing=exam,
+            to_the_end=True,
+            heard=heard,
+            met=met,
+            dyna=_QUICK,
         )
         runs.append(found)
     return DynaDemo(course.title, tuple(runs), _drawn(out, runs, shown, course))

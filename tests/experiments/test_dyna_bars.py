@@ -87,6 +87,15 @@ def test_finished_runs_are_not_run_again_and_make_the_page(
     assert "Not made yet: row 2, TruckPush: trained in the dream alone; row 3" in text
     assert (page.parent / "dream-1.png").stat().st_size > 5_000
 
+    page.write_text(text + "\nSAC was slow.\n\nVery slow.\n")
+    dyna_bars.page(tmp_path, page)
+    assert page.read_text() == text + "\nSAC was slow.\n\nVery slow.\n"
+
+
+def test_remarks_are_what_stands_below_the_last_table_of_a_section() -> None:
+    text = "# Title\n\nhead\n\n## row-1: a: b (c)\n\n```text\nx\n```\n\nSaid.\n\n## row-2: d\n\n```text\ny\n```\n"
+    assert dyna_bars.remarks(text) == {"row-1": "Said.", "row-2": ""}
+
 
 def test_a_row_of_which_nothing_is_known_says_so(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="nothing is known of row 5"):
