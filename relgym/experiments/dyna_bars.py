@@ -27,7 +27,7 @@ from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.seeds import TRAINING_SEEDS
 
-__all__ = ["main", "page", "remarks", "shown", "wanted"]
+__all__ = ["main", "page", "shown", "wanted"]
 
 _HEAD: Final = """# What dreaming is worth
 
@@ -71,6 +71,7 @@ def shown(number: int, store: ResultStore, out: Path, command: str) -> Made:
     figures = row.show(found)
     picture = f"dream-{number}.png" if figures.draw is not None else ""
     if figures.draw is not None:
+        out.mkdir(parents=True, exist_ok=True)
         figures.draw(out / picture)
     extent = f"{len(found)} of the row's {len(row.tasks)} runs have been made."
     text = report(row.title, figures.measures, [*figures.notes, extent])
@@ -83,23 +84,26 @@ def shown(number: int, store: ResultStore, out: Path, command: str) -> Made:
 def page(out: Path, target: Path) -> None:
     """Write the page of results from what rows have written, and copy their pictures beside it.
 
-    What was written by hand below the tables of a page that is there already stays.
+    Of a page that is there already, sections of rows that wrote nothing into this folder stay, and so does what was
+    written by hand below the tables.
     """
-    made = list(_made(out))
-    kept = remarks(target.read_text(encoding="utf-8")) if target.is_file() else {}
-    for each in made:
-        if each.figure:
-            write_atomically(target.parent / each.figure, (out / each.figure).read_bytes())
-    missing = [f"row {n}, {row.title}" for n, row in ROWS.items() if f"row-{n}" not in {m.name for m in made}]
+    old = _sections(target.read_text(encoding="utf-8")) if target.is_file() else {}
+    sections = dict(old)
+    for made in _made(out):
+        if made.figure:
+            write_atomically(target.parent / made.figure, (out / made.figure).read_bytes())
+        remark = old.get(made.name, "").rpartition("\n```\n")[2].strip()
+        sections[made.name] = section(made, ".") + (f"\n\n{remark}" if remark else "")
+    names = {f"row-{number}": row.title for number, row in ROWS.items()}
+    missing = [f"{name}, {title}" for name, title in names.items() if name not in sections]
     rest = [f"Not made yet: {'; '.join(missing)}."] if missing else []
-    sections = [part for each in made for part in (section(each, "."), kept.get(each.name, "")) if part]
-    write_atomically(target, "\n\n".join([_HEAD, *rest, *sections]).encode() + b"\n")
+    parts = [_HEAD, *rest, *(sections[name] for name in names if name in sections)]
+    write_atomically(target, "\n\n".join(parts).encode() + b"\n")
 
 
-def remarks(text: str) -> dict[str, str]:
-    """What stands below the tables of a page of results, by the name of the section."""
-    sections = text.split("\n## ")[1:]
-    return {own.split(":")[0]: own.rpartition("\n```\n")[2].strip() for own in sections}
+def _sections(text: str) -> dict[str, str]:
+    """The sections of a page of results, by the names of their rows."""
+    return {own.split(":")[0]: f"## {own.strip()}" for own in text.split("\n## ")[1:]}
 
 
 def _made(out: Path) -> Iterator[Made]:

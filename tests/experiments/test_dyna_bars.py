@@ -84,17 +84,26 @@ def test_finished_runs_are_not_run_again_and_make_the_page(
     text = page.read_text()
     assert "row-1: TruckPush: real steps to success" in text and "(./dream-1.png)" in text
     assert "1 of the row's 30 runs have been made." in text
-    assert "Not made yet: row 2, TruckPush: trained in the dream alone; row 3" in text
+    assert "Not made yet: row-2, TruckPush: trained in the dream alone; row-3" in text
     assert (page.parent / "dream-1.png").stat().st_size > 5_000
 
-    page.write_text(text + "\nSAC was slow.\n\nVery slow.\n")
-    dyna_bars.page(tmp_path, page)
-    assert page.read_text() == text + "\nSAC was slow.\n\nVery slow.\n"
 
-
-def test_remarks_are_what_stands_below_the_last_table_of_a_section() -> None:
-    text = "# Title\n\nhead\n\n## row-1: a: b (c)\n\n```text\nx\n```\n\nSaid.\n\n## row-2: d\n\n```text\ny\n```\n"
-    assert dyna_bars.remarks(text) == {"row-1": "Said.", "row-2": ""}
+def test_a_page_keeps_what_was_made_elsewhere_and_what_was_written_by_hand(tmp_path: Path) -> None:
+    store, page = ResultStore(tmp_path / "cache"), tmp_path / "dream.md"
+    for number, result in ((2, {"successes": 97, "seconds": 1.0}), (1, value("sac", 0, 42))):
+        task = next(t for t in ROWS[number].tasks if t.arguments.get("arm", "sac") == "sac")
+        store.put(task, Result(result, 3.0))
+    for number, folder in ((2, "a"), (1, "b")):
+        dyna_bars.shown(number, store, tmp_path / folder, "again")
+    dyna_bars.page(tmp_path / "a", page)
+    second = page.read_text().split("\n## ")[1]
+    page.write_text(page.read_text() + "\nAll in one night.\n\nReally.\n")
+    dyna_bars.page(tmp_path / "b", page)
+    head, row_1, row_2 = page.read_text().split("\n## ")
+    assert "Not made yet: row-3, BallGoal" in head and row_1.startswith("row-1: ")
+    assert row_2 == f"{second}\nAll in one night.\n\nReally.\n"
+    dyna_bars.page(tmp_path / "a", page)
+    assert page.read_text().split("\n## ") == [head, row_1, row_2]
 
 
 def test_a_row_of_which_nothing_is_known_says_so(tmp_path: Path) -> None:
