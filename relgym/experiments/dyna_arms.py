@@ -323,7 +323,9 @@ def _dyna(arm: Arm, course: Course, model: Any, *, seed: int, **changes: Any) ->
     }
     if not arm.doubted:
         settings |= {"open_at": 1.0, "shut_at": 1.0}
-    if arm.model == "neural":  # nets draw their batches from all they have seen: waiting would only withhold steps
+    if (
+        arm.model == "neural"
+    ):  # nets draw their batches from all they have seen: waiting would only withhold steps
         settings["shuffle"] = 0
     chosen = DynaConfig(**{**settings, **course.dreams, **changes})
     return Dyna(model, chosen, judge="learned" if arm.learned else None)

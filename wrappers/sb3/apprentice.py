@@ -14,7 +14,7 @@ from relgym.model.motion import possible_targets
 from relgym.model.scenes import mismatch
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Scene, SceneSchema
-from relgym.wrappers.sb3.config import DynaConfig
+from relgym.wrappers.sb3.config import DynaConfig, checked_config
 from relgym.wrappers.sb3.gate import Key, TrustGate, Verdict
 from relgym.wrappers.sb3.judges import (
     Acting,
@@ -62,7 +62,7 @@ class Apprentice:
     def __init__(
         self, model: DreamModel, judge: Judge | Literal["learned"], config: DynaConfig | None = None
     ) -> None:
-        config = config or DynaConfig()
+        config = checked_config(config)
         self.model = model
         self.judge = checked_judge(judge, model, model.schema)
         self.gate = TrustGate(

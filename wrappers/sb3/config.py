@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from relgym.errors import ConfigError
 
-__all__ = ["DynaConfig"]
+__all__ = ["DynaConfig", "checked_config"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,21 +84,34 @@ class DynaConfig:
 
     def __post_init__(self) -> None:
         for name in ("real_ratio", "from_start", "kick"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
+            value = getattr(self, name)
+            if not _number(value) or not 0.0 <= value <= 1.0:
                 raise ConfigError(f"{name}={getattr(self, name)!r}: expected a share from 0 to 1")
         for name, low in _LEAST.items():
             value = getattr(self, name)
             if value is None and name == "updates_alone":
                 continue
-            if not isinstance(value, int) or isinstance(value, bool) or value < low:
+            if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < low:
                 raise ConfigError(f"{name}={value!r}: expected a whole number, at least {low}")
         if self.least > self.window:
             raise ConfigError(f"least={self.least}: expected at most window={self.window}")
-        if not 0.0 <= self.open_at <= self.shut_at or not math.isfinite(self.shut_at):
+        fine = _number(self.open_at) and _number(self.shut_at)
+        if not fine or not 0.0 <= self.open_at <= self.shut_at or not math.isfinite(self.shut_at):
             raise ConfigError(
                 f"open_at={self.open_at!r}, shut_at={self.shut_at!r}: expected 0 <= open_at <= shut_at, so that "
                 "the gate doesn't flutter"
             )
+
+
+def checked_config(given: DynaConfig | None) -> DynaConfig:
+    """The parameters, or the default ones for none; `ConfigError` for anything else."""
+    if given is not None and not isinstance(given, DynaConfig):
+        raise ConfigError(f"config={given!r}: expected a DynaConfig, as DynaConfig(updates=40)")
+    return given or DynaConfig()
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
 _LEAST = {

@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from relgym.errors import ConfigError
 from relgym.wrappers.sb3.apprentice import Apprentice, check_model
-from relgym.wrappers.sb3.config import DynaConfig
+from relgym.wrappers.sb3.config import DynaConfig, checked_config
 from relgym.wrappers.sb3.imagination import Imagination
 from relgym.wrappers.sb3.lens import Lens, Observations, picked
 
@@ -51,6 +51,7 @@ def explore(apprentice: Apprentice, env: gym.Env[Any, Any], steps: int, *, seed:
             env.reset()
         for real in env.get_wrapper_attr("take")():
             apprentice.take_up(real)
+    apprentice.catch_up()
 
 
 class DreamVecEnv(VecEnv):  # type: ignore[misc]
@@ -90,7 +91,7 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
             raise ConfigError(f"num_envs={num_envs!r}: expected at least 1")
         self._lens = Lens(like)
         check_model(apprentice.model, self._lens, at_once=True)
-        self._apprentice, self._config = apprentice, config or DynaConfig()
+        self._apprentice, self._config = apprentice, checked_config(config)
         self._imagination = Imagination(apprentice.model, self._lens, apprentice.judge)
         self._rng = np.random.default_rng([self._config.seed, 3])
         self.render_mode = None
@@ -223,6 +224,7 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
                 f"spoke of {gate.known:.0%} of the latest real steps: let it watch more of them (explore) before an "
                 "agent trains in its dreams"
             )
+        self._next = min(self._next, self.num_timesteps)  # another learn() may count from 0 again
 
     def _on_step(self) -> bool:
         if self.num_timesteps < self._next:

@@ -10,13 +10,15 @@ from typing import Any, Final, Literal
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
+from stable_baselines3 import DQN
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from relgym.errors import ConfigError
 from relgym.wrappers.sb3.apprentice import Apprentice, check_model, checked_judge
-from relgym.wrappers.sb3.config import DynaConfig
+from relgym.wrappers.sb3.config import DynaConfig, checked_config
 from relgym.wrappers.sb3.imagination import Imagination, Imagined
 from relgym.wrappers.sb3.judges import Judge
 from relgym.wrappers.sb3.lens import Lens, Observations
@@ -88,14 +90,15 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     ) -> None:
         super().__init__(verbose)
         self.world = model
-        self.config = config or DynaConfig()
+        self.config = checked_config(config)
         self.imagined = 0
         self.dreaming_seconds = 0.0
         self._judge = judge
         self._like = like
         self._rng = np.random.default_rng([self.config.seed, 0])
         self._dreamed_at = 0
-        self._made_up = -1  # verdicts that were known when it was last trained in a burst
+        self._made_up = -1  # verdicts that were known when the agent was last trained in a burst
+        self._trained: Any = None  # the agent
         self._known = 0.0
         self._mixed: Any = None
         self._apprentice: Apprentice | None = None
@@ -120,30 +123,54 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         if self._mixed is not self.buffer:  # another agent's, or one that was loaded
             self.buffer.hold(self.config.capacity)
             self._mixed = self.buffer
+        if self._trained is not self.model:
+            self._trained, self._made_up = self.model, -1
         self.buffer.real_ratio = self.config.real_ratio
         self._imagination = Imagination(self.world, lens, self._apprentice.judge)
+        self._repeat = lens.repeat
         self._usual = int(self.model.gradient_steps)
         self._dreamed_at = min(self._dreamed_at, int(self.model.num_timesteps))
 
+    def _on_training_start(self) -> None:
+        for steps in self.training_env.env_method("take"):  # made by somebody else, before; real all the same
+            for real in steps:
+                self.apprentice.take_up(real)
+
+    def _on_rollout_start(self) -> None:
+        self.model.gradient_steps = (
+            self._usual
+        )  # what callbacks save between here and the end is the agent's own
+
     def _on_step(self) -> bool:
         for steps in self.training_env.env_method("take"):
+            if len(steps) > self._repeat:
+                raise ConfigError(
+                    f"a decision lasted {len(steps)} env steps, but dreamed ones last {self._repeat}: let "
+                    "relgym.wrappers.ActionRepeat or gymnasium.wrappers.RepeatAction repeat actions, or put what "
+                    "does inside the TransitionRecorder"
+                )
             for real in steps:
                 self.apprentice.take_up(real)
         trusted = self.apprentice.gate.open
-        if self.buffer.trusted and not trusted:  # what a model dreamed that is wrong by now is worth nothing
+        if (
+            not trusted and self.buffer.imagined.size()
+        ):  # what a model dreamed that is wrong by now is worth nothing
             self.buffer.hold(self.config.capacity)
         if trusted and not self._awake() and (self.buffer.imagined.size() == 0 or self._due()):
             self._dream()
         self.buffer.trusted = trusted
-        self.model.gradient_steps = self._gradient_steps(trusted)
         self._catch_up(trusted)
         self._log()
         return True
+
+    def _on_rollout_end(self) -> None:
+        self.model.gradient_steps = self._gradient_steps(self.buffer.trusted)
 
     def _on_training_end(self) -> None:
         self.apprentice.catch_up()
         self._complain()
         self.model.gradient_steps = self._usual
+        self.buffer.trusted = False  # without this callback nobody refreshes what was dreamed
 
     def _complain(self) -> None:
         """Warn where no dream was ever trusted, with what the learners lack: else it would go unnoticed."""
@@ -186,7 +213,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         And again when the judge has learned of something else that is paid for or ends episodes: what was dreamed
         before didn't know of it, nor does the policy that was trained in it.
         """
-        if not trusted or self.num_timesteps <= self.model.learning_starts:
+        if not trusted or self.num_timesteps <= self.model.learning_starts or not self.buffer.size():
             return
         known = getattr(self.apprentice.judge, "verdicts", 0)
         if known <= self._made_up:
@@ -198,6 +225,13 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         for done in range(0, self.config.burst, each):
             self._dream()
             self.model.train(min(each, self.config.burst - done), batch_size=self.model.batch_size)
+            self._aim()
+
+    def _aim(self) -> None:
+        """Let DQN's target net follow: Stable-Baselines3 does so per real step, of which a burst has none."""
+        if isinstance(self.model, DQN):
+            own, target = self.model.q_net, self.model.q_net_target
+            polyak_update(own.parameters(), target.parameters(), self.model.tau)
 
     def _dream(self) -> None:
         started = perf_counter()

@@ -33,8 +33,8 @@ class Lens:
     env
         The env that the agent acts in, in all its wrappers, a `TransitionRecorder` among them. Wrappers that
         leave the spaces as they are (time limits, monitors) are looked through; of the others those count
-        that are a `gymnasium.ObservationWrapper` or a `gymnasium.ActionWrapper`, whose functions are asked,
-        and an action repeat (an attribute ``repeat``).
+        that are a `gymnasium.ObservationWrapper` or a `gymnasium.ActionWrapper`, whose functions are asked, and
+        action repeats (an attribute ``repeat``, or ``num_repeats`` of a `gymnasium.wrappers.RepeatAction`).
 
     Attributes
     ----------
@@ -46,7 +46,8 @@ class Lens:
     Raises
     ------
     ConfigError
-        No recorder, or outside it a wrapper that changes rewards, or a space in a way that nobody can follow.
+        No recorder, or outside it a wrapper that changes rewards, or a space in a way that nobody can follow, or that
+        shows or does what depends on earlier steps (`gymnasium.wrappers.DelayObservation`).
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
@@ -75,7 +76,7 @@ class Lens:
         self._high = {name: part.high for name, part in base.spaces.items()}
 
     def _take_up(self, layer: gym.Wrapper[Any, Any, Any, Any]) -> None:
-        own = vars(layer).get("repeat")
+        own = vars(layer).get("num_repeats" if isinstance(layer, gym.wrappers.RepeatAction) else "repeat")
         if isinstance(layer, _REWARDING):
             raise ConfigError(
                 f"{type(layer).__name__} changes rewards outside the TransitionRecorder, where dreams would be paid "
@@ -83,10 +84,9 @@ class Lens:
             )
         if isinstance(own, int):
             self.repeat *= own
-        elif isinstance(layer, gym.ObservationWrapper):
-            self._show.append(layer)
-        elif isinstance(layer, gym.ActionWrapper):
-            self._do.append(layer)
+        elif isinstance(layer, gym.ObservationWrapper | gym.ActionWrapper):
+            _refuse_memory(layer)
+            (self._show if isinstance(layer, gym.ObservationWrapper) else self._do).append(layer)
         elif (layer.observation_space, layer.action_space) != (
             layer.env.observation_space,
             layer.env.action_space,
@@ -145,6 +145,19 @@ class Lens:
             parts = self.observation_space.spaces if isinstance(self.observation_space, spaces.Dict) else {}
             return {key: seen[key].astype(part.dtype, copy=False) for key, part in parts.items()}
         return seen.astype(self.observation_space.dtype or seen.dtype, copy=False)
+
+
+def _refuse_memory(layer: gym.Wrapper[Any, Any, Any, Any]) -> None:
+    """Raise `ConfigError` for a wrapper that keeps what happens in an episode: it would mix up dreams and the world.
+
+    Who has nothing to keep has nothing to do at a reset but what the base class does.
+    """
+    base = gym.ObservationWrapper if isinstance(layer, gym.ObservationWrapper) else gym.ActionWrapper
+    if type(layer).reset is not base.reset:
+        raise ConfigError(
+            f"{type(layer).__name__} keeps count of the real episode (it has a reset of its own), and nobody knows how "
+            "a dream could follow: put it inside the TransitionRecorder"
+        )
 
 
 def picked(seen: Observations, which: Any) -> Any:

@@ -58,8 +58,16 @@ class PermutedReplay(BaseCallback):  # type: ignore[misc]
         buffer.real_ratio = 1.0 / (1.0 + self.copies)
         buffer.trusted = True
 
+    def _on_training_start(self) -> None:
+        self.training_env.env_method("take")  # made by somebody else, before: not what is stored now
+
+    def _on_training_end(self) -> None:
+        self.model.replay_buffer.trusted = False  # without this callback nobody adds to the renamed
+
     def _on_step(self) -> bool:
         scaled, rewards, dones = (self.locals[name] for name in ("buffer_actions", "rewards", "dones"))
+        if (normalise := self.model.get_vec_normalize_env()) is not None:  # batches are normalised when drawn
+            rewards = normalise.get_original_reward()
         infos = self.locals["infos"]
         for k, steps in enumerate(self.training_env.env_method("take")):
             late = bool(infos[k].get("TimeLimit.truncated", False))

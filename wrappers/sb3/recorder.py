@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import gymnasium as gym
 from gymnasium.error import ResetNeeded
@@ -14,6 +15,9 @@ from relgym.scene.objects import Scene, Transition
 from relgym.wrappers.views import ViewLike, recordable, view_of
 
 __all__ = ["Experience", "TransitionRecorder"]
+
+_MOST: Final = 10_000
+"""Of an env in which agents are only tested, nobody takes the steps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +47,7 @@ class Experience:
 
 
 class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """Keeps the latest steps until somebody takes them; what the env returns stays as it is.
+    """Keeps the latest 10,000 steps until somebody takes them; what the env returns stays as it is.
 
     It goes directly round an env, inside all wrappers that change observations or actions: what these hide, scale or
     repeat, the model sees as it is. Where observations aren't scenes they are seen as one object of numbers, or one per
@@ -74,7 +78,7 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
         self.view = view_of(env, view)
         self._scene: Scene | None = None
         self._first = True
-        self._taken: list[Experience] = []
+        self._taken: deque[Experience] = deque(maxlen=_MOST)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -100,5 +104,6 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
 
     def take(self) -> list[Experience]:
         """All steps since the last call, in order; the recorder forgets them."""
-        taken, self._taken = self._taken, []
+        taken = list(self._taken)
+        self._taken.clear()
         return taken

@@ -8,6 +8,7 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.buffers import DictReplayBuffer, NStepReplayBuffer, ReplayBuffer
 
+from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
 from relgym.wrappers.sb3.imagination import Imagined
 from relgym.wrappers.sb3.lens import Observations, picked
@@ -47,6 +48,10 @@ class Mixing:
         """Make room for so many imagined transitions; those there were are gone."""
         self.imagined = self._twin(capacity)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a file or a copy keeps: what happened. What was dreamed is of the model of that hour."""
+        return {**self.__dict__, "trusted": False, "imagined": self._twin(1)}
+
     def _twin(self, capacity: int) -> Any:
         return self.plain(capacity, *self._spaces, device=self._device[0], n_envs=1, **self._options)
 
@@ -67,7 +72,7 @@ class Mixing:
         """A batch; mixed while the model is trusted and something was imagined."""
         real = batch_size
         if self.trusted and self.imagined.size() > self._options.get("n_steps", 1):
-            real = round(self.real_ratio * batch_size)
+            real = round(self.real_ratio * batch_size) if super().size() else 0  # type: ignore[misc]
         if real == batch_size:
             return super().sample(batch_size, env=env)  # type: ignore[misc]
         dreamed = self.imagined.sample(batch_size - real, env=env)
@@ -113,8 +118,7 @@ def replay_options(
     ConfigError
         n-step returns with Dict observations, which Stable-Baselines3 doesn't know, or ``n_steps < 1``.
     """
-    if n_steps < 1:
-        raise ConfigError(f"n_steps={n_steps!r}: expected at least 1")
+    n_steps = checked_count("n_steps", n_steps, 1, 10**6)
     is_dict = isinstance(observation_space, spaces.Dict)
     if is_dict and n_steps > 1:
         raise ConfigError(

@@ -178,21 +178,23 @@ class SceneStock:
 
 
 def free_properties(model: DreamModel) -> frozenset[tuple[str, str]]:
-    """(type, property) of bodiless objects that no law of another type's motion mentions.
+    """(type, property) of bodiless objects that no law but its own mentions.
 
-    Action and task apart. A model without readable modes licenses nothing.
+    Action and task apart. A model without readable modes licenses nothing, and so do scenes in which nothing has a
+    body: there bodiless objects are all there is, and one part of their state goes with another.
     """
     modes = getattr(model, "modes", None)
-    if modes is None:
+    if modes is None or not any(t.has_body for t in model.schema.types):
         return frozenset()
     bodiless = [t for t in model.schema.types if not t.has_body and t.name not in (ACTION, TASK)]
     mentioned = {
-        (role.type, prop.rstrip("'"))
+        (role.type, name)
         for target in model.targets
         for mode in modes(target.type, target.property)
         for role in mode.roles
         for prop, _ in role.terms
-        if role.type != target.type
+        for name in (prop.rstrip("'"),)
+        if (role.type, name) != (target.type, target.property)
     }
     return frozenset((t.name, p) for t in bodiless for p in t.properties) - mentioned
 

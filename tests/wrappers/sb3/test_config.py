@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from relgym.errors import ConfigError
@@ -22,11 +23,18 @@ from relgym.wrappers.sb3.config import DynaConfig
         ({"least": 200}, "least=200: expected at most window=100"),
         ({"open_at": 0.3}, "expected 0 <= open_at <= shut_at"),
         ({"shut_at": float("inf")}, "expected 0 <= open_at <= shut_at"),
+        ({"open_at": "a"}, "expected 0 <= open_at <= shut_at"),
+        ({"kick": "a"}, "kick='a': expected a share"),
+        ({"real_ratio": None}, "real_ratio=None: expected a share"),
     ],
 )
 def test_illegal_values(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         DynaConfig(**changes)
+
+
+def test_numpys_numbers_are_numbers() -> None:
+    assert DynaConfig(dreams=np.int64(4), kick=np.float64(0.5)).dreams == 4  # type: ignore[arg-type]
 
 
 def test_the_package_loads_without_torch() -> None:

@@ -133,6 +133,26 @@ def test_check_ups_see_what_the_agent_was_trained_on() -> None:
     np.testing.assert_allclose(dreamed.unnormalize_obs(shown[0]), first, atol=2.0)
 
 
+def test_check_ups_are_made_again_in_a_second_training() -> None:
+    from stable_baselines3 import PPO
+
+    from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
+
+    model = apprentice()
+    check = DreamCheckup(model, world(), every=32, episodes=1)
+    env = DreamVecEnv(model, world(), num_envs=4, config=QUICK)
+    agent = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
+    agent.learn(128, callback=check)
+    once = len(check.history)
+    agent.learn(128, callback=check)  # counts from 0 again
+    assert once >= 3 and len(check.history) == 2 * once
+
+
+def test_what_was_explored_has_all_been_learned() -> None:
+    found = apprentice()
+    assert len(found.model.learned) == 40  # type: ignore[attr-defined]
+
+
 def test_a_task_can_be_learned_while_exploring() -> None:
     from relgym.wrappers.sb3.dreaming import explore
     from relgym.wrappers.sb3.judges import LearnedTask

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import pickle
 from types import SimpleNamespace
 from typing import Any
 
@@ -115,6 +116,7 @@ def test_batches_hold_the_share_that_was_asked_for() -> None:
     algorithm.learn(40, callback=dyna)
     buffer = algorithm.replay_buffer
     buffer.rewards[:] = 7.0  # as if the world paid this, and only the world
+    buffer.trusted = True  # as while it learned
     batch = buffer.sample(64)
     assert int((batch.rewards == 7.0).sum()) == 16
     assert batch.observations.shape == (64, 1)
@@ -124,6 +126,88 @@ def test_batches_hold_the_share_that_was_asked_for() -> None:
     assert not bool((buffer.sample(64).rewards == 7.0).any())
     buffer.real_ratio = 1.0
     assert bool((buffer.sample(64).rewards == 7.0).all())
+
+
+def test_without_the_callback_nothing_stale_is_drawn() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    algorithm = agent("SAC", flat())
+    algorithm.learn(40, callback=Dyna(LineModel(), DynaConfig(**QUICK)))
+    buffer = algorithm.replay_buffer
+    assert buffer.imagined.size() > 0 and not buffer.trusted
+    buffer.trusted = True
+    kept = pickle.loads(pickle.dumps(buffer))
+    assert (kept.size(), kept.imagined.size(), kept.trusted) == (40, 0, False)
+    assert buffer.trusted and buffer.imagined.size() > 0  # keeping it changed nothing
+
+
+def test_what_others_save_while_it_learns_is_the_agents_own(tmp_path: Any) -> None:
+    from stable_baselines3 import SAC
+    from stable_baselines3.common.callbacks import CallbackList, CheckpointCallback
+
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    algorithm = agent("SAC", flat())
+    dyna = Dyna(LineModel(), DynaConfig(**QUICK))
+    algorithm.learn(40, callback=CallbackList([dyna, CheckpointCallback(10, str(tmp_path))]))
+    assert algorithm._n_updates > 40  # more than one per step
+    saved = sorted(tmp_path.glob("*.zip"))
+    assert len(saved) == 4
+    assert {SAC.load(path).gradient_steps for path in saved} == {1}
+
+
+def test_steps_that_were_made_before_are_learned_from_too() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    env, world = flat(), LineModel()
+    env.reset(seed=0)
+    for _ in range(5):
+        env.step(env.action_space.sample())
+    agent("SAC", env).learn(20, callback=Dyna(world, DynaConfig(**QUICK)))
+    assert len(world.learned) == 25
+
+
+def test_in_bursts_the_target_net_of_dqn_follows() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    algorithm = agent("DQN", Steering(flat()), train_freq=1)
+    before = [part.detach().clone() for part in algorithm.q_net_target.parameters()]
+    algorithm.learn(20, callback=Dyna(LineModel(), DynaConfig(**QUICK, burst=30)))
+    after = list(algorithm.q_net_target.parameters())
+    assert any(not bool((a == b).all()) for a, b in zip(before, after, strict=True))
+
+
+def test_a_burst_waits_for_a_real_step() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    dyna = Dyna(LineModel(), DynaConfig(**{**QUICK, "least": 1}, burst=30))
+    algorithm = agent("SAC", flat(), learning_starts=0)
+    algorithm.learn(5, callback=dyna)
+    assert algorithm._n_updates >= 30
+
+
+def test_a_decision_lasts_as_long_in_dreams() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    def repeated(wrapper: Any) -> Any:
+        return Flat(wrapper(TransitionRecorder(gym.wrappers.TimeLimit(LineEnv(), 8))))
+
+    algorithm = agent("SAC", repeated(lambda env: gym.wrappers.RepeatAction(env, 2)))
+    algorithm.learn(40, callback=Dyna(LineModel(), DynaConfig(**QUICK)))
+    pool = algorithm.replay_buffer.imagined
+    moved = 2.0 * (pool.next_observations - pool.observations)[: pool.size(), 0, 0]
+    whole = pool.dones[: pool.size(), 0] == 0.0
+    np.testing.assert_allclose(moved[whole], 4.0 * pool.actions[: pool.size(), 0, 0][whole], atol=1e-5)
+
+    class Twice(gym.Wrapper[Any, Any, Any, Any]):
+        def step(self, action: Any) -> Any:
+            self.env.step(action)
+            return self.env.step(action)
+
+    with pytest.raises(
+        ConfigError, match=r"a decision lasted 2 env steps, but dreamed ones last 1: .*RepeatAction"
+    ):
+        refused(repeated(Twice))
 
 
 def test_a_wrong_model_is_never_dreamed_in() -> None:
@@ -251,6 +335,9 @@ def test_what_a_trusted_model_could_have_taught_is_made_up_for_once() -> None:
     shut = agent("SAC", flat())
     shut.learn(20, callback=Dyna(LineModel(off=1.0), DynaConfig(**QUICK, burst=30)))
     assert shut._n_updates == 10
+    world.off, other = 0.0, agent("SAC", flat())  # another agent has been taught nothing yet
+    other.learn(20, callback=dyna)
+    assert other._n_updates >= 30
 
 
 def test_it_trains_again_when_more_has_become_known_of_the_task() -> None:
@@ -316,6 +403,11 @@ def test_refusals_name_the_remedy() -> None:
     unfrozen.frozen, unfrozen.targets = True, ()  # type: ignore[assignment]
     with pytest.raises(ConfigError, match="knows none of the targets"):
         refused(flat(), unfrozen)
+    with pytest.raises(ConfigError, match=r"config=.*: expected a DynaConfig, as DynaConfig\(updates=40\)"):
+        Dyna(LineModel(), {"updates": 3})  # type: ignore[arg-type]
+    for steps in (1.5, True, 0):
+        with pytest.raises(ConfigError, match=f"n_steps={steps}: expected a whole number"):
+            agent("SAC", flat(), n_steps=steps)
     with pytest.raises(ConfigError, match="training has not begun"):
         _ = Dyna(LineModel()).apprentice
 
@@ -396,7 +488,7 @@ def test_any_env_will_do() -> None:
 def test_n_steps_are_refused_where_there_is_no_buffer_for_them() -> None:
     from relgym.wrappers.sb3.replay import replay_options
 
-    with pytest.raises(ConfigError, match="n_steps=0: expected at least 1"):
+    with pytest.raises(ConfigError, match="n_steps=0: expected a whole number"):
         replay_options(flat().observation_space, n_steps=0)
     with pytest.raises(ConfigError, match="n_steps=3 with Dict observations"):
         replay_options(plain().observation_space, n_steps=3)
@@ -410,6 +502,7 @@ def test_stable_baselines3_is_still_what_this_stands_on() -> None:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
     from stable_baselines3.common.policies import BasePolicy
     from stable_baselines3.common.type_aliases import DictReplayBufferSamples, ReplayBufferSamples
+    from stable_baselines3.common.utils import polyak_update
 
     for algorithm in (SAC, TD3, DQN):
         assert issubclass(algorithm, OffPolicyAlgorithm)
@@ -424,8 +517,11 @@ def test_stable_baselines3_is_still_what_this_stands_on() -> None:
         assert added == ["obs", "next_obs", "action", "reward", "done", "infos"]
     fields = ("observations", "actions", "next_observations", "dones", "rewards", "discounts")
     assert ReplayBufferSamples._fields == DictReplayBufferSamples._fields == fields
-    for hook in ("_init_callback", "_on_step", "_on_training_end", "training_env", "logger"):
+    hooks = ("_init_callback", "_on_step", "_on_rollout_start", "_on_rollout_end", "_on_training_start")
+    for hook in (*hooks, "_on_training_end", "training_env", "logger"):
         assert hasattr(BaseCallback, hook)
+    assert list(inspect.signature(polyak_update).parameters) == ["params", "target_params", "tau"]
+    assert {"q_net", "q_net_target", "tau"} <= set(vars(agent("DQN", Steering(flat()), train_freq=1)))
     for name in ("get_vec_normalize_env", "predict", "set_logger", "train", "learn"):
         assert callable(getattr(OffPolicyAlgorithm, name))
     assert list(inspect.signature(OffPolicyAlgorithm.train).parameters)[1:] == [

@@ -126,6 +126,35 @@ def test_errors_name_the_remedy() -> None:
         Lens(Odd(TransitionRecorder(LineEnv())))
 
 
+@pytest.mark.parametrize(
+    "wrapper",
+    [
+        lambda env: gym.wrappers.DelayObservation(env, 1),
+        lambda env: gym.wrappers.TimeAwareObservation(gym.wrappers.TimeLimit(env, 8)),
+        lambda env: gym.wrappers.StickyAction(env, 0.5),
+    ],
+)
+def test_wrappers_that_remember_are_refused(wrapper: Any) -> None:
+    with pytest.raises(
+        ConfigError, match=r"keeps count of the real episode.*put it inside the TransitionRecorder"
+    ):
+        Lens(wrapper(Flat(TransitionRecorder(LineEnv()))))
+
+
+def test_gymnasiums_repeats_count() -> None:
+    inner = ActionRepeat(TransitionRecorder(LineEnv()), 3)
+    assert Lens(Flat(gym.wrappers.RepeatAction(inner, 2))).repeat == 6
+
+
+def test_a_recorder_nobody_asks_forgets_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("relgym.wrappers.sb3.recorder._MOST", 3)
+    env = TransitionRecorder(LineEnv())
+    env.reset(seed=0)
+    for push in (0.1, 0.2, 0.3, 0.4, 0.5):
+        env.step(np.array([push], dtype=np.float32))
+    assert [round(float(step.action[0]), 1) for step in env.take()] == [0.3, 0.4, 0.5]
+
+
 def test_a_recorder_writes_down_what_happened() -> None:
     env = Flat(ActionRepeat(TransitionRecorder(LineEnv()), 2))
     env.reset(seed=1)

@@ -47,6 +47,30 @@ def trained(**options: Any) -> Any:
     return agent.learn(30, callback=PermutedReplay(copies=3, seed=0))
 
 
+def test_rewards_are_normalised_once_and_steps_made_before_are_left_out() -> None:
+    import torch
+    from stable_baselines3 import SAC
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+    from relgym.wrappers.sb3.permuting import PermutedReplay
+    from relgym.wrappers.sb3.replay import replay_options
+
+    torch.set_num_threads(1)
+    env = Places(TransitionRecorder(LineEnv()))
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    envs = VecNormalize(DummyVecEnv([lambda: env]), norm_obs=False)
+    mixing = replay_options(env.observation_space)
+    agent = SAC("MlpPolicy", envs, learning_starts=100, buffer_size=500, device="cpu", seed=0, **mixing)
+    agent.learn(20, callback=PermutedReplay(copies=1, seed=0))
+    buffer = agent.replay_buffer
+    assert not buffer.trusted
+    np.testing.assert_array_equal(buffer.imagined.rewards[:20, 0], buffer.rewards[:20, 0])
+    np.testing.assert_array_equal(
+        np.sort(buffer.imagined.observations[:20, 0]), np.sort(buffer.observations[:20, 0])
+    )
+
+
 def test_copies_tell_the_same_under_other_names() -> None:
     buffer = trained().replay_buffer
     copies = buffer.imagined

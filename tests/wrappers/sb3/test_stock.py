@@ -156,3 +156,30 @@ def test_so_many_starts_are_kicked_as_was_asked_for(rng: np.random.Generator) ->
     varied = stock.starts(1_000, model, replace(plain, kick=0.25), rng=rng)[1]
     whole = np.isin(varied[:, stock.draw(1, from_start=1.0, rng=rng)[0].column(0, "vx")], (-1.0, 1.0, 3.0))
     assert 0.2 < (~whole).mean() < 0.3
+
+
+def test_where_nothing_has_a_body_nothing_is_redrawn(rng: np.random.Generator) -> None:
+    """Position and speed of a flat env are no goal that may lie anywhere: they go with one another."""
+    schema = SceneSchema((ObjectType("self", ("x", "v")),), (("self", "self"),))
+    model = WorldModel(schema)
+    for _ in range(60):
+        x, v = rng.uniform(-1, 1, 2)
+        before = schema.scene({"self": [x, v]})
+        model.learn_one(Transition(before, schema.scene({"self": [x + 0.5 * v, 0.9 * v]})))
+    assert model.modes("self", "v") and free_properties(model) == frozenset()
+
+
+def test_what_the_law_of_another_property_of_its_type_mentions_is_not_redrawn(
+    rng: np.random.Generator,
+) -> None:
+    schema = SceneSchema(
+        (ObjectType("block", (*POSE,), Box()), ObjectType("clock", ("time", "pace", "name"))),
+        (("block", "block"), ("clock", "clock")),
+        targets=(Target("clock", "time"),),
+    )
+    model = WorldModel(schema)
+    for _ in range(60):
+        time, pace, name = rng.uniform(-1, 1, 3)
+        before = schema.scene({"block": np.arange(9.0), "clock": [time, pace, name]})
+        model.learn_one(Transition(before, before.replace({("clock", "time"): time + pace})))
+    assert free_properties(model) == {("clock", "time"), ("clock", "name")}
