@@ -21,8 +21,10 @@ __all__ = [
     "checked_action",
     "checked_actions",
     "checked_count",
+    "checked_function",
     "checked_least",
     "checked_mask",
+    "checked_options",
     "checked_range",
     "counted",
     "numbered",
@@ -104,9 +106,23 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
+def checked_options(options: Any) -> Mapping[str, Any]:
+    """The options of a `reset`, none for None; `ConfigError` unless they are a mapping."""
+    if options is not None and not isinstance(options, Mapping):
+        raise ConfigError(f"options={options!r}: expected a dict such as {{'scene': scene}}")
+    return {} if options is None else options
+
+
+def checked_function(what: str, given: Any) -> Any:
+    """`given`; `ConfigError` unless it is a function or None."""
+    if given is not None and not callable(given):
+        raise ConfigError(f"{what}={given!r}: expected a function, or None")
+    return given
+
+
 def check_options(options: Mapping[str, Any], legal: Collection[str]) -> None:
     """Raise `ConfigError` when an option of `reset` isn't one of `legal`."""
-    unknown = sorted(set(options) - set(legal))
+    unknown = sorted(set(map(str, options)) - set(legal))
     if unknown:
         raise ConfigError(f"unknown reset options {unknown}; this env has {sorted(legal)}")
 
@@ -149,6 +165,13 @@ def refuse_vector_env(env: Any) -> None:
 
 def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:
     """`checked_action` for `count` actions at once, first axis first; they come back as one array."""
+    if isinstance(
+        space, spaces.MultiBinary
+    ):  # a batch of them is a Box of int8, which other integers aren't in
+        array = np.asarray(actions)
+        if array.shape != (count, *space.shape) or not np.isin(array, (0, 1)).all():
+            raise ActionError(f"expected {count} actions of {space}, got {actions!r}")
+        return array.astype(space.dtype)
     if not isinstance(space, spaces.Box):
         legal, array = batch_space(space, count), np.asarray(actions)
         if not legal.contains(array):

@@ -11,15 +11,22 @@ import gymnasium as gym
 from gymnasium.error import ResetNeeded
 
 from relgym.envs.actions import without_action
-from relgym.envs.arguments import check_options, checked_action, checked_count, checked_least
+from relgym.envs.arguments import (
+    check_options,
+    checked_action,
+    checked_count,
+    checked_function,
+    checked_least,
+    checked_options,
+)
 from relgym.envs.learned_model_ends import Cause, explained, horizon_reached, parts_of
-from relgym.envs.learned_model_judges import Judge, Judges, Start, TaskFunctions, marked
+from relgym.envs.learned_model_judges import Judge, Judges, Start, TaskFunctions, check_judges, marked
 from relgym.envs.learned_model_setting import Setting, check_knowledge
 from relgym.envs.views import View
 from relgym.errors import ConfigError
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import TASK, Scene
+from relgym.scene.objects import TASK, Scene, SceneSchema
 
 __all__ = ["Judge", "LearnedModelEnv"]
 
@@ -29,12 +36,12 @@ class LearnedModelEnv(gym.Env[Any, Any]):
 
     Description
     -----------
-    Has the spaces and the schema of the env that the model was learned in. Every step asks the model for the
-    next scene. Where it has no answer the episode is truncated and ``info["reason"]`` says why: a dream never
+    Has the spaces of the env that the model was learned in, and its schema if that has one. Every step asks the model
+    for the next scene. Where it has no answer the episode is truncated and ``info["reason"]`` says why: a dream never
     goes on by guessing. Exogenous properties keep their values.
 
-    The model is used as it is, live: what it learns later changes the dream. With ``snapshot=True`` the dream has a
-    copy of its own, and stays as it was.
+    The model is used as it is, live: what it learns later changes the dream; who judges is settled anew at each
+    reset. With ``snapshot=True`` the dream has a copy of its own, and stays as it was.
 
     Thousands of dreams at once: `LearnedModelVectorEnv`, which ``gym.make_vec`` makes of the same id.
 
@@ -77,11 +84,12 @@ class LearnedModelEnv(gym.Env[Any, Any]):
     like
         A real env whose scenes consist of types that the model knows: gives the spaces, first scenes, and its task
         if it has one. Numbers and names of objects may differ from those that the model was trained on. Wrappers
-        around it are looked through. Or a `Scene`: its objects get the bounds of their types, and dreams begin with
+        around it are looked through; where the model was learned through a view, those outside the spaces that it
+        was learned in. Or a `Scene`: its objects get the bounds of their types, and dreams begin with
         it. Not needed where a `ModelLearner` taught the model.
     view
         The view that the model was learned through (`relgym.envs.views`). Needed only for a `FunctionView`, which no
-        file can hold.
+        file can hold. Reward and termination that were learned beside it are seen to.
     reward, terminated
         Functions of (scene, action, next scene), or ``"learned"``: as the model predicts ``task.reward`` and
         ``task.terminated``. None: see above.
@@ -113,6 +121,9 @@ class LearnedModelEnv(gym.Env[Any, Any]):
     * v0: initial version.
     """
 
+    schema: SceneSchema
+    """Of the scenes; only where observations are scenes."""
+
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
 
     def __init__(
@@ -135,13 +146,17 @@ class LearnedModelEnv(gym.Env[Any, Any]):
                 f"render_mode={render_mode!r}: expected None or one of {self.metadata['render_modes']}"
             )
         self._setting = place = Setting.of(model, like, view, snapshot=snapshot)
-        self.model, self.schema, self.render_mode = place.model, place.schema, render_mode
+        self.model, self.render_mode = place.model, render_mode
+        if place.scenic:  # else the dream has none, as the real env
+            self.schema = place.schema
         self.observation_space, self.action_space = place.observation_space, place.action_space
         self.metadata = {**self.metadata, "render_fps": place.render_fps}
         self.task = place.task if task is None else task
         self.flat_spec = place.flat_spec
-        self._judges = Judges.of(reward, terminated, self.task, place.model, place.layout)
-        self._start = start
+        check_judges(reward, terminated, self.task, place.model, batched=False, at_once=snapshot)
+        self._given = reward, terminated
+        self._judges: Judges | None = None
+        self._start = checked_function("start", start)
         self._horizon = None if horizon is None else checked_count("horizon", horizon, 1, 10**9)
         self._min_margin = checked_least("min_margin", min_margin, 0.0)
         self._scene: Scene | None = None
@@ -166,7 +181,9 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         """
         super().reset(seed=seed)
         check_knowledge(self.model)
-        self._scene = self._first(seed, options or {})
+        judges = Judges.of(*self._given, self.task, self.model)
+        self._scene = self._first(seed, checked_options(options))
+        self._judges = judges
         self._steps, self._camera = 0, None
         if self.render_mode == "human":
             self.render()
@@ -190,6 +207,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         if (end := self._end(prediction, after)) is not None:
             self._steps += 1
             return self._observation(), 0.0, False, True, {**info, **_told(*end)}
+        assert self._judges is not None, "there is a scene"
         reward, ended = self._judges(before, taken, after)
         if math.isnan(reward):
             self._steps += 1
@@ -254,7 +272,8 @@ class LearnedModelEnv(gym.Env[Any, Any]):
 
     def _end(self, prediction: ScenePrediction, after: Scene) -> tuple[Cause, str] | None:
         """Why a prediction can't be followed; None if it can."""
-        if (told := explained(parts_of(prediction), self._min_margin, self._judges.overruled)) is not None:
+        overruled = self._judges.overruled if self._judges is not None else frozenset()
+        if (told := explained(parts_of(prediction), self._min_margin, overruled)) is not None:
             return told
         left = self._setting.shown.outside(after)
         return (Cause.LEFT, left) if left else None

@@ -110,6 +110,8 @@ class DreamStep:
         """Rewards, ends and successes; a step that can't be followed has none of them."""
         tells = getattr(self.task, "successes", None)
         layout = self.setting.layout
+        # Single dreams are frozen: a function that changes what it judges would change the dream.
+        before, after = _read_only(before), _read_only(after)
         if good.all():
             success = (
                 None if tells is None else np.asarray(tells(layout, before, actions, after), dtype=np.bool_)
@@ -118,7 +120,7 @@ class DreamStep:
         rewards, ended = np.zeros(len(before)), np.zeros(len(before), dtype=np.bool_)
         success = None if tells is None else ended.copy()
         if good.any():
-            steps = before[good], actions[good], after[good]
+            steps = _read_only(before[good]), actions[good], _read_only(after[good])
             rewards[good], ended[good] = self.judges(*steps)
             if tells is not None and success is not None:
                 success[good] = tells(layout, *steps)
@@ -136,3 +138,9 @@ class DreamStep:
         return self.setting.shown.outside(
             Scene(self.setting.schema, self.setting.layout, stepped.foreseen[row].copy())
         )
+
+
+def _read_only(vectors: Float2D) -> Float2D:
+    view = vectors.view()
+    view.flags.writeable = False
+    return view

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Protocol, TypeAlias
@@ -18,13 +19,14 @@ __all__ = [
     "BatchJudge",
     "BatchJudges",
     "BatchStart",
+    "Drawn",
     "Judge",
     "Judges",
     "Start",
     "TaskFunctions",
+    "check_judges",
     "drawn_from",
     "in_batches",
-    "learned_column",
     "marked",
 ]
 
@@ -42,6 +44,8 @@ BatchStart: TypeAlias = Callable[[np.random.Generator, int], Float2D]
 
 LEARNED: Final = "learned"
 """Stands for a reward or termination that the model predicts, as a property of the `task` object."""
+
+_WORDS: Final = {"reward": "reward", "terminated": "termination"}
 
 _ENDED = 0.5
 """A learned termination above this counts as true."""
@@ -69,46 +73,81 @@ class TaskFunctions(Protocol):
         ...
 
 
-def learned_column(model: WorldModel, layout: SceneLayout, prop: str) -> int:
-    """Column of a property of the `task` object in state vectors.
+def check_judges(
+    reward: Any, terminated: Any, task: Any, model: WorldModel, *, batched: bool, at_once: bool
+) -> None:
+    """Check what was given to judge by, before any dream begins.
+
+    Parameters
+    ----------
+    reward, terminated, task
+        As given.
+    model
+        Whose dreams are judged.
+    batched
+        Whether functions judge n steps at once.
+    at_once
+        Whether the model has learned all that it ever will: else what it is to have ``"learned"`` is asked for when a
+        dream begins.
 
     Raises
     ------
+    ConfigError
+        A task without functions; no function, or one of other arguments.
     QueryError
-        The model doesn't predict it.
+        The model won't learn what is to be ``"learned"``, or its scenes don't show it.
     """
-    if TASK in layout.names and any(
-        (t.type, t.property) == (_task_type(layout), prop) for t in model.targets
-    ):
-        return layout.column(layout.index(TASK), prop)
-    raise QueryError(
-        f"the model has not learned {TASK}.{prop}, it has the targets {[str(t) for t in model.targets]}: teach it in "
-        f"scenes with a bodiless object {TASK!r} that has this property, or pass the function itself"
-    )
+    _functions(task, *(("rewards", "terminations") if batched else ("reward", "terminated")))
+    for prop, given in (("reward", reward), ("terminated", terminated)):
+        if isinstance(given, str) and given == LEARNED:
+            shown = TASK in model.schema.order and prop in model.schema.type_of(TASK).properties
+            if at_once or not (shown and model.discovers):
+                _check_learned(model, prop)
+        elif given is not None and not callable(given):
+            raise ConfigError(f"{prop}={given!r}: expected a function, {LEARNED!r} or None")
+        elif given is not None:
+            _check_arguments(prop, given, batched=batched)
 
 
-def _task_type(layout: SceneLayout) -> str:
-    return layout.types[layout.index(TASK)].name
-
-
-def _has_learned(model: WorldModel, layout: SceneLayout, prop: str) -> bool:
+def _check_arguments(prop: str, judge: Any, *, batched: bool) -> None:
     try:
-        learned_column(model, layout, prop)
-    except QueryError:
+        own = inspect.signature(judge)
+    except (TypeError, ValueError):  # of something written in C nobody knows
+        return
+    try:
+        own.bind(*range(4 if batched else 3))
+    except TypeError:
+        told = (
+            "(layout, vectors before, actions, vectors after); in_batches(schema, function) makes one of a function of "
+            "scenes"
+            if batched
+            else "(scene before, action, scene after)"
+        )
+        raise ConfigError(f"{prop}: expected a function of {told}, got one of {own}") from None
+
+
+def _has_learned(model: WorldModel, prop: str) -> bool:
+    if TASK not in model.schema.order:
         return False
-    return True
+    own = model.schema.type_of(TASK).name
+    return any((t.type, t.property) == (own, prop) for t in model.targets)
 
 
-def _chosen(given: Any, own: Any, model: WorldModel, layout: SceneLayout, prop: str) -> Any:
-    """A function, the column of what was learned, or None."""
+def _check_learned(model: WorldModel, prop: str) -> None:
+    if not _has_learned(model, prop):
+        raise QueryError(
+            f"the model has not learned {TASK}.{prop}, it has the targets {[str(t) for t in model.targets]}: teach it "
+            f"in scenes with a bodiless object {TASK!r} that has this property, or pass the function itself"
+        )
+
+
+def _chosen(given: Any, own: Any, model: WorldModel, prop: str) -> Any:
+    """A function, `LEARNED`, or None."""
+    given = own if given is None else given
     if given is None:
-        given = own
-    if given is None and _has_learned(model, layout, prop):
-        given = LEARNED
-    if given == LEARNED:
-        return learned_column(model, layout, prop)
-    if given is not None and not callable(given):
-        raise ConfigError(f"{prop}={given!r}: expected a function, {LEARNED!r} or None")
+        return LEARNED if _has_learned(model, prop) else None
+    if isinstance(given, str):
+        _check_learned(model, prop)
     return given
 
 
@@ -131,13 +170,13 @@ def _doubts(task: Any) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Judges:
-    """Reward and termination of single steps: each a function, a column of the next state vector, or None.
+    """Reward and termination of single steps: each a function, `LEARNED` (the next scene tells), or None.
 
     `doubts`: NaN is no error, but says that nobody knows.
     """
 
-    reward: Judge | int | None
-    terminated: Judge | int | None
+    reward: Judge | Literal["learned"] | None
+    terminated: Judge | Literal["learned"] | None
     doubts: bool = False
 
     @classmethod
@@ -147,13 +186,18 @@ class Judges:
         terminated: Judge | Literal["learned"] | None,
         task: TaskFunctions | None,
         model: WorldModel,
-        layout: SceneLayout,
     ) -> Judges:
-        """Settle who judges: what was given, else the task, else what the model has learned, else nobody."""
+        """Settle who judges: what was given, else the task, else what the model has learned by now, else nobody.
+
+        Raises
+        ------
+        QueryError
+            The model has not learned what is to be ``"learned"``.
+        """
         own = _functions(task, "reward", "terminated")
         return cls(
-            _chosen(reward, own[0], model, layout, "reward"),
-            _chosen(terminated, own[1], model, layout, "terminated"),
+            _chosen(reward, own[0], model, "reward"),
+            _chosen(terminated, own[1], model, "terminated"),
             reward is None and _doubts(task),
         )
 
@@ -165,7 +209,7 @@ class Judges:
     def __call__(self, before: Scene, action: Any, after: Scene) -> tuple[float, bool]:
         """Reward of a step and whether it ends the episode; `ConfigError` where either is no finite number."""
         reward = _verdict("reward", self.reward, before, action, after, doubts=self.doubts)
-        return reward, _verdict("termination", self.terminated, before, action, after) > _ENDED
+        return reward, _verdict("terminated", self.terminated, before, action, after) > _ENDED
 
 
 def _overruled(reward: Any, terminated: Any) -> frozenset[tuple[str, str]]:
@@ -174,8 +218,8 @@ def _overruled(reward: Any, terminated: Any) -> frozenset[tuple[str, str]]:
 
 
 def _verdict(
-    what: str,
-    judge: Judge | int | None,
+    prop: str,
+    judge: Judge | Literal["learned"] | None,
     before: Scene,
     action: Any,
     after: Scene,
@@ -184,12 +228,13 @@ def _verdict(
 ) -> float:
     if judge is None:
         return 0.0
-    told = after.vector[judge] if isinstance(judge, int) else judge(before, action, after)
+    told = after[TASK][prop] if isinstance(judge, str) else judge(before, action, after)
     try:
         value = float(told)
     except (TypeError, ValueError):
         value = np.nan
     if not (np.isfinite(value) or (doubts and np.isnan(value))):
+        what = _WORDS[prop]
         raise ConfigError(
             f"the {what} of a dreamed step is {told!r}: expected a finite number; mend the {what} function for "
             f"before={before.values()}, action={action}, after={after.values()}"
@@ -202,8 +247,8 @@ class BatchJudges:
     """`Judges` of n steps at once."""
 
     layout: SceneLayout
-    reward: BatchJudge | int | None
-    terminated: BatchJudge | int | None
+    reward: BatchJudge | Literal["learned"] | None
+    terminated: BatchJudge | Literal["learned"] | None
     doubts: bool = False
 
     @classmethod
@@ -219,8 +264,8 @@ class BatchJudges:
         own = _functions(task, "rewards", "terminations")
         return cls(
             layout,
-            _chosen(reward, own[0], model, layout, "reward"),
-            _chosen(terminated, own[1], model, layout, "terminated"),
+            _chosen(reward, own[0], model, "reward"),
+            _chosen(terminated, own[1], model, "terminated"),
             reward is None and _doubts(task),
         )
 
@@ -238,12 +283,12 @@ class BatchJudges:
             A reward is not finite, or a function returns another shape.
         """
         rewards = self._verdicts("reward", self.reward, before, actions, after, doubts=self.doubts)
-        return rewards, self._verdicts("termination", self.terminated, before, actions, after) > _ENDED
+        return rewards, self._verdicts("terminated", self.terminated, before, actions, after) > _ENDED
 
     def _verdicts(
         self,
-        what: str,
-        judge: BatchJudge | int | None,
+        prop: str,
+        judge: BatchJudge | Literal["learned"] | None,
         before: Float2D,
         actions: Any,
         after: Float2D,
@@ -252,18 +297,19 @@ class BatchJudges:
     ) -> Float1D:
         if judge is None:
             return np.zeros(len(after))
-        if isinstance(judge, int):
-            return after[:, judge].copy()
-        told = judge(self.layout, before, actions, after)
+        if isinstance(judge, str):
+            return after[:, self.layout.column(self.layout.index(TASK), prop)].copy()
+        what = _WORDS[prop]
+        told: Any = judge(self.layout, before, actions, after)
         try:
             found = np.asarray(told, dtype=np.float64)
-        except (TypeError, ValueError):
-            found = np.empty(0)
+        except (TypeError, ValueError):  # no numbers, or not as many in each row
+            found = np.empty((0, 0))
         if found.shape != (len(after),):
+            came = f"one of shape {told.shape}" if isinstance(told, np.ndarray) else repr(told)
             raise ConfigError(
                 f"{what}: expected an array of {len(after)} numbers from a function of (layout, before, actions, "
-                f"after), got {type(told).__name__} of shape {np.shape(told)}; in_batches(schema, function) makes one "
-                "of a function of scenes"
+                f"after), got {came}; in_batches(schema, function) makes one of a function of scenes"
             )
         fine = np.isfinite(found) | np.isnan(found) if doubts else np.isfinite(found)
         if not fine.all():
@@ -296,22 +342,60 @@ def in_batches(schema: SceneSchema, judge: Judge) -> BatchJudge:
     return judged
 
 
+class Drawn:
+    """First scenes of a batch of dreams, drawn uniformly: see `drawn_from`.
+
+    Parameters
+    ----------
+    scenes
+        Scenes, or state vectors.
+    """
+
+    def __init__(self, scenes: Sequence[Scene] | Float2D) -> None:
+        given: Any = scenes
+        if not isinstance(given, np.ndarray) and not (
+            isinstance(given, Sequence) and all(isinstance(scene, Scene) for scene in given)
+        ):
+            raise ConfigError(
+                f"expected scenes, or an array of state vectors, got {given!r}; take env.scene, or "
+                "schema.scene(observation)"
+            )
+        if not len(scenes) or (isinstance(scenes, np.ndarray) and scenes.ndim != 2):
+            came = f"an array of shape {scenes.shape}" if isinstance(scenes, np.ndarray) else "none"
+            raise ConfigError(f"expected some scenes with the same objects, got {came}")
+        self._scenes = scenes
+        self._vectors: Float2D | None = None
+        if isinstance(scenes, np.ndarray):
+            self._vectors = scenes.astype(np.float64)
+        elif len({scene.layout for scene in scenes}) == 1:
+            self._vectors = np.array([scene.vector for scene in scenes])
+
+    def fit(self, vector_of: Callable[[Scene], Float1D]) -> Drawn:
+        """The same with state vectors as a world's dreams have them."""
+        if isinstance(self._scenes, np.ndarray):
+            return self
+        return Drawn(np.array([vector_of(scene) for scene in self._scenes]))
+
+    def __call__(self, rng: np.random.Generator, count: int) -> Float2D:
+        """State vectors of so many first scenes."""
+        if self._vectors is None:
+            raise ConfigError("the scenes hold different objects, or the same ones in another order")
+        drawn: Float2D = self._vectors[rng.integers(len(self._vectors), size=count)]
+        return drawn
+
+
 def drawn_from(scenes: Sequence[Scene] | Float2D) -> BatchStart:
     """First scenes for `LearnedModelVectorEnv`, drawn uniformly from scenes with the same objects.
 
     Parameters
     ----------
     scenes
-        Scenes without an action, or their state vectors, shape ``(m, layout.width)``.
+        Scenes, with their objects in any order; or state vectors without an action, as the dreams have them: shape
+        ``(m, layout.width)``, the columns of ``vectors``.
+
+    Raises
+    ------
+    ConfigError
+        Something else, or none. Scenes with other objects are refused by the env: `ObservationError`.
     """
-    vectors = scenes if isinstance(scenes, np.ndarray) else np.array([scene.vector for scene in scenes])
-    if vectors.ndim != 2 or not len(vectors):
-        raise ConfigError(
-            f"expected some scenes with the same objects, got an array of shape {vectors.shape}"
-        )
-
-    def start(rng: np.random.Generator, count: int) -> Float2D:
-        drawn: Float2D = vectors[rng.integers(len(vectors), size=count)]
-        return drawn
-
-    return start
+    return Drawn(scenes)

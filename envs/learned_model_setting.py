@@ -19,7 +19,7 @@ from relgym.envs.flat import FlatSpec
 from relgym.envs.learned_model_judges import TaskFunctions
 from relgym.envs.learned_model_shown import BoxesShown, Shown, ViewShown, checked_boxes, is_plain
 from relgym.envs.model_files import EnvRecord, copied, schema_like, world_like
-from relgym.envs.views import View, view_from_json
+from relgym.envs.views import REWARD, TERMINATED, TaskView, View, view_from_json
 from relgym.errors import ConfigError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
@@ -83,24 +83,25 @@ class Setting:
         """
         if like is not None and not isinstance(like, (gym.Env, Scene)):
             raise ConfigError(f"like={like!r}: expected an env (gym.make makes one of an id) or a Scene")
-        if not isinstance(model, WorldModel):
-            model = WorldModel.load(model)
-        elif snapshot:
-            model = copy.deepcopy(model)
+        if view is not None and not isinstance(view, View):
+            raise ConfigError(
+                f"view={view!r}: expected a view (relgym.envs.views), such as env.view of a ModelLearner"
+            )
+        model = _model(model, snapshot=snapshot)
         if model.frozen or snapshot:
             check_knowledge(model)
-        scenic = isinstance(like, gym.Env) and hasattr(like.unwrapped, "schema")
+        scenic = isinstance(like, gym.Env) and _schema_of(like) is not None
         if view is None and not scenic and "view" in model.extra:
             view = view_from_json(model.extra["view"])
         if view is not None and not is_plain(view):
-            return cls._viewed(model, like, view)
+            return cls._viewed(model, like, _told(view, model.schema))
         world: gym.Env[Any, Any] | None = None
         if isinstance(like, Scene):
             schema = schema_like(_present(like), model.schema, "like=scene")
             record = _of_scene(like, model, schema)
         elif like is not None:
             world = world_like(like, model.schema)
-            schema = schema_like(getattr(world, "schema", None), model.schema, f"like={like}")
+            schema = schema_like(_schema_of(world), model.schema, f"like={like}")
             record = EnvRecord(world.observation_space, world.action_space, metadata=_metadata(world))
         else:
             schema, record = model.schema, recorded(model)
@@ -120,15 +121,8 @@ class Setting:
         if like is None:
             record = recorded(model)
         else:
-            world = copied(like)
+            world = copied(_seen_through(like, recorded(model)) if model.extra else like)
             record = EnvRecord(world.observation_space, world.action_space, metadata=_metadata(world))
-            known = recorded(model) if model.extra else record
-            for what in ("observation_space", "action_space"):
-                if getattr(record, what) != getattr(known, what):
-                    raise ConfigError(
-                        f"like={like}: expected the {what} of the env that the model was learned in, "
-                        f"{getattr(known, what)}, got {getattr(record, what)}; make it with the same arguments"
-                    )
         shown = ViewShown(view, record.observation_space, record.action_space)
         return cls._made(model, view.schema, record, shown, view, world)
 
@@ -149,6 +143,11 @@ class Setting:
         return cls(model, schema, *spaces_of, shown, view, world, record.starts, fps)
 
     @property
+    def scenic(self) -> bool:
+        """Whether observations are scenes."""
+        return isinstance(self.shown, BoxesShown)
+
+    @property
     def layout(self) -> SceneLayout:
         """Layout of the scenes of a batch: what is shown, and the `task` object if there is one; no action."""
         return self.shown.layout
@@ -163,8 +162,10 @@ class Setting:
 
     @property
     def task(self) -> TaskFunctions | None:
-        """What the real env asks of its agents, if it says so."""
-        return None if self.world is None else getattr(self.world, "task", None)
+        """What the real env asks of its agents, if it says so: an attribute ``task`` with functions of steps."""
+        task = None if self.world is None else getattr(self.world.unwrapped, "task", None)
+        told = all(callable(getattr(task, name, None)) for name in ("reward", "terminated"))
+        return task if told else None  # an attribute of that name may be anything
 
     @cached_property
     def brought(self) -> NDArray[np.intp]:
@@ -262,6 +263,45 @@ def recorded(model: WorldModel) -> EnvRecord:
             "the model holds no spaces: pass like=env, or learn it with a ModelLearner around an env"
         )
     return EnvRecord.from_json(model.extra, model.schema)
+
+
+def _model(given: Any, *, snapshot: bool) -> WorldModel:
+    """The model, a copy of it, or the one in a file."""
+    if isinstance(given, WorldModel):
+        return copy.deepcopy(given) if snapshot else given
+    if not isinstance(given, (str, os.PathLike)):
+        raise ConfigError(
+            f"model={given!r}: expected a WorldModel or the path of its file; a ModelLearner's is env.model"
+        )
+    return WorldModel.load(given)
+
+
+def _schema_of(env: gym.Env[Any, Any]) -> SceneSchema | None:
+    """The schema of an env whose observations are scenes."""
+    schema = getattr(env.unwrapped, "schema", None)
+    return schema if isinstance(schema, SceneSchema) else None
+
+
+def _told(view: View, schema: SceneSchema) -> View:
+    """The view, with what a step brings in it where the model has learned that."""
+    if TASK not in schema.order or TASK in view.schema.order:
+        return view
+    told = schema.type_of(TASK).properties
+    return TaskView(view, reward=REWARD in told, terminated=TERMINATED in told)
+
+
+def _seen_through(like: gym.Env[Any, Any], known: EnvRecord) -> gym.Env[Any, Any]:
+    """The outermost of an env's wrappers, or the env itself, that has the spaces that the model was learned in."""
+    layer = like
+    while (layer.observation_space, layer.action_space) != (known.observation_space, known.action_space):
+        if not isinstance(layer, gym.Wrapper):
+            raise ConfigError(
+                f"like={like}: expected the spaces of the env that the model was learned in, "
+                f"{known.observation_space} and {known.action_space}, got {like.observation_space} and "
+                f"{like.action_space}; make it with the same arguments"
+            )
+        layer = layer.env
+    return layer
 
 
 def _present(scene: Scene) -> SceneSchema:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from relgym.envs.actions import BatchActions, acting
 from relgym.envs.arguments import checked_actions
 from relgym.envs.views import SceneView, TaskView, View
-from relgym.errors import ConfigError
+from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
 
-__all__ = ["BoxesShown", "Deeds", "Shown", "ViewShown", "checked_boxes", "is_plain"]
+__all__ = ["BoxesShown", "Deeds", "Shown", "ViewShown", "checked_boxes", "is_plain", "shown_at_once"]
 
 
 class Deeds(Protocol):
@@ -81,6 +81,16 @@ def is_plain(view: View) -> bool:
     return isinstance(view.view if isinstance(view, TaskView) else view, SceneView)
 
 
+def shown_at_once(view: View, layout: SceneLayout, vectors: Float2D) -> tuple[Any, NDArray[np.bool_]] | None:
+    """Observations of n scenes, and which lie in the observation space; None where a view shows them one by one."""
+    inner = view.view if isinstance(view, TaskView) else view
+    if (found := getattr(inner, "observations", None)) is None:
+        return None
+    bare = inner.schema.layout(name for name in layout.names if name != TASK)
+    seen, inside = found(bare, vectors[:, : bare.width])  # `task` stands last
+    return seen, np.asarray(inside)
+
+
 class BoxesShown:
     """Scenes as they are: ``Dict``, object name -> ``Box``; no loop over scenes anywhere.
 
@@ -109,8 +119,12 @@ class BoxesShown:
             (name, self.layout.slice(i), seen[name].dtype) for i, name in enumerate(names) if name in seen
         ]
         self._low, self._high = np.full(self.layout.width, -np.inf), np.full(self.layout.width, np.inf)
-        for name, cut, _ in self._cuts:
-            self._low[cut], self._high[cut] = seen[name].low, seen[name].high
+        for name, cut, dtype in self._cuts:
+            # What is infinite, or would be in the space's dtype, has left a space without bounds, too.
+            most = float(np.finfo(dtype.name).max) if dtype.kind == "f" else np.inf
+            self._low[cut] = np.maximum(seen[name].low, -most)
+            self._high[cut] = np.minimum(seen[name].high, most)
+        self._whole = {name for name, _, dtype in self._cuts if dtype.kind in "iub"}
 
     def acting(self, scene: Scene, action: Any) -> Scene:
         """The scene with a checked action in it."""
@@ -126,7 +140,9 @@ class BoxesShown:
 
     def observations(self, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
         """Property vectors by object, of one state vector or of n."""
-        return {name: vectors[..., cut].astype(dtype) for name, cut, dtype in self._cuts}
+        found = {name: vectors[..., cut] for name, cut, _ in self._cuts}
+        found |= {name: np.rint(found[name]) for name in self._whole}
+        return {name: found[name].astype(dtype) for name, _, dtype in self._cuts}
 
     def inside(self, vectors: Float2D) -> NDArray[np.bool_]:
         """Which of n scenes lie in the observation space, shape ``(n,)``."""
@@ -145,7 +161,9 @@ class BoxesShown:
 
 
 class ViewShown:
-    """Scenes through a view (`relgym.envs.views`): whatever the env's observations are; one scene at a time.
+    """Scenes through a view (`relgym.envs.views`): whatever the env's observations are.
+
+    One scene at a time, but for views that offer more (`View`): those of numbers.
 
     Parameters
     ----------
@@ -176,17 +194,24 @@ class ViewShown:
 
     def observations(self, vectors: Float2D) -> Any:
         """Observations of n scenes, batched as Gymnasium batches them."""
+        if (found := shown_at_once(self._view, self.layout, vectors)) is not None:
+            return found[0]
         seen = [self.observation(self._scene(vector)) for vector in vectors]
         empty: Any = create_empty_array(self._space, len(seen))
         return concatenate(self._space, seen, empty)
 
     def inside(self, vectors: Float2D) -> NDArray[np.bool_]:
         """Which of n scenes lie in the observation space, shape ``(n,)``."""
+        if (found := shown_at_once(self._view, self.layout, vectors)) is not None:
+            return found[1]
         return np.array([not self.outside(self._scene(vector)) for vector in vectors], dtype=np.bool_)
 
     def outside(self, scene: Scene) -> str:
         """The observation, if it lies outside the observation space."""
-        observation = self.observation(scene)
+        try:
+            observation = self.observation(scene)
+        except ObservationError as error:  # numbers that the space's dtype can't hold
+            return str(error)
         if self._space.contains(observation):
             return ""
         return f"the observation {observation} left the observation space {self._space}"
@@ -196,7 +221,7 @@ class ViewShown:
 
 
 class ViewDeeds:
-    """`Deeds` through a view: each distinct action is asked for once.
+    """`Deeds` through a view: of all actions at once where it can tell (`View`), else each distinct one once.
 
     Parameters
     ----------
@@ -225,13 +250,8 @@ class ViewDeeds:
         """State vectors with the actions in them, shape ``(n, layout.width)``."""
         if self.layout is self._bare:
             return vectors
-        distinct, which = np.unique(
-            np.asarray(actions).reshape(len(vectors), -1), axis=0, return_inverse=True
-        )
-        shape = np.shape(actions)[1:]
-        done = np.array([self._values(action.reshape(shape)) for action in distinct])
         both = np.empty((len(vectors), self.layout.width))
-        both[:, self._own], both[:, self._rest] = done[which.reshape(-1)], vectors
+        both[:, self._own], both[:, self._rest] = self._all_values(actions, len(vectors)), vectors
         return both
 
     def parted(self, vectors: Float2D) -> Float2D:
@@ -245,6 +265,16 @@ class ViewDeeds:
     @cached_property
     def _rest(self) -> NDArray[np.intp]:
         return np.delete(np.arange(self.layout.width), self._own)
+
+    def _all_values(self, actions: Any, count: int) -> Float2D:
+        """Properties of the action object for n actions."""
+        view = self._view.view if isinstance(self._view, TaskView) else self._view
+        if (at_once := getattr(view, "action_values", None)) is not None:
+            return np.asarray(at_once(actions), dtype=np.float64)
+        distinct, which = np.unique(np.asarray(actions).reshape(count, -1), axis=0, return_inverse=True)
+        done = np.array([self._values(action.reshape(np.shape(actions)[1:])) for action in distinct])
+        found: Float2D = done[which.reshape(-1)]
+        return found
 
     def _values(self, action: Any) -> Float1D:
         """Properties of the action object; they don't depend on the scene."""

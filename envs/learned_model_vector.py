@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
@@ -13,16 +14,31 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from relgym.envs.arguments import check_options, checked_count, checked_least, checked_mask
+from relgym.envs.arguments import (
+    check_options,
+    checked_count,
+    checked_function,
+    checked_least,
+    checked_mask,
+    checked_options,
+)
 from relgym.envs.learned_model_batch import DreamStep, Stepped
 from relgym.envs.learned_model_infos import masked, told_of
-from relgym.envs.learned_model_judges import BatchJudge, BatchJudges, BatchStart, TaskFunctions, marked
+from relgym.envs.learned_model_judges import (
+    BatchJudge,
+    BatchJudges,
+    BatchStart,
+    Drawn,
+    TaskFunctions,
+    check_judges,
+    marked,
+)
 from relgym.envs.learned_model_setting import Setting, check_knowledge
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Float1D, Float2D, Scene
+from relgym.scene.objects import Float1D, Float2D, Scene, SceneSchema
 
 __all__ = ["LearnedModelVectorEnv"]
 
@@ -32,6 +48,8 @@ _Rows: TypeAlias = NDArray[np.intp]
 
 class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     """`LearnedModelEnv`, many scenes at once: no loop over scenes, the same bits as single dreams.
+
+    But for what a view shows one by one: all but those of scenes and of numbers (`relgym.envs.views.View`).
 
     Description
     -----------
@@ -118,7 +136,9 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._mode = _checked_mode(autoreset_mode)
         self._setting = place = Setting.of(model, like, view, snapshot=snapshot)
         self.num_envs = checked_count("num_envs", num_envs, 1, 10**7)
-        self.model, self.schema, self.render_mode = place.model, place.schema, render_mode
+        self.model, self.render_mode = place.model, render_mode
+        if place.scenic:  # else the dreams have none, as the real env
+            self.schema = place.schema
         self.flat_spec = place.flat_spec
         self.single_observation_space, self.single_action_space = place.observation_space, place.action_space
         self.observation_space = batch_space(place.observation_space, self.num_envs)
@@ -129,21 +149,27 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             "autoreset_mode": self._mode,
         }
         self.task = place.task if task is None else task
+        check_judges(reward, terminated, self.task, place.model, batched=True, at_once=snapshot)
+        self._given = reward, terminated
         self._step = DreamStep(
             place,
-            BatchJudges.of(reward, terminated, self.task, place.model, place.layout),
+            BatchJudges(place.layout, None, None),  # settled when dreams begin
             self.task,
             place.shown.deeds(),
             _shorter(horizon, max_episode_steps),
             checked_least("min_margin", min_margin, 0.0),
         )
-        self._start = start
+        start = checked_function("start", start)
+        self._start = start.fit(place.fitted_vector) if isinstance(start, Drawn) else start
         self._vectors: Float2D | None = None
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._over = np.zeros(self.num_envs, dtype=np.bool_)
         self._viewer: Any = None
         self._cameras: dict[int, Any] = {}
         self.prediction: BatchPrediction | None = None
+
+    schema: SceneSchema
+    """Of the scenes; only where observations are scenes."""
 
     # ------------------------------------------------------------------ the Gymnasium contract
     def reset(
@@ -164,7 +190,8 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         """
         super().reset(seed=seed)
         check_knowledge(self.model)
-        rest = dict(options or {})
+        judges = BatchJudges.of(*self._given, self.task, self.model, self._setting.layout)
+        rest = dict(checked_options(options))
         mask = checked_mask(rest.pop("reset_mask", None), self.num_envs)
         if self._vectors is None and not mask.all():
             raise ResetNeeded("the dreams have not begun: call reset() without a mask first")
@@ -173,6 +200,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if self._vectors is None:
             self._vectors = np.empty((self.num_envs, self._setting.layout.width))
         self._begin(rows, first)
+        self._step = replace(self._step, judges=judges)
         return self._setting.shown.observations(self._vectors), {}
 
     def step(self, actions: Any) -> tuple[Any, Float1D, _Bools, _Bools, dict[str, Any]]:
@@ -195,18 +223,24 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             )
         taken = self._step.actions.checked(actions, self.num_envs)
         rows, anew = np.flatnonzero(~pending), np.flatnonzero(pending)
-        first = self._first(anew, None, {}) if len(anew) else None
         rewards, infos = np.zeros(self.num_envs), {}
         ended, cut = (np.zeros(self.num_envs, dtype=np.bool_) for _ in range(2))
-        if len(rows):
-            stepped = self._advance(rows, taken[rows])
+        stepped = self._stepped(rows, taken[rows]) if len(rows) else None
+        if stepped is not None:
             rewards[rows], ended[rows], cut[rows] = stepped.rewards, stepped.terminated, stepped.truncated
             infos = told_of(self._step, stepped, rows, self.num_envs)
+        over = ended | cut
+        same = self._mode is AutoresetMode.SAME_STEP and bool(over.any())
+        begun = np.flatnonzero(over) if same else anew
+        first = self._first(begun, None, {}) if len(begun) else None
+        # Nothing can fail from here on; whatever did has left the dreams where they were.
+        if stepped is not None:
+            self._follow(rows, stepped)
+        if same:
+            infos = self._ended(infos, over)
+        self._over = over
         if first is not None:
-            self._begin(anew, first)
-        self._over = ended | cut
-        if self._mode is AutoresetMode.SAME_STEP and self._over.any():
-            infos = self._restarted(infos)
+            self._begin(begun, first)
         return self._setting.shown.observations(self.vectors), rewards, ended, cut, infos
 
     def render(self) -> tuple[Any, ...]:
@@ -245,7 +279,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         return tuple(self._scene(vector) for vector in self.vectors)
 
     def _scene(self, vector: Float1D) -> Scene:
-        return Scene(self.schema, self._setting.layout, vector.copy())
+        return Scene(self._setting.schema, self._setting.layout, vector.copy())
 
     # ------------------------------------------------------------------ beginning
     def _first(self, rows: _Rows, seed: int | None, options: Mapping[str, Any]) -> Float2D:
@@ -268,6 +302,10 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     def _checked_first(self, given: Any, count: int, what: str) -> Float2D:
         place = self._setting
         if not isinstance(given, np.ndarray):
+            if not isinstance(given, Iterable):
+                raise ObservationError(
+                    f"{what}: expected {count} first scenes, or an array of their state vectors, got {given!r}"
+                )
             given = np.array([place.fitted_vector(scene) for scene in given])
         if given.shape != (count, place.layout.width):
             raise ObservationError(
@@ -292,21 +330,22 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._over[rows] = False
 
     # ------------------------------------------------------------------ stepping
-    def _advance(self, rows: _Rows, actions: Any) -> Stepped:
-        """Step some of the dreams; nothing has changed if it raises."""
+    def _stepped(self, rows: _Rows, actions: Any) -> Stepped:
+        """A step of some of the dreams, which stay where they are."""
         assert self._vectors is not None, "checked by the caller"
-        steps = self._steps[rows] + 1
-        stepped = self._step(self._vectors[rows], steps, actions)
-        self._vectors[rows], self._steps[rows] = stepped.vectors, steps
-        self.prediction = stepped.prediction
-        return stepped
+        return self._step(self._vectors[rows], self._steps[rows] + 1, actions)
 
-    def _restarted(self, infos: dict[str, Any]) -> dict[str, Any]:
-        """Begin anew what is over, in the same step; its last observations and infos move to ``final_…``."""
-        over = self._over.copy()  # beginning anew clears it
-        rows = np.flatnonzero(over)
+    def _follow(self, rows: _Rows, stepped: Stepped) -> None:
+        """Go on to where a step has led."""
+        assert self._vectors is not None, "checked by the caller"
+        self._vectors[rows] = stepped.vectors
+        self._steps[rows] += 1
+        self.prediction = stepped.prediction
+
+    def _ended(self, infos: dict[str, Any], over: _Bools) -> dict[str, Any]:
+        """Infos in which last observations and infos of what is over stand under ``final_…``."""
         final = np.full(self.num_envs, None, dtype=object)
-        for k in rows.tolist():
+        for k in np.flatnonzero(over).tolist():
             final[k] = self._setting.shown.observation(self._scene(self.vectors[k]))
         told = {
             "final_obs": final,
@@ -314,7 +353,6 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             "final_info": masked(infos, over),
             "_final_info": over.copy(),
         }
-        self._begin(rows, self._first(rows, None, {}))
         return told | masked(infos, ~over)
 
 

@@ -83,7 +83,8 @@ def world_like(like: gym.Env[Any, Any], schema: SceneSchema) -> gym.Env[Any, Any
         The model can't speak of its scenes (`schema_like`), or it can't be copied.
     """
     inner = like.unwrapped
-    schema_like(getattr(inner, "schema", None), schema, f"like={like}")
+    own = getattr(inner, "schema", None)
+    schema_like(own if isinstance(own, SceneSchema) else None, schema, f"like={like}")
     return copied(inner)
 
 

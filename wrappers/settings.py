@@ -23,12 +23,13 @@ def target_of(given: PlainTarget) -> Target:
     """The target that is meant; `ConfigError` where none is."""
     if isinstance(given, Target):
         return given
-    if not isinstance(given, str):
+    if isinstance(given, str):
+        type_name, dot, prop = given.rpartition(".")  # type names may hold dots
+        if dot and type_name and prop:
+            return Target(type_name, prop)
+    elif isinstance(given, (tuple, list)) and len(given) in (2, 3):
         return target_from_json([*given, []] if len(given) == 2 else list(given))
-    type_name, dot, prop = given.rpartition(".")  # type names may hold dots
-    if not (dot and type_name and prop):
-        raise ConfigError(f"target {given!r}: expected 'ball.vx', ('ball', 'vx') or a Target")
-    return Target(type_name, prop)
+    raise ConfigError(f"target {given!r}: expected 'ball.vx', ('ball', 'vx') or a Target")
 
 
 def config_of(given: ModelConfig | Mapping[str, Any]) -> ModelConfig:

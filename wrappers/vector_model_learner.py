@@ -189,7 +189,7 @@ def _autoreset_mode(env: gym.vector.VectorEnv[Any, Any, Any]) -> AutoresetMode:
 
 
 def _schema(env: gym.vector.VectorEnv[Any, Any, Any]) -> Any:
-    """The envs' schema, if they have one."""
+    """The envs' schema, if they have one, or whatever they call so."""
     inner: Any = env.unwrapped
     if hasattr(inner, "schema"):
         return inner.schema

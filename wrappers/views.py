@@ -14,6 +14,7 @@ from relgym.envs.arguments import checked_action
 from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
+from relgym.scene.objects import SceneSchema
 
 __all__ = [
     "SceneView",
@@ -53,6 +54,8 @@ def view_of(
     ConfigError
         Images, tables and nested spaces, with what to do instead; or wrappers changed the spaces of a SceneEnv.
     """
+    if not isinstance(env, gym.Env):
+        raise ConfigError(f"expected an env, got {env!r}: gym.make makes one of an id")
     schema = env.get_wrapper_attr("schema") if env.has_wrapper_attr("schema") else None
     return chosen_view(
         given, env.observation_space, env.action_space, schema=schema, reward=reward, terminated=terminated
@@ -88,7 +91,7 @@ def chosen_view(
     """
     view: Any
     if given is None:
-        if schema is None:
+        if not isinstance(schema, SceneSchema):  # an attribute of that name may be anything
             view = NumbersView(observation_space, action_space)
         else:
             view = SceneView(schema, observation_space, action_space)

@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from relgym.errors import ObservationError
 from relgym.scene.objects import Scene, SceneSchema
 
-__all__ = ["View", "precision_of"]
+__all__ = ["View", "as_shown", "cast_to", "precision_of"]
 
 
 @runtime_checkable
@@ -17,6 +19,11 @@ class View(Protocol):
     """What a learner, and a dream, must know of an env: how to see objects in it.
 
     A view keeps no state: what a scene depends on is passed in. One view serves any number of envs.
+
+    Two more methods are optional, and make many dreams at once faster: ``observations(layout, vectors)``, the
+    observations of n scenes, batched as Gymnasium batches them, and which of them lie in the observation space; and
+    ``action_values(actions)``, the properties of the action object for n actions, shape ``(n, k)``. Both give the same
+    bits as one by one.
 
     Attributes
     ----------
@@ -73,12 +80,47 @@ class View(Protocol):
         ...
 
     def observation(self, scene: Scene) -> Any:
-        """The observation that shows a scene: the inverse of `scene` (`ConfigError` where there is none)."""
+        """The observation that shows a scene: the inverse of `scene` (`ConfigError` where there is none).
+
+        Raises
+        ------
+        ObservationError
+            Its dtype can't hold a number of the scene; views of the user's own may do otherwise.
+        """
         ...
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `relgym.envs.views.view_from_json` reads back."""
         ...
+
+
+def as_shown(numbers: NDArray[np.float64], dtype: Any) -> NDArray[Any]:
+    """Numbers in the dtype of a space: to the nearest whole one where it has only those.
+
+    Raises
+    ------
+    ObservationError
+        A number that the dtype can't hold, and that would come out as another one.
+    """
+    found, fits = cast_to(numbers, dtype)
+    if not fits.all():
+        raise ObservationError(f"the observation {numbers} left what {np.dtype(dtype).name} can hold")
+    return found
+
+
+def cast_to(numbers: NDArray[np.float64], dtype: Any) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Numbers in another dtype, to the nearest whole one where it has only those, and which of them it can hold.
+
+    Those that it can't (NaN too) come out as 0.
+    """
+    kind = np.dtype(dtype)
+    whole = kind.kind in "iub"
+    rounded = np.rint(numbers) if whole else np.asarray(numbers)
+    limits: Any = np.iinfo(kind) if kind.kind in "iu" else np.finfo(kind) if kind.kind == "f" else None
+    low, high = (0, 1) if limits is None else (limits.min, limits.max)
+    # Of int64 the greatest number is none of float64; the one after it is.
+    fits = (low <= rounded) & ((rounded < high + 1) if whole else (rounded <= high))
+    return (rounded if fits.all() else np.where(fits, rounded, 0.0)).astype(kind), fits
 
 
 def precision_of(*single: bool) -> float:

@@ -10,9 +10,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
+from relgym.envs.views.base import as_shown, cast_to
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import Float1D
+from relgym.scene.objects import Float1D, Float2D
 
 __all__ = ["Leaf", "Numbers"]
 
@@ -64,13 +66,16 @@ class Leaf:
         return array.ravel()
 
     def write(self, numbers: Float1D) -> Any:
-        """The inverse of `read`: whole numbers where the space has them."""
-        if isinstance(self.space, spaces.Discrete):
-            return np.int64(round(float(numbers[0])))
-        dtype = self.space.dtype
-        whole = dtype is not None and np.issubdtype(dtype, np.integer)
-        array = np.rint(numbers) if whole else np.asarray(numbers)
-        return array.astype(dtype).reshape(self.space.shape or ())
+        """The inverse of `read`: whole numbers where the space has them; `ObservationError` where they don't fit."""
+        shown = as_shown(numbers, self.space.dtype)
+        return shown[0] if isinstance(self.space, spaces.Discrete) else shown.reshape(self.space.shape or ())
+
+    def write_all(self, numbers: Float2D) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """`write` of n observations, and which of them lie in the space."""
+        low, high = self.bounds
+        shown, fits = cast_to(numbers, self.space.dtype)
+        inside = np.asarray((fits & (low <= shown) & (shown <= high)).all(axis=1))
+        return shown.reshape(len(shown), *(self.space.shape or ())), inside
 
     def _place(self) -> str:
         return "" if self.key is None else f"observation[{self.key!r}]: "
@@ -93,6 +98,10 @@ class Numbers:
     def __init__(self, space: spaces.Space[Any]) -> None:
         self.space = space
         self.leaves = tuple(Leaf(key, _flat(part, key)) for key, part in _parts(space))
+        if not self.leaves:
+            raise ConfigError(
+                f"the observation space {space} has no parts: expected some numbers to learn of"
+            )
         ends = np.cumsum([0, *(leaf.size for leaf in self.leaves)]).tolist()
         self.slices = tuple(slice(a, b) for a, b in pairwise(ends))
         self.width = int(ends[-1])
@@ -130,6 +139,15 @@ class Numbers:
         if isinstance(self.space, spaces.Dict):
             return {leaf.key: part for leaf, part in zip(self.leaves, parts, strict=True)}
         return tuple(parts) if isinstance(self.space, spaces.Tuple) else parts[0]
+
+    def write_all(self, numbers: Float2D) -> tuple[Any, NDArray[np.bool_]]:
+        """`write` of n observations, batched as Gymnasium batches them, and which of them lie in the space."""
+        parts = [leaf.write_all(numbers[:, cut]) for leaf, cut in zip(self.leaves, self.slices, strict=True)]
+        inside = np.logical_and.reduce([fine for _, fine in parts])
+        shown = [part for part, _ in parts]
+        if isinstance(self.space, spaces.Dict):
+            return {leaf.key: part for leaf, part in zip(self.leaves, shown, strict=True)}, inside
+        return (tuple(shown) if isinstance(self.space, spaces.Tuple) else shown[0]), inside
 
     def _check_keys(self, observation: Any) -> None:
         keys = {leaf.key for leaf in self.leaves}

@@ -17,7 +17,7 @@ from relgym.envs.views.base import precision_of
 from relgym.envs.views.leaves import Numbers
 from relgym.envs.views.records import Angle, Part, Static, identifiers
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import Float1D, Scene
+from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
 
 __all__ = ["NumbersView"]
 
@@ -198,6 +198,23 @@ class NumbersView:
         for (i, j), angle in zip(self._how.pairs, sources[width:], strict=False):
             numbers[i], numbers[j] = np.cos(angle), np.sin(angle)
         return self._numbers.write(numbers)
+
+    def observations(self, layout: SceneLayout, vectors: Float2D) -> tuple[Any, NDArray[np.bool_]]:
+        """`observation` of n scenes, batched, and which lie in the observation space: see `View`."""
+        how, width = self._how, self._numbers.width
+        columns = np.concatenate(
+            [np.arange(layout.width)[layout.slice(layout.index(name))] for name in how.layout.names]
+        )
+        sources = np.zeros((len(vectors), width + len(how.pairs) + len(how.constants)))
+        sources[:, how.gather] = vectors[:, columns]
+        for k, (i, j) in enumerate(how.pairs):
+            angle = sources[:, width + k]
+            sources[:, i], sources[:, j] = np.cos(angle), np.sin(angle)
+        return self._numbers.write_all(sources[:, :width])
+
+    def action_values(self, actions: Any) -> Float2D:
+        """Properties of the action object for n actions: see `View`."""
+        return self._acts.values_batch(actions)
 
     def _sources(self, scene: Scene) -> Float1D:
         """Numbers, angles and constants of a scene: what its vector was gathered from."""

@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from relgym.envs.actions import acting, check_action_space
 from relgym.envs.spaces_json import space_from_json, space_to_json
-from relgym.envs.views.base import precision_of
+from relgym.envs.views.base import as_shown, precision_of
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.storage import schema_from_json, schema_to_json
 from relgym.scene.objects import ACTION, Scene, SceneSchema
@@ -90,7 +90,7 @@ class SceneView:
 
     def observation(self, scene: Scene) -> dict[str, Any]:
         """Property vectors by object name, in the dtypes of the observation space."""
-        return {o.name: o.values.astype(self._boxes[o.name].dtype) for o in scene if o.name in self._boxes}
+        return {o.name: as_shown(o.values, self._boxes[o.name].dtype) for o in scene if o.name in self._boxes}
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
-from relgym.envs.views.base import precision_of
+from relgym.envs.views.base import as_shown, precision_of
 from relgym.envs.views.matching import matched
 from relgym.envs.views.records import Rows, Static, identifiers, merged
 from relgym.errors import ConfigError, ObservationError
@@ -228,6 +228,10 @@ class TableView:
         """The scene with the action's properties: see `Acts`."""
         return self._acts.acting(scene, action)
 
+    def action_values(self, actions: Any) -> Float2D:
+        """Properties of the action object for n actions: see `View`."""
+        return self._acts.values_batch(actions)
+
     def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
         """The scene as it is: this view learns of the state alone (`TaskView` of more)."""
         return scene
@@ -238,7 +242,7 @@ class TableView:
         Raises
         ------
         ObservationError
-            More objects of a kind than rows.
+            More objects of a kind than rows, or a number that the table's dtype can't hold.
         """
         table = np.zeros(self._space.shape)
         at = 0
@@ -252,7 +256,7 @@ class TableView:
                 if self._here is not None:
                     table[row, self._here] = 1.0
             at += part.count
-        return table.astype(self._space.dtype)
+        return as_shown(table, self._space.dtype)
 
     # ------------------------------------------------------------------ files
     def to_json(self) -> dict[str, Any]:

@@ -57,13 +57,23 @@ def write_model(
         Plain data.
     arrays
         History to keep beside it (then the file is a zip), or None.
+
+    Raises
+    ------
+    ModelFileError
+        There is no such folder, or nothing may be written there.
     """
     text = _canonical({"format": FORMAT, "version": VERSION, "sha256": _digest(body), "body": body})
     data = text.encode()
     if arrays is not None:
         data = _zipped(data, arrays)
     target = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    except OSError as error:
+        raise ModelFileError(
+            f"{path} can't be written ({error.strerror}): expected a path in a folder that may be written to"
+        ) from error
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
@@ -82,9 +92,14 @@ def read_model(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, 
     Raises
     ------
     ModelFileError
-        The file isn't a relgym model, is of another version, truncated, or was edited.
+        There is no such file, it isn't a relgym model, is of another version, truncated, or was edited.
     """
-    data = Path(path).read_bytes()
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise ModelFileError(
+            f"{path} can't be read ({error.strerror}): expected a file that a model's save has written"
+        ) from error
     arrays: dict[str, NDArray[Any]] | None = None
     if data[:2] == b"PK":
         data, arrays = _unzipped(path, data)

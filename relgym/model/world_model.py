@@ -95,6 +95,11 @@ class WorldModel:
         return self._parts.targets
 
     @property
+    def discovers(self) -> bool:
+        """Whether it may find more targets as it learns: none were named, and it isn't frozen."""
+        return self._parts.open and not self.frozen
+
+    @property
     def history(self) -> int:
         """Number of examples remembered of the type that has most; see `ModelConfig.history`."""
         return max((len(table) for table in self._parts.tables.values()), default=0)

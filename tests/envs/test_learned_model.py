@@ -26,17 +26,18 @@ from dreams import (
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
-from plain_envs import Drifter
+from plain_envs import Drifter, Visited
 from worlds import ROOM_TARGETS, room, scene, schema_of
 
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
+from relgym.envs.learned_model_shown import BoxesShown
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.spaces_json import space_from_json, space_to_json
-from relgym.envs.views import NumbersView
+from relgym.envs.views import NumbersView, Rows, TableView, TaskView
 from relgym.errors import ActionError, ConfigError, ModelFileError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Target
-from relgym.wrappers import ModelLearner
+from relgym.wrappers import ModelLearner, VectorModelLearner
 
 ID = "relgym/LearnedModel-v0"
 PUSH = np.array([1.0], np.float32)
@@ -336,10 +337,17 @@ def test_a_dream_shows_what_the_real_env_shows(tmp_path: Path) -> None:
         assert reward == pytest.approx(gained, abs=1e-9)
 
 
+def visited_view(seen: spaces.Space, acting: spaces.Space) -> TableView:
+    rows = (Rows("box"), Rows("visitor"))
+    return TableView(seen, acting, columns=("here", "x"), rows=rows, presence="here")
+
+
+def flat_scene(x: float, v: float) -> Scene:
+    return flat_model().schema.scene({"self": [x, v]})
+
+
 def test_a_view_must_fit_the_dream() -> None:
-    with pytest.raises(
-        ConfigError, match="expected the action_space of the env that the model was learned in"
-    ):
+    with pytest.raises(ConfigError, match="expected the spaces of the env that the model was learned in"):
         other = FlatCart()
         other.action_space = spaces.Box(-2.0, 2.0, (1,), np.float32)
         LearnedModelEnv(flat_model(), like=other)
@@ -349,7 +357,117 @@ def test_a_view_must_fit_the_dream() -> None:
         LearnedModelEnv(cart_model(), view=NumbersView(FlatCart().observation_space, FlatCart().action_space))
 
 
+def test_of_an_env_in_wrappers_those_inside_are_reset() -> None:
+    for like in (
+        gym.wrappers.NormalizeObservation(ModelLearner(FlatCart())),
+        gym.wrappers.RescaleAction(FlatCart(), np.float32(-3.0), np.float32(3.0)),
+        gym.wrappers.TimeLimit(FlatCart(), 5),
+    ):
+        dream = LearnedModelEnv(flat_model(), like=like)
+        assert dream.observation_space == FlatCart().observation_space
+        np.testing.assert_array_equal(dream.reset(seed=3)[0], FlatCart().reset(seed=3)[0])
+
+
+def test_attributes_of_others_that_have_our_names_are_left_alone() -> None:
+    env = FlatCart()
+    env.schema, env.task = {"x": "metres"}, "drive"  # type: ignore[attr-defined]
+    learner = ModelLearner(env)
+    run(learner, 30)
+    dream = LearnedModelEnv(learner.model, like=learner)
+    dream.reset(seed=0)
+    assert dream.step(PUSH)[1] == 0.0
+    env.task = Errand()  # type: ignore[attr-defined]
+    errand = LearnedModelEnv(flat_model(), like=gym.wrappers.TimeLimit(env, 9))
+    assert isinstance(errand.task, Errand)
+
+
+def test_a_dream_of_an_env_without_a_schema_has_none() -> None:
+    """So whatever goes round the env goes round the dream."""
+    dream = LearnedModelEnv(flat_model())
+    assert not hasattr(dream, "schema")
+    learner = ModelLearner(dream)
+    run(learner, 20)
+    assert learner.model.seen == 20
+    many = VectorModelLearner(LearnedModelVectorEnv(flat_model(), 2, horizon=5))
+    many.reset(seed=0)
+    many.step(np.zeros((2, 1), np.float32))
+    assert many.model.seen == 2
+    assert LearnedModelEnv(cart_model(), like=LearnedModelEnv(cart_model())).schema == cart_model().schema
+
+
+# ---------------------------------------------------------------------- numbers that a space can't hold
+@pytest.mark.parametrize("dtype", [np.int64, np.int8])
+def test_a_dream_of_whole_numbers_shows_the_nearest_and_leaves_where_none_is(dtype: type) -> None:
+    learner = ModelLearner(Visited(dtype), view=visited_view, learn_reward=True)
+    for seed in range(12):
+        run(learner, 15, seed=seed)
+    learner.model.finish()
+    dream = LearnedModelEnv(learner.model, like=learner)
+    for seed in range(4):  # with a visitor and without
+        seen, _ = dream.reset(seed=seed)
+        place, objects = int(seen[0, 1]), len(dream.scene.layout.names)
+        for _ in range(5):
+            seen, reward, _, truncated, info = dream.step(1)
+            place += 3
+            assert (seen[0, 1], seen.dtype) == (place, dtype), info
+            assert reward == pytest.approx(-place, abs=1e-6)
+            assert not truncated
+        assert seen[1, 0] == objects - 2
+    far = learner.view.scene(np.array([[1, 99], [0, 0]]).astype(dtype))
+    dream.reset(options={"scene": far})
+    seen, _, _, truncated, info = dream.step(1)
+    assert (truncated, info["cause"], seen[0, 1]) == (True, "left", 99)
+
+
+def test_infinite_numbers_have_left_every_space() -> None:
+    env = FlatCart()
+    env.observation_space = spaces.Box(-np.inf, np.inf, (2,), np.float32)
+    model = flat_model()
+    kept = model.extra
+    try:
+        model.extra = {}
+        dream = LearnedModelEnv(model, like=env, view=NumbersView(env.observation_space, env.action_space))
+        dream.reset(options={"scene": flat_scene(3.2e38, 3.2e38)})
+        _, _, _, truncated, info = dream.step(PUSH)
+    finally:
+        model.extra = kept
+    assert truncated and "left what float32 can hold" in info["reason"]
+    assert np.isfinite(dream.scene.vector).all()
+    vast = {"cart": spaces.Box(-np.inf, np.inf, (2,), np.float64)}
+    boxes = BoxesShown(CART_SCHEMA, spaces.Dict(vast), spaces.Box(-1.0, 1.0, (1,), np.float32))
+    vectors = np.array([[0.0, 1.0, 0.0, 0.0], [np.inf, 1.0, 0.0, 0.0], [0.0, np.nan, 0.0, 0.0]])
+    assert boxes.inside(vectors).tolist() == [True, False, False]
+
+
 # ---------------------------------------------------------------------- reward and end
+def test_a_live_dream_is_paid_as_soon_as_the_model_knows() -> None:
+    learner = ModelLearner(FlatCart(), learn_reward=True)
+    learner.reset(seed=0)
+    early = [LearnedModelEnv(learner.model, like=FlatCart(), reward=how) for how in (None, "learned")]
+    many = LearnedModelVectorEnv(learner.model, 2, like=FlatCart())
+    with pytest.raises(QueryError, match="knows none of its targets"):
+        early[1].reset(seed=0)
+    run(learner, 120)
+    learner.model.finish()
+    late = LearnedModelEnv(learner.model, like=FlatCart())
+    rewards = []
+    for dream in (*early, late):
+        dream.reset(seed=0)
+        rewards.append(dream.step(PUSH)[1])
+    assert rewards[0] != 0.0 and len(set(rewards)) == 1
+    many.reset(seed=0)
+    assert many.step(np.ones((2, 1), np.float32))[1][0] == rewards[0]
+
+
+def test_a_view_that_is_passed_again_loses_no_reward() -> None:
+    env = FlatCart()
+    view = NumbersView(env.observation_space, env.action_space)
+    for again in (view, TaskView(view, terminated=False)):
+        dream, known = (LearnedModelEnv(flat_model(), **given) for given in ({"view": again}, {}))
+        dream.reset(seed=0), known.reset(seed=0)
+        assert dream.step(PUSH)[1] == known.step(PUSH)[1] != 0.0
+
+
 def test_reward_and_end_can_be_learned() -> None:
     dream = LearnedModelEnv(cart_model())
     check_env(dream, skip_render_check=True)
@@ -481,6 +599,30 @@ def test_what_was_not_learned_cannot_be_read(cart: ModelLearner) -> None:
     for model in (cart_model(rewarded=False), cart.model):
         with pytest.raises(QueryError, match=r"has not learned task\.reward.*pass the function itself"):
             LearnedModelEnv(model, reward="learned")
+
+
+def test_what_is_no_argument_is_refused_at_once(cart: ModelLearner) -> None:
+    for arguments, message in [
+        ({"start": 3}, "start=3: expected a function, or None"),
+        ({"view": 3}, "view=3: expected a view"),
+        ({"reward": lambda before, after: 0.0}, r"reward: expected a function of \(scene before, action"),
+        ({"reward": np.zeros(3)}, "reward=array.*expected a function"),
+    ]:
+        with pytest.raises(ConfigError, match=message):
+            LearnedModelEnv(cart.model, **arguments)
+    with pytest.raises(
+        ConfigError, match=r"expected a WorldModel or the path of its file; a ModelLearner's is env\.model"
+    ):
+        LearnedModelEnv(cart)  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match=r"options=\['scene'\]: expected a dict"):
+        LearnedModelEnv(cart.model).reset(options=["scene"])  # type: ignore[arg-type]
+    for path in ("nowhere.json", "/"):
+        with pytest.raises(ModelFileError, match="can't be read"):
+            LearnedModelEnv(path)
+    with pytest.raises(
+        ModelFileError, match=r"/nowhere/x\.json can't be written \(No such file or directory\)"
+    ):
+        cart.save("/nowhere/x.json")
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from dreams import (
     CART_SCHEMA,
+    ROOM_STEPS,
     Errand,
     FlatCart,
     cart_model,
@@ -32,8 +34,9 @@ from worlds import line, room
 
 import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv, drawn_from, in_batches
+from relgym.envs.arguments import checked_actions
 from relgym.envs.learned_model_shown import ViewShown
-from relgym.envs.views import NumbersView
+from relgym.envs.views import NumbersView, Static, TaskView
 from relgym.errors import ActionError, ConfigError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
@@ -202,6 +205,42 @@ def test_actions_through_a_view_are_those_of_single_scenes(space: spaces.Space) 
     np.testing.assert_array_equal(deeds.parted(joined), vectors)
 
 
+@pytest.mark.parametrize("told", [False, True])
+def test_views_of_numbers_show_many_scenes_as_one(told: bool, rng: np.random.Generator) -> None:
+    """Angles, constants, several keys, coarse numbers: the same bits in arrays, and the same limits."""
+    keys = {
+        "hand": spaces.Box(-1.0, 1.0, (2,), np.float32),
+        "gear": spaces.Discrete(3),
+        "load": spaces.Box(-5.0, 5.0, (1,), np.float64),
+    }
+    space, acting = spaces.Dict(keys), spaces.Discrete(2)
+    view: Any = NumbersView(
+        space, acting, angles=[("hand.x0", "hand.x1")], static=[Static("wall", {"at": 3.0})]
+    )
+    view = TaskView(view) if told else view
+    shown = ViewShown(view, space, acting)
+    vectors = rng.uniform(-6.0, 6.0, (300, shown.layout.width))
+    seen, inside = shown.observations(vectors), shown.inside(vectors)
+    assert 0.1 < inside.mean() < 0.9
+    for k, vector in enumerate(vectors):
+        one = Scene(view.schema, shown.layout, vector.copy())
+        assert inside[k] == (shown.outside(one) == "")
+        if inside[k]:
+            for key, part in shown.observation(one).items():
+                np.testing.assert_array_equal(seen[key][k], part)
+
+
+def test_many_switches_are_thrown_at_once() -> None:
+    """A batch of MultiBinary actions is an int8 Box to Gymnasium; agents send what they like."""
+    space = spaces.MultiBinary(2)
+    for sent in (np.array([[1, 0], [0, 1]]), np.array([[1.0, 0.0], [0.0, 1.0]], np.float32)):
+        found = checked_actions(space, sent, 2)
+        assert (found.tolist(), found.dtype) == ([[1, 0], [0, 1]], np.int8)
+    for bad in (np.array([[1, 2], [0, 1]]), np.array([1, 0]), "on"):
+        with pytest.raises(ActionError, match="expected 2 actions of MultiBinary"):
+            checked_actions(space, bad, 2)
+
+
 # ---------------------------------------------------------------------- what Gymnasium asks
 def test_make_vec_needs_a_file_alone(tmp_path: Path) -> None:
     room_model("world").save(tmp_path / "room.json")
@@ -293,6 +332,57 @@ def test_first_scenes_can_be_drawn_from_arrays_and_scenes() -> None:
         drawn_from([])
 
 
+def test_scenes_to_draw_from_may_name_their_objects_in_any_order() -> None:
+    model = room_model()
+    starts = starts_of(model.schema, ROOM_STEPS[:4])
+    turned = replace(model.schema, objects=tuple(reversed(model.schema.objects)))
+    other = [turned.scene(each.values()) for each in starts]
+    assert other[0].layout.names != starts[0].layout.names
+    for scenes in (starts, other):
+        envs = LearnedModelVectorEnv(model, 3, start=drawn_from(scenes))
+        envs.reset(seed=0)
+        assert {tuple(v) for v in envs.vectors} <= {tuple(each.vector) for each in starts}
+    with pytest.raises(ConfigError, match="the same ones in another order"):
+        drawn_from([starts[0], other[0]])(np.random.default_rng(0), 1)
+    learned = LearnedModelVectorEnv(cart_model(), 2, start=drawn_from([cart_start()]))
+    learned.reset(seed=0)
+    assert learned.vectors.shape == (2, 4)
+    with pytest.raises(ObservationError, match="expected the objects"):
+        LearnedModelVectorEnv(cart_model(), 2, start=drawn_from(starts))
+    for bad in ([1], [], np.zeros(3), 5):
+        with pytest.raises(ConfigError, match=r"expected (some )?scenes"):
+            drawn_from(bad)  # type: ignore[arg-type]
+
+
+def test_a_step_whose_new_beginnings_fail_is_not_made() -> None:
+    broken = [False]
+
+    def start(rng: np.random.Generator, count: int) -> Any:
+        return np.full((count, 4), np.nan if broken[0] else 0.0)
+
+    envs = LearnedModelVectorEnv(cart_model(), 2, start=start, horizon=2, autoreset_mode="SameStep")
+    envs.reset(seed=0)
+    envs.step(np.ones((2, 1), np.float32))
+    was, broken[0] = envs.vectors.copy(), True
+    with pytest.raises(ObservationError, match="start: dream 0 can't begin here"):
+        envs.step(np.ones((2, 1), np.float32))
+    np.testing.assert_array_equal(envs.vectors, was)
+    broken[0] = False
+    *_, cut, infos = envs.step(np.ones((2, 1), np.float32))
+    assert cut.all() and infos["_final_obs"].all()
+
+
+def test_who_judges_changes_nothing() -> None:
+    def greedy(_layout: Any, before: Any, _actions: Any, after: Any) -> Any:
+        after -= before
+        return after[:, 0]
+
+    envs = carts(2, reward=greedy)
+    envs.reset(seed=0)
+    with pytest.raises(ValueError, match="read-only"):
+        envs.step(np.ones((2, 1), np.float32))
+
+
 def test_some_dreams_begin_anew_and_the_others_go_on() -> None:
     envs = carts(3)
     envs.reset(seed=0)
@@ -368,9 +458,28 @@ def test_bad_input_names_the_remedy() -> None:
         ({"max_episode_steps": 0}, "max_episode_steps=0"),
         ({"autoreset_mode": "never"}, r"autoreset_mode='never': expected one of \['NextStep'"),
         ({"min_margin": float("nan")}, "min_margin=nan"),
+        ({"start": 3}, "start=3: expected a function, or None"),
+        ({"reward": np.zeros(2)}, "reward=array.*expected a function, 'learned' or None"),
+        (
+            {"reward": lambda before, action, after: 0.0},
+            r"reward: .*in_batches\(schema, function\) makes one",
+        ),
+        ({"view": 3}, "view=3: expected a view"),
     ]:
         with pytest.raises(ConfigError, match=message):
             carts(**arguments)
+    for model in (None, 3):
+        with pytest.raises(ConfigError, match="expected a WorldModel or the path of its file"):
+            LearnedModelVectorEnv(model, 2)  # type: ignore[arg-type]
+    for options, error, message in [
+        (["scene"], ConfigError, "expected a dict such as"),
+        ({"scenes": None}, ObservationError, r"options\['scenes'\]: expected 2 first scenes"),
+        ({1: 2, "x": 3}, ConfigError, "unknown reset options"),
+    ]:
+        with pytest.raises(error, match=message):
+            carts(2).reset(options=options)  # type: ignore[arg-type]
+    with pytest.raises(ObservationError, match="start: expected 2 first scenes"):
+        carts(2, start=lambda rng, n: None).reset()
     with pytest.raises(QueryError, match="let a ModelLearner around the real env act"):
         LearnedModelVectorEnv(WorldModel(CART_SCHEMA), 2, like=cart_start(), snapshot=True)
     envs = carts(2)
@@ -417,8 +526,9 @@ def test_rewards_that_are_no_numbers_are_refused_and_nothing_has_changed() -> No
             lambda _layout, before, _actions, _after: np.where(before[:, 0] > 0, np.nan, 0.0),
             "step 1 of 2 is nan",
         ),
-        (lambda *_: np.ones(3), r"expected an array of 2 numbers .*got ndarray of shape \(3,\)"),
-        (lambda *_: None, "reward: expected an array of 2 numbers .*got NoneType"),
+        (lambda *_: np.ones(3), r"expected an array of 2 numbers .*got one of shape \(3,\)"),
+        (lambda *_: None, "reward: expected an array of 2 numbers .*got None"),
+        (lambda *_: [[1.0], [1.0, 2.0]], "reward: expected an array of 2 numbers"),
         (lambda *_: 1.0, r"in_batches\(schema, function\) makes one"),
     ]:
         envs = carts(2, reward=reward)

@@ -133,3 +133,31 @@ class Drifter(gym.Env[Any, Any]):
 
     def _seen(self) -> Any:
         return self.place.astype(np.float32) if self.says is None else self.says
+
+
+class Visited(gym.Env[Any, Any]):
+    """A box pushed along a line, and in every second episode a visitor that stands there; the reward is -x'.
+
+    Observes a table: here or not, and the place, as the `dtype` has it.
+    """
+
+    def __init__(self, dtype: Any = np.float64) -> None:
+        self.observation_space = spaces.Box(-100, 100, (2, 2), dtype)
+        self.action_space = spaces.Discrete(3, start=-1)
+        self.dtype = dtype
+        self.x, self.visits = 0, 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        self.x, self.visits = int(self.np_random.integers(-9, 9)), self.visits + 1
+        return self._seen(), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        self.x += 3 * int(action)
+        return self._seen(), -float(self.x), False, False, {}
+
+    def _seen(self) -> Any:
+        visitor = [1, 50] if self.visits % 2 else [0, 0]
+        return np.array([[1, self.x], visitor]).astype(self.dtype)

@@ -182,3 +182,17 @@ def test_features_may_be_a_list() -> None:
     assert ModelLearner(Slider(), config={"features": ["self:trig(x0)"]}).model.config == ModelConfig(
         features=("self:trig(x0)",)
     )
+
+
+def test_what_is_no_env_no_target_and_nothing_to_learn_of() -> None:
+    with pytest.raises(ConfigError, match=r"expected an env, got 'CartPole-v1': gym\.make makes one"):
+        ModelLearner("CartPole-v1")  # type: ignore[arg-type]
+    for wrong in (3, ("ball",), "vx", {}):
+        with pytest.raises(
+            ConfigError, match=r"target .*: expected 'ball\.vx', \('ball', 'vx'\) or a Target"
+        ):
+            ModelLearner(Slider(), targets=[wrong])  # type: ignore[list-item]
+    bare = Slider()
+    bare.observation_space = spaces.Dict({})
+    with pytest.raises(ConfigError, match="has no parts: expected some numbers to learn of"):
+        ModelLearner(bare)

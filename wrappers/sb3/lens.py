@@ -11,8 +11,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from relgym.envs.learned_model_shown import ViewDeeds, is_plain
-from relgym.errors import ConfigError
+from relgym.envs.learned_model_shown import ViewDeeds, is_plain, shown_at_once
+from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import Float2D, Scene, SceneLayout
 from relgym.wrappers.sb3.acting import acting_all
 from relgym.wrappers.sb3.recorder import TransitionRecorder
@@ -123,19 +123,29 @@ class Lens:
     def inside(self, layout: SceneLayout, vectors: Float2D) -> NDArray[np.bool_]:
         """Which of n scenes lie in the bare env's observation space."""
         if not self._plain:
-            seen = (self._view.observation(scene) for scene in self._scenes(layout, vectors))
-            return np.array([self._base.contains(one) for one in seen], dtype=np.bool_)
+            if (found := shown_at_once(self._view, layout, vectors)) is not None:
+                return found[1]
+            return np.array([self._shows(scene) for scene in self._scenes(layout, vectors)], dtype=np.bool_)
         low, high = (
             np.concatenate([ends[name] for name in layout.names]) for ends in (self._low, self._high)
         )
         within = (low <= vectors) & (vectors <= high)
         return np.asarray(within.all(axis=1))
 
+    def _shows(self, scene: Scene) -> bool:
+        try:
+            return bool(self._base.contains(self._view.observation(scene)))
+        except ObservationError:  # numbers that the space's dtype can't hold
+            return False
+
     def _scenes(self, layout: SceneLayout, vectors: Float2D) -> Iterator[Scene]:
         return (Scene(self._view.schema, layout, vector.copy()) for vector in vectors)
 
     def _raw(self, layout: SceneLayout, vectors: Float2D) -> Observations:
         if not self._plain:
+            found = shown_at_once(self._view, layout, vectors)
+            if found is not None and isinstance(found[0], (np.ndarray, dict)):
+                return found[0]
             return _stacked([self._view.observation(scene) for scene in self._scenes(layout, vectors)])
         cuts = ((name, layout.slice(k)) for k, name in enumerate(layout.names))
         return {name: vectors[:, cut].astype(self._dtypes[name]) for name, cut in cuts}
