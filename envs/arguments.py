@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeAlias
@@ -31,6 +32,7 @@ __all__ = [
     "per_object",
     "physical_action",
     "refuse_vector_env",
+    "takes",
 ]
 
 Coefficient: TypeAlias = float | Mapping[str, float]
@@ -113,11 +115,24 @@ def checked_options(options: Any) -> Mapping[str, Any]:
     return {} if options is None else options
 
 
-def checked_function(what: str, given: Any) -> Any:
-    """`given`; `ConfigError` unless it is a function or None."""
+def checked_function(what: str, given: Any, *arguments: str) -> Any:
+    """`given`; `ConfigError` unless it is None, or a function of these arguments."""
     if given is not None and not callable(given):
         raise ConfigError(f"{what}={given!r}: expected a function, or None")
+    if given is not None and not takes(given, len(arguments)):
+        raise ConfigError(f"{what}={given!r}: expected a function of ({', '.join(arguments)})")
     return given
+
+
+def takes(function: Any, count: int) -> bool:
+    """Whether a function may be called with so many arguments; of something written in C nobody knows, so it may."""
+    try:
+        inspect.signature(function).bind(*range(count))
+    except TypeError:
+        return False
+    except ValueError:
+        return True
+    return True
 
 
 def check_options(options: Mapping[str, Any], legal: Collection[str]) -> None:

@@ -156,7 +156,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         check_judges(reward, terminated, self.task, place.model, batched=False, at_once=snapshot)
         self._given = reward, terminated
         self._judges: Judges | None = None
-        self._start = checked_function("start", start)
+        self._start = checked_function("start", start, "random generator")
         self._horizon = None if horizon is None else checked_count("horizon", horizon, 1, 10**9)
         self._min_margin = checked_least("min_margin", min_margin, 0.0)
         self._scene: Scene | None = None

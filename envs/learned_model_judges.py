@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Protocol, TypeAlias
@@ -10,6 +9,7 @@ from typing import Any, Final, Literal, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.envs.arguments import takes
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
@@ -110,20 +110,14 @@ def check_judges(
 
 
 def _check_arguments(prop: str, judge: Any, *, batched: bool) -> None:
-    try:
-        own = inspect.signature(judge)
-    except (TypeError, ValueError):  # of something written in C nobody knows
-        return
-    try:
-        own.bind(*range(4 if batched else 3))
-    except TypeError:
+    if not takes(judge, 4 if batched else 3):
         told = (
             "(layout, vectors before, actions, vectors after); in_batches(schema, function) makes one of a function of "
             "scenes"
             if batched
             else "(scene before, action, scene after)"
         )
-        raise ConfigError(f"{prop}: expected a function of {told}, got one of {own}") from None
+        raise ConfigError(f"{prop}: expected a function of {told}, got {judge!r}")
 
 
 def _has_learned(model: WorldModel, prop: str) -> bool:

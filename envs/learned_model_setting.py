@@ -163,7 +163,10 @@ class Setting:
     @property
     def task(self) -> TaskFunctions | None:
         """What the real env asks of its agents, if it says so: an attribute ``task`` with functions of steps."""
-        task = None if self.world is None else getattr(self.world.unwrapped, "task", None)
+        world = self.world
+        task = (
+            world.get_wrapper_attr("task") if world is not None and world.has_wrapper_attr("task") else None
+        )
         told = all(callable(getattr(task, name, None)) for name in ("reward", "terminated"))
         return task if told else None  # an attribute of that name may be anything
 

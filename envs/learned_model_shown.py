@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 from relgym.envs.actions import BatchActions, acting
 from relgym.envs.arguments import checked_actions
 from relgym.envs.views import SceneView, TaskView, View
+from relgym.envs.views.base import in_batches_too, is_whole, limits_of
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
 
-__all__ = ["BoxesShown", "Deeds", "Shown", "ViewShown", "checked_boxes", "is_plain", "shown_at_once"]
+__all__ = ["Boxes", "BoxesShown", "Deeds", "Shown", "ViewShown", "checked_boxes", "is_plain", "shown_at_once"]
 
 
 class Deeds(Protocol):
@@ -83,12 +85,72 @@ def is_plain(view: View) -> bool:
 
 def shown_at_once(view: View, layout: SceneLayout, vectors: Float2D) -> tuple[Any, NDArray[np.bool_]] | None:
     """Observations of n scenes, and which lie in the observation space; None where a view shows them one by one."""
+    told = isinstance(view, TaskView)
     inner = view.view if isinstance(view, TaskView) else view
-    if (found := getattr(inner, "observations", None)) is None:
+    if (found := in_batches_too(inner, "observations", "observation")) is None:
         return None
-    bare = inner.schema.layout(name for name in layout.names if name != TASK)
+    bare = inner.schema.layout(name for name in layout.names if not (told and name == TASK))
     seen, inside = found(bare, vectors[:, : bare.width])  # `task` stands last
     return seen, np.asarray(inside)
+
+
+class Boxes:
+    """The numbers of objects as Boxes show them: in their dtypes, within their limits.
+
+    Parameters
+    ----------
+    boxes
+        By object; what an object that isn't there shows, is in no space.
+    """
+
+    def __init__(self, boxes: Mapping[str, spaces.Box]) -> None:
+        self._dtypes = {name: np.dtype(box.dtype) for name, box in boxes.items()}
+        self._low: dict[str, NDArray[Any]] = {}
+        self._high: dict[str, NDArray[Any]] = {}
+        for name, box in boxes.items():
+            # What is infinite, or would be in the space's dtype, has left a space without bounds, too.
+            least, most = limits_of(box.dtype)
+            self._low[name], self._high[name] = np.maximum(box.low, least), np.minimum(box.high, most)
+        self._whole = frozenset(name for name, dtype in self._dtypes.items() if is_whole(dtype))
+
+    def shown(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+        """Property vectors by object, of one state vector or of n: arrays of their own."""
+        rounded = self.rounded(layout, vectors)
+        return {
+            name: rounded[..., layout.slice(k)].astype(self._dtypes[name])
+            for k, name in enumerate(layout.names)
+            if name in self._dtypes
+        }
+
+    def inside(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of n state vectors lie within the limits, shape ``(n,)``; not those with NaN."""
+        low, high = self.limits(layout)
+        rounded = self.rounded(layout, vectors)
+        return np.asarray(((low <= rounded) & (rounded <= high)).all(axis=-1))
+
+    def limits(self, layout: SceneLayout) -> tuple[Float1D, Float1D]:
+        """Smallest and largest element of each column."""
+        if layout not in self._limits:
+            low, high = np.full(layout.width, -np.inf), np.full(layout.width, np.inf)
+            for k, name in enumerate(layout.names):
+                if name in self._low:
+                    low[layout.slice(k)], high[layout.slice(k)] = self._low[name], self._high[name]
+            self._limits[layout] = low, high
+        return self._limits[layout]
+
+    def rounded(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """State vectors with whole numbers where only those are shown."""
+        if not self._whole:
+            return vectors
+        found = vectors.copy()
+        for k, name in enumerate(layout.names):
+            if name in self._whole:
+                found[..., layout.slice(k)] = np.rint(found[..., layout.slice(k)])
+        return found
+
+    @cached_property
+    def _limits(self) -> dict[SceneLayout, tuple[Float1D, Float1D]]:
+        return {}
 
 
 class BoxesShown:
@@ -111,20 +173,8 @@ class BoxesShown:
         self, schema: SceneSchema, observation_space: spaces.Space[Any], action_space: spaces.Space[Any]
     ) -> None:
         seen = checked_boxes(observation_space, schema)
-        self._schema, self._action_space = schema, action_space
+        self._schema, self._action_space, self._boxes = schema, action_space, Boxes(seen)
         self.layout = schema.layout([*seen, *(name for name in (TASK,) if name in schema.order)])
-        names = self.layout.names
-        # As the real env's observations; the Dict space sorts its keys.
-        self._cuts = [
-            (name, self.layout.slice(i), seen[name].dtype) for i, name in enumerate(names) if name in seen
-        ]
-        self._low, self._high = np.full(self.layout.width, -np.inf), np.full(self.layout.width, np.inf)
-        for name, cut, dtype in self._cuts:
-            # What is infinite, or would be in the space's dtype, has left a space without bounds, too.
-            most = float(np.finfo(dtype.name).max) if dtype.kind == "f" else np.inf
-            self._low[cut] = np.maximum(seen[name].low, -most)
-            self._high[cut] = np.minimum(seen[name].high, most)
-        self._whole = {name for name, _, dtype in self._cuts if dtype.kind in "iub"}
 
     def acting(self, scene: Scene, action: Any) -> Scene:
         """The scene with a checked action in it."""
@@ -136,21 +186,22 @@ class BoxesShown:
 
     def observation(self, scene: Scene) -> dict[str, NDArray[Any]]:
         """Property vectors by object."""
-        return self.observations(scene.vector)
+        return self._boxes.shown(scene.layout, scene.vector)
 
     def observations(self, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-        """Property vectors by object, of one state vector or of n."""
-        found = {name: vectors[..., cut] for name, cut, _ in self._cuts}
-        found |= {name: np.rint(found[name]) for name in self._whole}
-        return {name: found[name].astype(dtype) for name, _, dtype in self._cuts}
+        """Property vectors by object, of n state vectors."""
+        return self._boxes.shown(self.layout, vectors)
 
     def inside(self, vectors: Float2D) -> NDArray[np.bool_]:
         """Which of n scenes lie in the observation space, shape ``(n,)``."""
-        return np.asarray(((self._low <= vectors) & (vectors <= self._high)).all(axis=1))
+        return self._boxes.inside(self.layout, vectors)
 
     def outside(self, scene: Scene) -> str:
         """Which properties lie outside the observation space."""
-        vector, low, high = scene.vector, self._low, self._high
+        vector, (low, high) = (
+            self._boxes.rounded(scene.layout, scene.vector),
+            self._boxes.limits(scene.layout),
+        )
         left = np.flatnonzero(~((low <= vector) & (vector <= high)))
         if not len(left):
             return ""
@@ -269,7 +320,7 @@ class ViewDeeds:
     def _all_values(self, actions: Any, count: int) -> Float2D:
         """Properties of the action object for n actions."""
         view = self._view.view if isinstance(self._view, TaskView) else self._view
-        if (at_once := getattr(view, "action_values", None)) is not None:
+        if (at_once := in_batches_too(view, "action_values", "with_action")) is not None:
             return np.asarray(at_once(actions), dtype=np.float64)
         distinct, which = np.unique(np.asarray(actions).reshape(count, -1), axis=0, return_inverse=True)
         done = np.array([self._values(action.reshape(np.shape(actions)[1:])) for action in distinct])

@@ -159,7 +159,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             _shorter(horizon, max_episode_steps),
             checked_least("min_margin", min_margin, 0.0),
         )
-        start = checked_function("start", start)
+        start = checked_function("start", start, "random generator", "count")
         self._start = start.fit(place.fitted_vector) if isinstance(start, Drawn) else start
         self._vectors: Float2D | None = None
         self._steps = np.zeros(self.num_envs, dtype=np.int64)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.views.records import Angle, Part, Static, identifier, identifiers, merged
 from relgym.errors import ConfigError
-from relgym.scene.objects import ACTION, Float1D, ObjectType, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, TASK, Float1D, ObjectType, SceneLayout, SceneSchema
 
 __all__ = ["SELF", "Arrangement", "arranged", "default_parts", "numbered"]
 
@@ -119,11 +119,12 @@ def arranged(
         kinds.append(_kind(part, (*own, *fixed), turning))
     owners = [part.name for part in everything]
     identifiers("names of the objects", owners, len(owners))
-    if ACTION in owners:
-        raise ConfigError(
-            f"an object of an observation can't be called {ACTION!r}: that is what the agent does; call it otherwise "
-            f"(numbers under a Dict's key {ACTION!r}: parts=[Part('other', {{'x0': '{ACTION}.x0', ...}})])"
-        )
+    for taken, what in ((ACTION, "what the agent does"), (TASK, "what a step brings")):
+        if taken in owners:
+            raise ConfigError(
+                f"an object of an observation can't be called {taken!r}: that is {what}; call it otherwise (numbers "
+                f"under a Dict's key {taken!r}: parts=[Part('other', {{'x0': '{taken}.x0', ...}})])"
+            )
     objects = [(name, kind.name) for name, kind in zip(owners, kinds, strict=True)]
     schema = SceneSchema((*merged(kinds), action), (*objects, (ACTION, ACTION)), up=axes[0], planar=axes[1])
     return Arrangement(schema, schema.layout(owners), np.array(sources, np.intp), np.array(constants), pairs)

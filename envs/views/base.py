@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from relgym.errors import ObservationError
 from relgym.scene.objects import Scene, SceneSchema
 
-__all__ = ["View", "as_shown", "cast_to", "precision_of"]
+__all__ = ["View", "as_shown", "cast_to", "in_batches_too", "is_whole", "limits_of", "precision_of"]
 
 
 @runtime_checkable
@@ -23,7 +24,7 @@ class View(Protocol):
     Two more methods are optional, and make many dreams at once faster: ``observations(layout, vectors)``, the
     observations of n scenes, batched as Gymnasium batches them, and which of them lie in the observation space; and
     ``action_values(actions)``, the properties of the action object for n actions, shape ``(n, k)``. Both give the same
-    bits as one by one.
+    bits as one by one. Where a subclass changes `observation` or `with_action` alone, that is asked.
 
     Attributes
     ----------
@@ -94,6 +95,16 @@ class View(Protocol):
         ...
 
 
+def in_batches_too(view: Any, many: str, single: str) -> Any:
+    """A view's method for many scenes or actions; None where it has none, or a subclass has changed the single one."""
+    for kind in type(view).__mro__:
+        if many in vars(kind):
+            return getattr(view, many)
+        if single in vars(kind):
+            return None
+    return None
+
+
 def as_shown(numbers: NDArray[np.float64], dtype: Any) -> NDArray[Any]:
     """Numbers in the dtype of a space: to the nearest whole one where it has only those.
 
@@ -113,14 +124,27 @@ def cast_to(numbers: NDArray[np.float64], dtype: Any) -> tuple[NDArray[Any], NDA
 
     Those that it can't (NaN too) come out as 0.
     """
+    rounded = np.rint(numbers) if is_whole(dtype) else np.asarray(numbers)
+    low, high = limits_of(dtype)
+    fits = (low <= rounded) & (rounded <= high)
+    return (rounded if fits.all() else np.where(fits, rounded, 0.0)).astype(np.dtype(dtype)), fits
+
+
+def is_whole(dtype: Any) -> bool:
+    """Whether a dtype holds whole numbers only."""
+    return np.dtype(dtype).kind in "iub"
+
+
+@cache
+def limits_of(dtype: Any) -> tuple[float, float]:
+    """Smallest and largest number of float64 that a dtype can hold; neither is infinite."""
     kind = np.dtype(dtype)
-    whole = kind.kind in "iub"
-    rounded = np.rint(numbers) if whole else np.asarray(numbers)
-    limits: Any = np.iinfo(kind) if kind.kind in "iu" else np.finfo(kind) if kind.kind == "f" else None
-    low, high = (0, 1) if limits is None else (limits.min, limits.max)
-    # Of int64 the greatest number is none of float64; the one after it is.
-    fits = (low <= rounded) & ((rounded < high + 1) if whole else (rounded <= high))
-    return (rounded if fits.all() else np.where(fits, rounded, 0.0)).astype(kind), fits
+    if kind.kind == "b":
+        return 0.0, 1.0
+    found: Any = np.iinfo(kind) if kind.kind in "iu" else np.finfo(kind)
+    most = float(found.max)
+    # The greatest number of int64 is none of float64, and the next one is too great.
+    return float(found.min), most if most <= found.max else float(np.nextafter(most, 0.0))
 
 
 def precision_of(*single: bool) -> float:

@@ -92,7 +92,7 @@ def page(out: Path, target: Path) -> None:
     for made in _made(out):
         if made.figure:
             write_atomically(target.parent / made.figure, (out / made.figure).read_bytes())
-        remark = old.get(made.name, "").rpartition("\n```\n")[2].strip()
+        remark = old.get(made.name, "").partition("\n```\n")[2].strip()
         sections[made.name] = section(made, ".") + (f"\n\n{remark}" if remark else "")
     names = {f"row-{number}": row.title for number, row in ROWS.items()}
     missing = [f"{name}, {title}" for name, title in names.items() if name not in sections]

@@ -80,6 +80,8 @@ def write_model(
             file.flush()
             os.fsync(file.fileno())
         os.chmod(temporary, 0o666 & ~_umask())  # a temporary file is its owner's alone; a model need not be
+        if target.is_dir():
+            raise ModelFileError(f"{path} is a folder: expected the path of a file")
         os.replace(temporary, target)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)

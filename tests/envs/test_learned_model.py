@@ -380,6 +380,11 @@ def test_attributes_of_others_that_have_our_names_are_left_alone() -> None:
     errand = LearnedModelEnv(flat_model(), like=gym.wrappers.TimeLimit(env, 9))
     assert isinstance(errand.task, Errand)
 
+    class Paid(gym.Wrapper[Any, Any, Any, Any]):
+        task = Errand()
+
+    assert LearnedModelEnv(flat_model(), like=Paid(FlatCart())).task is Paid.task
+
 
 def test_a_dream_of_an_env_without_a_schema_has_none() -> None:
     """So whatever goes round the env goes round the dream."""
@@ -601,9 +606,10 @@ def test_what_was_not_learned_cannot_be_read(cart: ModelLearner) -> None:
             LearnedModelEnv(model, reward="learned")
 
 
-def test_what_is_no_argument_is_refused_at_once(cart: ModelLearner) -> None:
+def test_what_is_no_argument_is_refused_at_once(cart: ModelLearner, tmp_path: Path) -> None:
     for arguments, message in [
         ({"start": 3}, "start=3: expected a function, or None"),
+        ({"start": lambda rng, count: None}, r"expected a function of \(random generator\)"),
         ({"view": 3}, "view=3: expected a view"),
         ({"reward": lambda before, after: 0.0}, r"reward: expected a function of \(scene before, action"),
         ({"reward": np.zeros(3)}, "reward=array.*expected a function"),
@@ -623,6 +629,9 @@ def test_what_is_no_argument_is_refused_at_once(cart: ModelLearner) -> None:
         ModelFileError, match=r"/nowhere/x\.json can't be written \(No such file or directory\)"
     ):
         cart.save("/nowhere/x.json")
+    with pytest.raises(ModelFileError, match="is a folder: expected the path of a file"):
+        cart.save(tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])

@@ -35,7 +35,7 @@ from worlds import line, room
 import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv, drawn_from, in_batches
 from relgym.envs.arguments import checked_actions
-from relgym.envs.learned_model_shown import ViewShown
+from relgym.envs.learned_model_shown import BoxesShown, ViewShown
 from relgym.envs.views import NumbersView, Static, TaskView
 from relgym.errors import ActionError, ConfigError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
@@ -228,6 +228,37 @@ def test_views_of_numbers_show_many_scenes_as_one(told: bool, rng: np.random.Gen
         if inside[k]:
             for key, part in shown.observation(one).items():
                 np.testing.assert_array_equal(seen[key][k], part)
+
+
+def test_what_a_subclass_of_a_view_changes_holds_for_many_too() -> None:
+    class Clipped(NumbersView):
+        def observation(self, scene: Scene) -> Any:
+            return np.clip(super().observation(scene), -1.0, 1.0)
+
+    class Doubled(NumbersView):
+        def with_action(self, scene: Scene, action: Any) -> Scene:
+            return super().with_action(scene, 2.0 * action)
+
+    space, acting = FlatCart().observation_space, FlatCart().action_space
+    start = {"scene": flat_model().schema.scene({"self": [5.0, -4.0]})}
+    push = np.array([[0.5]], np.float32)
+    for kind in (Clipped, Doubled):
+        alone = LearnedModelEnv(flat_model(), view=kind(space, acting))
+        many = LearnedModelVectorEnv(flat_model(), 1, view=kind(space, acting))
+        np.testing.assert_array_equal(many.reset(options=start)[0][0], alone.reset(options=start)[0])
+        np.testing.assert_array_equal(many.step(push)[0][0], alone.step(push[0])[0])
+
+
+def test_the_limits_of_boxes_are_those_of_what_they_show() -> None:
+    seen = spaces.Dict({"cart": spaces.Box(-100, 100, (2,), np.int64)})
+    boxes = BoxesShown(CART_SCHEMA, seen, spaces.Box(-1.0, 1.0, (1,), np.float32))
+    assert boxes.inside(np.array([[100.4, 0.6, 0.0, 0.0], [100.6, 0.0, 0.0, 0.0]])).tolist() == [True, False]
+    assert boxes.observations(np.array([[100.4, 0.6, 0.0, 0.0]]))["cart"].tolist() == [[100, 1]]
+    most = np.iinfo(np.int64)
+    wide = spaces.Dict({"cart": spaces.Box(most.min, most.max, (2,), np.int64)})
+    boxes = BoxesShown(CART_SCHEMA, wide, spaces.Box(-1.0, 1.0, (1,), np.float32))
+    ends = np.array([[2.0**63, 0.0, 0.0, 0.0], [2.0**62, 0.0, 0.0, 0.0], [-(2.0**63), 0.0, 0.0, 0.0]])
+    assert boxes.inside(ends).tolist() == [False, True, True]
 
 
 def test_many_switches_are_thrown_at_once() -> None:
@@ -459,6 +490,7 @@ def test_bad_input_names_the_remedy() -> None:
         ({"autoreset_mode": "never"}, r"autoreset_mode='never': expected one of \['NextStep'"),
         ({"min_margin": float("nan")}, "min_margin=nan"),
         ({"start": 3}, "start=3: expected a function, or None"),
+        ({"start": lambda rng: None}, r"expected a function of \(random generator, count\)"),
         ({"reward": np.zeros(2)}, "reward=array.*expected a function, 'learned' or None"),
         (
             {"reward": lambda before, action, after: 0.0},

@@ -97,11 +97,12 @@ def test_a_page_keeps_what_was_made_elsewhere_and_what_was_written_by_hand(tmp_p
         dyna_bars.shown(number, store, tmp_path / folder, "again")
     dyna_bars.page(tmp_path / "a", page)
     second = page.read_text().split("\n## ")[1]
-    page.write_text(page.read_text() + "\nAll in one night.\n\nReally.\n")
+    remark = "\nAll in one night.\n\n```text\nand day\n```\n\nReally.\n"
+    page.write_text(page.read_text() + remark)
     dyna_bars.page(tmp_path / "b", page)
     head, row_1, row_2 = page.read_text().split("\n## ")
     assert "Not made yet: row-3, BallGoal" in head and row_1.startswith("row-1: ")
-    assert row_2 == f"{second}\nAll in one night.\n\nReally.\n"
+    assert row_2 == f"{second}{remark}"
     dyna_bars.page(tmp_path / "a", page)
     assert page.read_text().split("\n## ") == [head, row_1, row_2]
 

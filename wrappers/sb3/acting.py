@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.errors import ConfigError
 from relgym.scene.objects import ACTION, Float2D, SceneLayout, SceneSchema
 
 __all__ = ["acting_all"]
@@ -15,7 +16,13 @@ __all__ = ["acting_all"]
 def acting_all(
     schema: SceneSchema, layout: SceneLayout, vectors: Float2D, actions: NDArray[Any]
 ) -> tuple[SceneLayout, NDArray[np.float64]]:
-    """Layout and state vectors with actions in them, in physical units: `relgym.envs.actions.acting` for n."""
+    """Layout and state vectors with actions in them, in physical units: `relgym.envs.actions.acting` for n.
+
+    Raises
+    ------
+    ConfigError
+        The action object has more properties than an action has numbers: a view makes them (`Lens.acting`).
+    """
     if ACTION not in schema.order:
         return layout, vectors
     whole = schema.layout((*layout.names, ACTION))
@@ -24,5 +31,10 @@ def acting_all(
         ranges = {p: (k, low, high) for k, (p, low, high) in enumerate(schema.action_scale)}
         scaled = [ranges[prop] for prop in schema.type_of(ACTION).properties]
         done = np.stack([low + (done[:, k] + 1.0) / 2.0 * (high - low) for k, low, high in scaled], axis=1)
+    if done.shape[1] != (known := len(schema.type_of(ACTION).properties)):
+        raise ConfigError(
+            f"expected {known} numbers for each action, as the action object has, got {done.shape[1]}: what a view "
+            "makes of them Lens(env).acting says, acting= of a LearnedTask"
+        )
     at = whole.offsets[whole.index(ACTION)]
     return whole, np.concatenate([vectors[:, :at], done, vectors[:, at:]], axis=1)

@@ -172,6 +172,8 @@ def checked_judge(judge: Any, model: DreamModel, schema: SceneSchema, acting: Ac
             f"judge={judge!r}: expected 'learned', or an object with judge(layout, before, actions, after) for arrays "
             "of steps, as a relgym.envs.tasks.Task has"
         )
+    if isinstance(judge, (LearnedTask, NeuralTask)) and acting is not None:
+        judge.adopt(acting)
     found: Judge = judge
     return found
 

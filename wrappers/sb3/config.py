@@ -45,8 +45,9 @@ class DynaConfig:
     permute
         Whether dreams exchange the roles of objects of one type. The model licenses that, a net doesn't.
     redraw
-        Whether dreams redraw properties of bodiless objects that no law of motion mentions, between the
-        smallest and the largest value seen at the start of episodes. The model licenses that too.
+        Whether dreams redraw properties of bodiless objects that no law but their own mentions, between the
+        smallest and the largest value seen at the start of episodes. The model licenses that too; where nothing has a
+        body, nothing is redrawn.
     kick
         Share of the dreams in which moving bodies begin with velocities redrawn, up to twice as fast as they were ever
         seen. So dreams get where no real step has led yet: exploring starts (Sutton & Barto 2018, §5.3), which the

@@ -43,6 +43,8 @@ def explore(apprentice: Apprentice, env: gym.Env[Any, Any], steps: int, *, seed:
     if steps < 1:
         raise ConfigError(f"steps={steps!r}: expected at least 1")
     _check_recorded(env)
+    if hasattr(apprentice.judge, "adopt"):
+        apprentice.judge.adopt(Lens(env).acting)
     env.action_space.seed(seed)
     env.reset(seed=seed)
     for _ in range(steps):
@@ -224,7 +226,10 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
                 f"spoke of {gate.known:.0%} of the latest real steps: let it watch more of them (explore) before an "
                 "agent trains in its dreams"
             )
-        self._next = min(self._next, self.num_timesteps)  # another learn() may count from 0 again
+        if (
+            self.history and self.num_timesteps < self.history[-1][0]
+        ):  # another learn() that counts from 0 again
+            self._next = self.num_timesteps
 
     def _on_step(self) -> bool:
         if self.num_timesteps < self._next:

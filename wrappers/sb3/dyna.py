@@ -99,6 +99,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self._dreamed_at = 0
         self._made_up = -1  # verdicts that were known when the agent was last trained in a burst
         self._trained: Any = None  # the agent
+        self._usual = 1  # its gradient steps
+        self._lent: int | None = None  # those that it has in their place
         self._known = 0.0
         self._mixed: Any = None
         self._apprentice: Apprentice | None = None
@@ -123,12 +125,15 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         if self._mixed is not self.buffer:  # another agent's, or one that was loaded
             self.buffer.hold(self.config.capacity)
             self._mixed = self.buffer
-        if self._trained is not self.model:
+        again = self._trained is self.model
+        if not again:
             self._trained, self._made_up = self.model, -1
         self.buffer.real_ratio = self.config.real_ratio
         self._imagination = Imagination(self.world, lens, self._apprentice.judge)
         self._repeat = lens.repeat
-        self._usual = int(self.model.gradient_steps)
+        if again and self.model.gradient_steps == self._lent:  # training was interrupted
+            self.model.gradient_steps = self._usual
+        self._usual, self._lent = int(self.model.gradient_steps), None
         self._dreamed_at = min(self._dreamed_at, int(self.model.num_timesteps))
 
     def _on_training_start(self) -> None:
@@ -137,13 +142,12 @@ class Dyna(BaseCallback):  # type: ignore[misc]
                 self.apprentice.take_up(real)
 
     def _on_rollout_start(self) -> None:
-        self.model.gradient_steps = (
-            self._usual
-        )  # what callbacks save between here and the end is the agent's own
+        self._give_back()  # what callbacks save between here and the end is the agent's own
 
     def _on_step(self) -> bool:
         for steps in self.training_env.env_method("take"):
-            if len(steps) > self._repeat:
+            # Of more than one episode others have made some: an evaluation in this env, a wrapper's reset.
+            if len(steps) > self._repeat and not any(real.first for real in steps[1:]):
                 raise ConfigError(
                     f"a decision lasted {len(steps)} env steps, but dreamed ones last {self._repeat}: let "
                     "relgym.wrappers.ActionRepeat or gymnasium.wrappers.RepeatAction repeat actions, or put what "
@@ -152,9 +156,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
             for real in steps:
                 self.apprentice.take_up(real)
         trusted = self.apprentice.gate.open
-        if (
-            not trusted and self.buffer.imagined.size()
-        ):  # what a model dreamed that is wrong by now is worth nothing
+        if not trusted and self.buffer.imagined.size():  # what a model dreamed that is wrong is worth nothing
             self.buffer.hold(self.config.capacity)
         if trusted and not self._awake() and (self.buffer.imagined.size() == 0 or self._due()):
             self._dream()
@@ -164,13 +166,16 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         return True
 
     def _on_rollout_end(self) -> None:
-        self.model.gradient_steps = self._gradient_steps(self.buffer.trusted)
+        self._lent = self.model.gradient_steps = self._gradient_steps(self.buffer.trusted)
 
     def _on_training_end(self) -> None:
         self.apprentice.catch_up()
         self._complain()
-        self.model.gradient_steps = self._usual
+        self._give_back()
         self.buffer.trusted = False  # without this callback nobody refreshes what was dreamed
+
+    def _give_back(self) -> None:
+        self.model.gradient_steps, self._lent = self._usual, None
 
     def _complain(self) -> None:
         """Warn where no dream was ever trusted, with what the learners lack: else it would go unnoticed."""

@@ -91,7 +91,8 @@ class LearnedTask(Judging):
     config
         Free parameters of the model; laws of motion have nothing to say here.
     acting
-        Puts actions into scenes; default: by the schema's affine maps.
+        Puts actions into scenes; default: as the env does in which `Dyna` or `explore` let it judge, else by the
+        schema's affine maps.
 
     Attributes
     ----------
@@ -124,7 +125,7 @@ class LearnedTask(Judging):
     ) -> None:
         self.schema = schema
         self._changing = frozenset(changing)
-        self._acting = partial(acting_all, schema) if acting is None else acting
+        self._acting = acting
         counts = Counter(name for _, name in schema.objects)
         single = [
             (name, schema.type(t)) for name, t in schema.objects if counts[t] == 1 and t not in (ACTION, TASK)
@@ -141,6 +142,10 @@ class LearnedTask(Judging):
         self._rng = np.random.default_rng(0)
         self._together: set[tuple[int, int]] = set()
         self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
+
+    def adopt(self, acting: Acting) -> None:
+        """Take over how actions come into scenes, as an env has it, where nobody said so when it was made."""
+        self._acting = self._acting or acting
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the judge to one file, atomically, with all that further learning needs; `load` reads it.
@@ -298,7 +303,8 @@ class LearnedTask(Judging):
         if name == TASK:
             return np.zeros((len(before), 2))
         if name == ACTION:
-            whole, joined = self._acting(layout, before, actions)
+            acting = self._acting or partial(acting_all, self.schema)
+            whole, joined = acting(layout, before, actions)
             return joined[:, whole.slice(whole.index(ACTION))]
         pairs, vectors = (self._now, before) if name == _NOW else (self._next, after)
         found: NDArray[np.float64] = vectors[:, [layout.column(layout.index(o), prop) for o, prop in pairs]]
@@ -330,16 +336,21 @@ class NeuralTask:
     model
         The model; it learns the task together with the scenes.
     acting
-        Puts actions into scenes; default: by the affine maps of the model's schema.
+        Puts actions into scenes; default: as of `LearnedTask`.
     """
 
     learned: Final = True
 
     def __init__(self, model: NeuralModel, *, acting: Acting | None = None) -> None:
         self.model = model
-        self._acting = partial(acting_all, model.schema) if acting is None else acting
+        self._acting = acting
+
+    def adopt(self, acting: Acting) -> None:
+        """As of `LearnedTask`."""
+        self._acting = self._acting or acting
 
     def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
         """What the model says; the next scene doesn't matter to it."""
-        rewards, ended = self.model.judge_all(*self._acting(layout, before, actions))
+        acting = self._acting or partial(acting_all, self.model.schema)
+        rewards, ended = self.model.judge_all(*acting(layout, before, actions))
         return Judgement(rewards, ended, np.zeros(len(before), dtype=bool))

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from relgym.envs.learned_model_shown import ViewDeeds, is_plain, shown_at_once
+from relgym.envs.learned_model_shown import Boxes, ViewDeeds, is_plain, shown_at_once
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import Float2D, Scene, SceneLayout
 from relgym.wrappers.sb3.acting import acting_all
@@ -71,12 +71,11 @@ class Lens:
         base: Any = (
             self._base if self._plain else spaces.Dict()
         )  # if plain, of Boxes, as the view has checked
-        self._dtypes = {name: part.dtype for name, part in base.spaces.items()}
-        self._low = {name: part.low for name, part in base.spaces.items()}
-        self._high = {name: part.high for name, part in base.spaces.items()}
+        self._boxes = Boxes(base.spaces)
 
     def _take_up(self, layer: gym.Wrapper[Any, Any, Any, Any]) -> None:
-        own = vars(layer).get("num_repeats" if isinstance(layer, gym.wrappers.RepeatAction) else "repeat")
+        gymnasiums = isinstance(layer, getattr(gym.wrappers, "RepeatAction", ()))  # since 1.3
+        own = vars(layer).get("num_repeats" if gymnasiums else "repeat")
         if isinstance(layer, _REWARDING):
             raise ConfigError(
                 f"{type(layer).__name__} changes rewards outside the TransitionRecorder, where dreams would be paid "
@@ -126,11 +125,7 @@ class Lens:
             if (found := shown_at_once(self._view, layout, vectors)) is not None:
                 return found[1]
             return np.array([self._shows(scene) for scene in self._scenes(layout, vectors)], dtype=np.bool_)
-        low, high = (
-            np.concatenate([ends[name] for name in layout.names]) for ends in (self._low, self._high)
-        )
-        within = (low <= vectors) & (vectors <= high)
-        return np.asarray(within.all(axis=1))
+        return self._boxes.inside(layout, vectors)
 
     def _shows(self, scene: Scene) -> bool:
         try:
@@ -147,8 +142,7 @@ class Lens:
             if found is not None and isinstance(found[0], (np.ndarray, dict)):
                 return found[0]
             return _stacked([self._view.observation(scene) for scene in self._scenes(layout, vectors)])
-        cuts = ((name, layout.slice(k)) for k, name in enumerate(layout.names))
-        return {name: vectors[:, cut].astype(self._dtypes[name]) for name, cut in cuts}
+        return self._boxes.shown(layout, vectors)
 
     def _cast(self, seen: Observations) -> Observations:
         if isinstance(seen, dict):

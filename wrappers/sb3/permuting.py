@@ -47,6 +47,7 @@ class PermutedReplay(BaseCallback):  # type: ignore[misc]
         self.copies, self.capacity = copies, capacity
         self._rng = np.random.default_rng([seed, 2])
         self._like = like
+        self._mixed: Any = None
 
     def _init_callback(self) -> None:
         check_algorithm(self.model)
@@ -54,7 +55,9 @@ class PermutedReplay(BaseCallback):  # type: ignore[misc]
         buffer: Any = self.model.replay_buffer
         if getattr(buffer, "n_steps", 1) > 1:
             raise ConfigError("renamed transitions stand alone and give no n-step returns: take n_steps=1")
-        buffer.hold(min(self.capacity, self.copies * buffer.buffer_size))
+        if self._mixed is not buffer:  # another agent's, or one that was loaded
+            buffer.hold(min(self.capacity, self.copies * buffer.buffer_size))
+            self._mixed = buffer
         buffer.real_ratio = 1.0 / (1.0 + self.copies)
         buffer.trusted = True
 

@@ -254,6 +254,7 @@ def test_spaces_that_say_nothing_of_objects_are_refused_with_a_remedy(space: Any
         ({"parts": [Part("a", ("x0",)), Part("b", ("x0",))]}, r"\['x0'\] are claimed by several"),
         ({"parts": [Part("a", {"p": "x0"}, type="t"), Part("b", {"q": "x1"}, type="t")]}, "type 't' differ"),
         ({"parts": [Part("action", ("x0",))]}, "can't be called 'action'"),
+        ({"parts": [Part("task", ("x0",))]}, "can't be called 'task': that is what a step brings"),
         ({"parts": [Part("a", ("x0",), constants={"x0": 1.0})]}, "columns and constants at once"),
         ({"parts": [Part("a", ("x0",))], "angles": [("x0", "x1")]}, "must belong to the same object"),
         ({"angles": [("x0", "x7")]}, r"no numbers \['x7'\]"),

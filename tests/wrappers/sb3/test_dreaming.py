@@ -139,13 +139,14 @@ def test_check_ups_are_made_again_in_a_second_training() -> None:
     from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
 
     model = apprentice()
-    check = DreamCheckup(model, world(), every=32, episodes=1)
+    check = DreamCheckup(model, world(), every=100, episodes=1)
     env = DreamVecEnv(model, world(), num_envs=4, config=QUICK)
     agent = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
-    agent.learn(128, callback=check)
-    once = len(check.history)
-    agent.learn(128, callback=check)  # counts from 0 again
-    assert once >= 3 and len(check.history) == 2 * once
+    counts = []
+    for again in (True, False, True):  # 64 steps each
+        agent.learn(64, callback=check, reset_num_timesteps=again)
+        counts.append(len(check.history))
+    assert counts == [1, 2, 3]  # after 4 and 104 steps; and after 4 when counted from 0 again
 
 
 def test_what_was_explored_has_all_been_learned() -> None:

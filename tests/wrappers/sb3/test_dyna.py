@@ -167,6 +167,51 @@ def test_steps_that_were_made_before_are_learned_from_too() -> None:
     assert len(world.learned) == 25
 
 
+def test_steps_that_others_make_in_the_env_are_no_long_decision() -> None:
+    from stable_baselines3.common.callbacks import CallbackList, EvalCallback
+
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    class Restless(gym.Wrapper[Any, Any, Any, Any]):
+        """Does nothing three times before an episode."""
+
+        def reset(self, **options: Any) -> Any:
+            self.env.reset(**options)
+            for _ in range(3):
+                seen, _, _, _, info = self.env.step(np.zeros(1, dtype=np.float32))
+            return seen, info
+
+    world, env = LineModel(), flat()
+    tests = EvalCallback(env, eval_freq=15, n_eval_episodes=2, verbose=0, warn=False)
+    agent("SAC", env).learn(30, callback=CallbackList([tests, Dyna(world, DynaConfig(**QUICK))]))
+    assert len(world.learned) > 30
+    restless = Flat(Restless(TransitionRecorder(gym.wrappers.TimeLimit(LineEnv(), 8))))
+    agent("SAC", restless).learn(30, callback=Dyna(LineModel(), DynaConfig(**QUICK)))
+
+
+def test_an_interrupted_training_leaves_the_agent_its_own_gradient_steps() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    algorithm, dyna = agent("SAC", flat()), Dyna(LineModel(), DynaConfig(**QUICK))
+    train, left = algorithm.train, [25]
+
+    def interrupted(*given: Any, **named: Any) -> None:
+        left[0] -= 1
+        if left[0] == 0:
+            raise KeyboardInterrupt
+        train(*given, **named)
+
+    algorithm.train = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        algorithm.learn(60, callback=dyna)
+    assert algorithm.gradient_steps == 2  # Dyna's
+    algorithm.learn(20, callback=dyna)
+    assert algorithm.gradient_steps == 1
+    algorithm.gradient_steps = 3  # what a user sets in between counts
+    algorithm.learn(20, callback=dyna)
+    assert algorithm.gradient_steps == 3
+
+
 def test_in_bursts_the_target_net_of_dqn_follows() -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 

@@ -141,6 +141,20 @@ def test_wrappers_that_remember_are_refused(wrapper: Any) -> None:
         Lens(wrapper(Flat(TransitionRecorder(LineEnv()))))
 
 
+def test_agents_are_shown_whole_numbers_as_the_env_shows_them() -> None:
+    env = LineEnv(dtype=np.int16)
+    lens = Lens(TransitionRecorder(env))
+    state = np.array([[2.9999999, 1.0, -0.9999999, 2.0, 99.6], [1e6, 1.0, 0.0, 2.0, 0.0]])
+    seen: Any = lens.observations(LAYOUT, state[:1])
+    assert [seen[name][0, 0] for name in ("cart", "other", "mark")] == [3, -1, 100]
+    assert lens.inside(LAYOUT, state).tolist() == [True, False]
+    env.observation_space["cart"] = gym.spaces.Box(-np.inf, np.inf, (2,), np.float32)
+    wide = Lens(TransitionRecorder(env))
+    far = np.array([[x, 1.0, 0.0, 2.0, 0.0] for x in (1e30, 1e39, np.inf, np.nan)])
+    assert wide.inside(LAYOUT, far).tolist() == [True, False, False, False]
+
+
+@pytest.mark.skipif(not hasattr(gym.wrappers, "RepeatAction"), reason="Gymnasium has it since 1.3")
 def test_gymnasiums_repeats_count() -> None:
     inner = ActionRepeat(TransitionRecorder(LineEnv()), 3)
     assert Lens(Flat(gym.wrappers.RepeatAction(inner, 2))).repeat == 6

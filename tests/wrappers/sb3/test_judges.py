@@ -8,12 +8,14 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium import spaces
 
 import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
 from relgym.envs.scripted import ball_home, push_knowing
-from relgym.errors import ModelFileError
+from relgym.errors import ConfigError, ModelFileError
 from relgym.scene.objects import ObjectType, SceneSchema, Target, Transition
+from relgym.wrappers.sb3.apprentice import Apprentice
 from relgym.wrappers.sb3.judges import LearnedTask
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
 from relgym.wrappers.sb3.stock import changing
@@ -247,3 +249,32 @@ def test_dyna_learns_the_task_beside_the_world() -> None:
     assert isinstance(judge, LearnedTask)
     assert (model.seen, judge.model.seen) == (250, 250)
     assert 0.0 < dyna.apprentice.gate.error < 1.0
+
+
+def test_actions_come_into_scenes_as_the_env_has_them() -> None:
+    """Three choices are a number and three indicators in its scenes: a judge of one's own learns that from the env."""
+    pytest.importorskip("stable_baselines3")
+    from relgym.wrappers.sb3.dreaming import explore
+
+    class Paying(gym.Env[Any, Any]):
+        observation_space = spaces.Box(-np.inf, np.inf, (1,), np.float64)
+        action_space = spaces.Discrete(3)
+
+        def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+            super().reset(seed=seed)
+            self.x, self.steps = self.np_random.uniform(-1.0, 1.0, 1), 0
+            return self.x.copy(), {}
+
+        def step(self, action: Any) -> Any:
+            self.x, self.steps = 0.9 * self.x + (action == 1), self.steps + 1
+            return self.x.copy(), float(action == 1), False, self.steps >= 20, {}
+
+    env = TransitionRecorder(Paying())
+    schema = env.view.schema
+    judge = LearnedTask(schema, {("self", "x")})
+    bare, nothing, choices = schema.layout(("self",)), np.zeros((3, 1)), np.arange(3)
+    explore(Apprentice(relgym.WorldModel(schema), judge), env, 120, seed=0)
+    told = judge.judge(bare, nothing, choices, np.array([[0.0], [1.0], [0.0]]))
+    np.testing.assert_allclose(told.rewards, [0.0, 1.0, 0.0], atol=1e-6)
+    with pytest.raises(ConfigError, match=r"expected 4 numbers for each action.*Lens\(env\)\.acting"):
+        LearnedTask(schema, {("self", "x")}).judge(bare, nothing, choices, nothing)

@@ -47,6 +47,15 @@ def trained(**options: Any) -> Any:
     return agent.learn(30, callback=PermutedReplay(copies=3, seed=0))
 
 
+def test_a_second_training_keeps_what_was_renamed() -> None:
+    from relgym.wrappers.sb3.permuting import PermutedReplay
+
+    agent, replay = trained(), PermutedReplay(copies=3, seed=0)
+    agent.learn(20, callback=replay)
+    agent.learn(5, callback=replay)
+    assert (agent.replay_buffer.size(), agent.replay_buffer.imagined.size()) == (55, 75)
+
+
 def test_rewards_are_normalised_once_and_steps_made_before_are_left_out() -> None:
     import torch
     from stable_baselines3 import SAC
