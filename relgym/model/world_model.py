@@ -187,6 +187,11 @@ class WorldModel:
         self._percept = None
         self.finish()
 
+    def untaught(self) -> WorldModel:
+        """A model of the same schema, configuration and named targets that has learned nothing."""
+        named = None if self._parts.open else self.targets
+        return WorldModel(self.schema, self.config, targets=named)
+
     def finish(self) -> int:
         """Re-learn every stale classifier now, without a budget; returns the work spent.
 

@@ -34,10 +34,15 @@ __all__ = ["Apprentice", "check_model", "checked_judge"]
 class Apprentice:
     """Foretells, is judged, learns; test, then train (Dawid 1984).
 
+    A model that was trusted and is no more may be one of a world that has changed: what it learned before counts on,
+    and nothing in a scene tells what holds when. So a rival begins to learn the same steps from nothing, and whichever
+    is trusted first goes on (Gama et al. 2004 begin anew from such a point on).
+
     Parameters
     ----------
     model
-        The model; one that is frozen (``model.frozen``) is judged all the same, but doesn't learn.
+        The model; one that is frozen (``model.frozen``) is judged all the same, but doesn't learn, nor does it get a
+        rival. Rivals need a method ``untaught`` of the model's, as `WorldModel.untaught`.
     judge
         Reward and termination; one that learns (`LearnedTask`) learns from every step as it comes. ``"learned"``: as
         for `Dyna`.
@@ -51,70 +56,80 @@ class Apprentice:
 
     Attributes
     ----------
-    gate : TrustGate
-        Whether to trust the model.
     stock : SceneStock
         Real scenes to dream on from.
     seconds : float
         Time spent on foretelling and learning.
+    renewals : int
+        How often a rival has taken the model's place.
     """
 
     def __init__(
         self, model: DreamModel, judge: Judge | Literal["learned"], config: DynaConfig | None = None
     ) -> None:
-        config = checked_config(config)
-        self.model = model
+        self._config = checked_config(config)
+        self._pupil = _Pupil(model, self._config, np.random.default_rng([self._config.seed, 1]))
+        self._rival: _Pupil | None = None
+        self._rivals = 0
         self.judge = checked_judge(judge, model, model.schema)
-        self.gate = TrustGate(
-            open_at=config.open_at, shut_at=config.shut_at, window=config.window, least=config.least
-        )
         self.stock = SceneStock()
         self.seconds = 0.0
-        self._learns = not getattr(model, "frozen", False)
-        self._waiting: list[Experience] = []
-        self._shuffle = config.shuffle
-        self._rng = np.random.default_rng([config.seed, 1])
+        self.renewals = 0
+
+    @property
+    def model(self) -> DreamModel:
+        """The model at work: the one that was given, until a rival takes its place."""
+        return self._pupil.model
+
+    @property
+    def gate(self) -> TrustGate:
+        """Whether to trust the model."""
+        return self._pupil.gate
 
     def take_up(self, real: Experience) -> None:
         """Foretell a real step, judge the model by it, and learn from it or from an earlier one."""
         started = perf_counter()
-        self.gate.count(self._judged(real))
+        self.gate.count(self._judged(self.model, real))
         self.stock.add(real.start, first=real.first)
+        rival = self._challenge()
+        if rival is not None:
+            rival.gate.count(self._judged(rival.model, real))
         if hasattr(self.judge, "learn_step"):
             # At once: a judge sees but what is there once, and what there is to learn is rare at first.
             self.judge.learn_step(real.transition, real.reward, terminated=real.terminated)
-        if self._learns:
-            self._learn(real)
+        self._pupil.learn(real)
+        if rival is not None:
+            rival.learn(real)
+            if rival.gate.open:
+                self._pupil, self._rival, self.renewals = rival, None, self.renewals + 1
         self.seconds += perf_counter() - started
 
     def catch_up(self) -> None:
         """Learn what is still waiting for its turn; there may be no more steps to wait for."""
         started = perf_counter()
-        for k in self._rng.permutation(len(self._waiting)).tolist():
-            self._teach(self._waiting[k])
-        self._waiting.clear()
+        self._pupil.catch_up()
         self.seconds += perf_counter() - started
 
-    def _learn(self, real: Experience) -> None:
-        """A stock of `shuffle` experiences is learned from in random order, one for every new one."""
-        self._waiting.append(real)
-        if len(self._waiting) > self._shuffle:
-            chosen = int(self._rng.integers(len(self._waiting)))
-            self._waiting[chosen], self._waiting[-1] = self._waiting[-1], self._waiting[chosen]
-            self._teach(self._waiting.pop())
+    def _challenge(self) -> _Pupil | None:
+        """The rival of a model that was trusted and is no more, if it has one."""
+        patience, own = self._config.renew, self._pupil
+        if own.gate.open or not own.gate.switches or not (patience and own.learns):
+            self._rival = None
+        elif self._rival is None or self._rival.steps >= patience:
+            untaught = getattr(own.model, "untaught", None)
+            if untaught is None:
+                return None
+            self._rivals += 1
+            rng = np.random.default_rng([self._config.seed, 4, self._rivals])
+            self._rival = _Pupil(untaught(), self._config, rng)
+        return self._rival
 
-    def _teach(self, real: Experience) -> None:
-        if hasattr(self.model, "learn_step"):  # the task as well
-            self.model.learn_step(real.transition, real.reward, terminated=real.terminated)
-        else:
-            self.model.learn_one(real.transition)
-
-    def _judged(self, real: Experience) -> Verdict:
+    def _judged(self, model: DreamModel, real: Experience) -> Verdict:
         before, after = real.start, real.transition.after
-        foretold = self.model.predict_one(real.transition.before)
+        foretold = model.predict_one(real.transition.before)
         changes: dict[Key, float] = {(TASK, "reward"): real.reward, (TASK, "terminated"): 1.0}
         residuals: dict[Key, float] = {}
-        moving = changing(self.model)
+        moving = changing(model)
         for o in before:
             if o.name not in after:
                 continue
@@ -141,6 +156,43 @@ class Apprentice:
             (TASK, "reward"): real.reward - float(judged.rewards[0]),
             (TASK, "terminated"): float(real.terminated) - float(judged.terminated[0]),
         }
+
+
+class _Pupil:
+    """A model, whether it is trusted, and the lessons that wait for their turn."""
+
+    def __init__(self, model: DreamModel, config: DynaConfig, rng: np.random.Generator) -> None:
+        self.model = model
+        self.gate = TrustGate(
+            open_at=config.open_at, shut_at=config.shut_at, window=config.window, least=config.least
+        )
+        self.learns = not getattr(model, "frozen", False)
+        self.steps = 0
+        self._waiting: list[Experience] = []
+        self._shuffle, self._rng = config.shuffle, rng
+
+    def learn(self, real: Experience) -> None:
+        """A stock of `shuffle` experiences is learned from in random order, one for every new one."""
+        self.steps += 1
+        if not self.learns:
+            return
+        self._waiting.append(real)
+        if len(self._waiting) > self._shuffle:
+            chosen = int(self._rng.integers(len(self._waiting)))
+            self._waiting[chosen], self._waiting[-1] = self._waiting[-1], self._waiting[chosen]
+            self._teach(self._waiting.pop())
+
+    def catch_up(self) -> None:
+        """Learn all that waits."""
+        for k in self._rng.permutation(len(self._waiting)).tolist():
+            self._teach(self._waiting[k])
+        self._waiting.clear()
+
+    def _teach(self, real: Experience) -> None:
+        if hasattr(self.model, "learn_step"):  # the task as well
+            self.model.learn_step(real.transition, real.reward, terminated=real.terminated)
+        else:
+            self.model.learn_one(real.transition)
 
 
 def checked_judge(judge: Any, model: DreamModel, schema: SceneSchema, acting: Acting | None = None) -> Judge:

@@ -58,6 +58,10 @@ class DynaConfig:
     open_at, shut_at
         The model is trusted when its prequential error falls to `open_at`, until it rises to `shut_at`
         (`TrustGate`).
+    renew
+        A model that was trusted and is no more gets a rival that learns the same steps from nothing, and takes its
+        place if it is trusted first (`Apprentice`); one that isn't trusted within so many real steps begins anew.
+        0: no rivals.
     window, least
         Latest real steps that the error is a mean of, and how many there must be.
     seed
@@ -79,6 +83,7 @@ class DynaConfig:
     shuffle: int = 150
     open_at: float = 0.1
     shut_at: float = 0.2
+    renew: int = 1_000
     window: int = 100
     least: int = 50
     seed: int = 0
@@ -124,6 +129,7 @@ _LEAST = {
     "updates_alone": 0,
     "burst": 0,
     "shuffle": 0,
+    "renew": 0,
     "window": 1,
     "least": 1,
     "seed": 0,

@@ -66,7 +66,10 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     Notes
     -----
     Logged: ``relgym/error``, ``relgym/known``, ``relgym/trusted``, ``relgym/imagined`` (how many so far),
-    ``relgym/dreams_known``, ``relgym/learning_seconds`` and ``relgym/dreaming_seconds``.
+    ``relgym/dreams_known``, ``relgym/renewals`` (how often a rival took the model's place: `Apprentice`),
+    ``relgym/learning_seconds`` and ``relgym/dreaming_seconds``.
+
+    The model that was passed stays that of the world it learned: where a rival has taken its place, that is `world`.
 
     Examples
     --------
@@ -89,7 +92,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         verbose: int = 0,
     ) -> None:
         super().__init__(verbose)
-        self.world = model
+        self._given = model
         self.config = checked_config(config)
         self.imagined = 0
         self.dreaming_seconds = 0.0
@@ -105,6 +108,11 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self._mixed: Any = None
         self._apprentice: Apprentice | None = None
         self._imagination: Imagination | None = None
+
+    @property
+    def world(self) -> DreamModel:
+        """The model at work: the one that was given, until a rival takes its place (`Apprentice`)."""
+        return self._given if self._apprentice is None else self._apprentice.model
 
     @property
     def apprentice(self) -> Apprentice:
@@ -130,6 +138,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
             self._trained, self._made_up = self.model, -1
         self.buffer.real_ratio = self.config.real_ratio
         self._imagination = Imagination(self.world, lens, self._apprentice.judge)
+        self._renewals = self._apprentice.renewals
         self._repeat = lens.repeat
         if again and self.model.gradient_steps == self._lent:  # training was interrupted
             self.model.gradient_steps = self._usual
@@ -155,6 +164,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
                 )
             for real in steps:
                 self.apprentice.take_up(real)
+        if self.apprentice.renewals != self._renewals:
+            self._begin_anew()
         trusted = self.apprentice.gate.open
         if not trusted and self.buffer.imagined.size():  # what a model dreamed that is wrong is worth nothing
             self.buffer.hold(self.config.capacity)
@@ -173,6 +184,13 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self._complain()
         self._give_back()
         self.buffer.trusted = False  # without this callback nobody refreshes what was dreamed
+
+    def _begin_anew(self) -> None:
+        """Dream in the model that has taken the other one's place; what was dreamed before is of another world."""
+        assert self._imagination is not None, "made when training begins"
+        self._imagination = Imagination(self.world, self._imagination.lens, self.apprentice.judge)
+        self._renewals, self._made_up = self.apprentice.renewals, -1
+        self.buffer.hold(self.config.capacity)
 
     def _give_back(self) -> None:
         self.model.gradient_steps, self._lent = self._usual, None
@@ -277,6 +295,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         record("relgym/trusted", float(gate.open))
         record("relgym/imagined", self.imagined)
         record("relgym/dreams_known", self._known)
+        record("relgym/renewals", self.apprentice.renewals)
         record("relgym/learning_seconds", self.apprentice.seconds)
         record("relgym/dreaming_seconds", self.dreaming_seconds)
 
