@@ -137,14 +137,21 @@ def explain(
     from relgym.model.world_model import WorldModel
     from relgym.wrappers.views import view_of
 
+    loaded = WorldModel.load(model)
     env: Any = _make(env_id, arg)
     env.action_space.seed(seed)
-    observation, _ = env.reset(seed=seed)
-    for _ in range(step):
-        observation, *_ = env.step(env.action_space.sample())
-    view = view_of(env)
-    scene = view.with_action(view.scene(observation), env.action_space.sample())
-    typer.echo(WorldModel.load(model).explain(scene))
+    observation, info = env.reset(seed=seed)
+    # The model's own view knows which numbers are an angle, say; an env of scenes has others of its own.
+    view = view_of(env, None if env.has_wrapper_attr("schema") else loaded.extra.get("view"))
+    scene = view.scene(observation, info)
+    for taken in range(step):
+        observation, _, terminated, truncated, info = env.step(env.action_space.sample())
+        scene = view.scene(observation, info, last=scene)
+        if (terminated or truncated) and taken + 1 < step:
+            raise ConfigError(
+                f"--step {step}: the episode was over after {taken + 1} steps; try another --seed"
+            )
+    typer.echo(loaded.explain(view.with_action(scene, env.action_space.sample())))
 
 
 @app.command("eval")
@@ -316,8 +323,12 @@ def _make(env_id: str, arguments: list[str] | None) -> Any:
 
     try:
         return gymnasium.make(env_id, **dict(map(_argument, arguments or [])))
-    except gymnasium.error.UnregisteredEnv as error:
+    except gymnasium.error.Error as error:
         raise ConfigError(f"{error}; `relgym envs` lists relgym's own") from None
+    except (ImportError, TypeError, ValueError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise ConfigError(f"{env_id} with {arguments or 'no arguments'} can't be made: {error}") from None
 
 
 def _argument(text: str) -> tuple[str, Any]:

@@ -76,6 +76,13 @@ def test_explain_a_scene_of_an_env(folder: Path) -> None:
     assert "ball.vx: " in text and "ball.vy: " in text
 
 
+def test_explain_goes_by_the_models_own_view_and_stays_in_the_episode(folder: Path, tmp_path: Path) -> None:
+    run("learn", "Pendulum-v1", "--steps", 60, "--out", tmp_path / "p.json")
+    assert "self.x2: " in run("explain", tmp_path / "p.json", "Pendulum-v1", "--step", 5)
+    text = run("explain", folder / "truck.json", "relgym/TruckPush-v0", "--step", 100, code=2)
+    assert "the episode was over after" in text
+
+
 def test_explain_an_action(folder: Path) -> None:
     text = run("explain", folder / "truck.json", "relgym/TruckPush-v0", "--arg", "redraw=step")
     assert "truck.vx: 0" in text
@@ -133,6 +140,10 @@ def test_doctor_finds_everything_that_the_tests_run_with() -> None:
         (("inspect", "relgym/Nowhere-v0"), "relgym envs"),
         (("inspect", "CartPole-v1"), "schema"),
         (("inspect", "relgym/TruckPush-v0", "-a", "n_boxes"), "NAME=VALUE"),
+        (("inspect", "relgym/TruckPush-v0", "-a", "nosuch=3"), "nosuch"),
+        (("inspect", "relgym/LearnedModel-v0"), "can't be made"),
+        (("inspect", "nomod:Foo-v0"), "No module named 'nomod'"),
+        (("inspect", "a:b:c"), "a:b:c with no arguments can't be made"),
         (("inspect", "relgym/TruckPush-v0", "-a", "n_boxes=99"), "n_boxes"),
     ],
 )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from relgym.baselines.ensemble import MLPEnsemble
 from relgym.errors import ConfigError
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
+from relgym.model.scenes import unwrapped, wrap
 from relgym.scene.objects import ACTION, Float2D, Scene, SceneLayout, SceneSchema, Target, Transition
 
 __all__ = ["Features", "NeuralWorldModel"]
@@ -78,9 +79,10 @@ class NeuralWorldModel:
         before, after = transition.before, transition.after
         columns = self._columns(before.layout)
         now = before.vector[columns]
-        following = np.concatenate(
+        whole = np.concatenate(
             [after[name].values if name in after else before[name].values for name in before.layout.names]
-        )[columns]
+        )
+        following = unwrapped(before.layout, before.vector, whole)[columns]
         values = np.concatenate([following - now, [reward, float(terminated)]])
         self.ensemble.learn_one(self._rows(before.layout, before.vector[None])[0], values)
 
@@ -107,6 +109,7 @@ class NeuralWorldModel:
             changes = self.ensemble.predict_batch(self._rows(layout, vectors))
             following[:, columns] += changes[:, : len(columns)]
             self._derive(layout, vectors, following)
+            wrap(layout, following)
         return BatchPrediction(
             layout,
             following,
@@ -142,7 +145,7 @@ class NeuralWorldModel:
         return [layout.column(layout.index(name), prop) for name, prop in self._parts(layout)]
 
     def _derive(self, layout: SceneLayout, now: Float2D, following: Float2D) -> None:
-        for law in self.schema.kinematics:
+        for law in self.schema.derivations:
             for index in layout.of_type(law.type):
                 place, rate = layout.column(index, law.property), layout.column(index, law.rate)
                 source = following if law.uses_next else now

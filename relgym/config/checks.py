@@ -2,9 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+from typing import Any
+
 from relgym.errors import ConfigError
 
-__all__ = ["at_least", "one_of", "unit"]
+__all__ = ["at_least", "one_of", "plain", "unit"]
+
+
+def plain(config: Any) -> None:
+    """Make plain numbers of a record's fields, so that files can hold them.
+
+    Raises
+    ------
+    ConfigError
+        A field whose default is a whole number, a number or a truth value has something else.
+    """
+    for field in fields(config):
+        value, usual = getattr(config, field.name), field.default
+        if callable(getattr(value, "item", None)) and getattr(value, "ndim", 0) == 0:  # NumPy's
+            value = value.item()
+            object.__setattr__(config, field.name, value)
+        kinds: tuple[type, ...] = ()
+        if isinstance(usual, bool):
+            kinds, said = (bool,), "True or False"
+        elif isinstance(usual, int):
+            kinds, said = (int,), "a whole number"
+        elif isinstance(usual, float):
+            kinds, said = (int, float), "a number"
+        if kinds and (not isinstance(value, kinds) or (bool not in kinds and isinstance(value, bool))):
+            raise ConfigError(f"{field.name} must be {said}, got {value!r}")
 
 
 def one_of(config: object, **allowed: tuple[str, ...]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from relgym.config.checks import at_least, one_of, unit
+from relgym.config.checks import at_least, one_of, plain, unit
 from relgym.errors import ConfigError
 
 __all__ = ["ClassificationConfig"]
@@ -135,6 +135,7 @@ class ClassificationConfig:
     relearn_growth: float = 1.5
 
     def __post_init__(self) -> None:
+        plain(self)
         one_of(self, votes=("soft", "hard"), context=("auto", "approached", "touching", "all"))
         one_of(self, ambiguous=("drop", "keep"), literal_choice=("gain", "negatives"))
         one_of(self, tree_errors=("class", "stage"))

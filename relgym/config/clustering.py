@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from relgym.config.checks import at_least, one_of
+from relgym.config.checks import at_least, one_of, plain
 from relgym.errors import ConfigError
 
 __all__ = ["ClusteringConfig"]
@@ -75,6 +75,7 @@ class ClusteringConfig:
     review: bool = True
 
     def __post_init__(self) -> None:
+        plain(self)
         one_of(self, stickiness=("simple", "nearest"))
         at_least(self, 1, "draws", "support")
         at_least(self, 0, "max_terms")
@@ -84,6 +85,8 @@ class ClusteringConfig:
             raise ConfigError(f"noise_std must be 'auto' or a positive float, got {self.noise_std!r}")
         if least != "auto" and not (isinstance(least, int) and least >= 4):
             raise ConfigError(f"min_examples must be 'auto' or an int >= 4, got {self.min_examples!r}")
+        if not 0.0 < self.inlier_stds < float("inf"):
+            raise ConfigError(f"inlier_stds must be a positive number, got {self.inlier_stds}")
         if not 0.5 <= self.unify_ratio <= 1.0:
             raise ConfigError(f"unify_ratio must lie in [0.5, 1], got {self.unify_ratio}")
         if not self.refit_growth > 1.0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
-from relgym.config.checks import at_least, one_of
+from relgym.config.checks import at_least, one_of, plain
 from relgym.config.classification import ClassificationConfig
 from relgym.config.clustering import ClusteringConfig
 from relgym.errors import ConfigError
@@ -61,6 +61,10 @@ class ModelConfig:
     history: int = 200_000
 
     def __post_init__(self) -> None:
+        plain(self)
+        for name, kind in (("clustering", ClusteringConfig), ("classification", ClassificationConfig)):
+            if not isinstance(getattr(self, name), kind):
+                raise ConfigError(f"{name} must be a {kind.__name__}, got {getattr(self, name)!r}")
         one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
         at_least(self, 0, "seed", "work_per_step")
         at_least(self, 100, "history")

@@ -143,7 +143,7 @@ class Answers(StandIns):
         casts = self._casts(situation.signature)
         row = percept.rows(index, following[None], ordered=casts)
         x = row[0].tolist()
-        if not self.scope.covers_one(x):
+        if not self.scope.covers_one(x, situation.signature):
             return replace(nothing, outcome=Outcome.UNEXPLAINED)
         example = self._shown(situation, row)
         ranking = self.classifier.rank(
@@ -202,7 +202,7 @@ class Answers(StandIns):
         verdict.outcomes[:] = _NO_ROLES
         said = _UNEXPLAINED if self.undecided else _PREDICTED
         outside = ~ranking.seen if self.config.abstain and len(modes) > 1 else np.zeros(n, dtype=np.bool_)
-        beyond = ~self.scope.covers(x)
+        beyond = ~self.scope.covers(x, situation.signature)
         verdict.outcomes[outside], verdict.outcomes[beyond] = _OUTSIDE, _UNEXPLAINED
         waiting = ~(outside | beyond)
         for place in range(len(modes)):

@@ -125,7 +125,7 @@ class Guesses:
         self._due = int(GROWTH * max(LEAST, clusterer.seen))
         numbers, slots = alike(clusterer, table)
         self.best, work = _guessed(clusterer, table, slots, numbers)
-        beyond = numbers[~scope.covers(table.x[clusterer.rows[numbers]])]
+        beyond = numbers[~scope.covers(table.x[clusterer.rows[numbers]], slots)]
         self.beyond, more = _guessed(clusterer, table, slots, beyond)
         return work + more
 

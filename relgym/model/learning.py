@@ -14,7 +14,7 @@ from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.property_model import bodies_of
-from relgym.model.scenes import next_values, unwrapped
+from relgym.model.scenes import next_values, stays, unwrapped
 from relgym.scene.objects import Transition
 
 __all__ = ["LearnReport", "finish", "learn"]
@@ -53,7 +53,7 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
-            if before.layout.names[index] in after:
+            if stays(before, after, index):
                 _learn_object(parts, percept, index, following, reports, turn)
     for type_name, table in parts.tables.items():
         if parts.open and table.seen in CHECK_AT:
@@ -62,8 +62,8 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
     if parts.looks and turn.take():
         revise(parts, parts.looks.pop(0))
     if parts.laws is not None:
-        stays = {i: name in after for i, name in enumerate(before.layout.names)}
-        parts.laws.learn_one(percept, following, stays, parts.models)
+        there = {i: stays(before, after, i) for i in range(len(before))}
+        parts.laws.learn_one(percept, following, there, parts.models)
     return LearnReport(reports, _refresh(parts))
 
 

@@ -58,6 +58,10 @@ def merge(parts: Parts, other: Parts, *, follow_laws: bool) -> None:
 
 def _check(parts: Parts, other: Parts) -> None:
     difference = mismatch(other.schema, parts.schema) or mismatch(parts.schema, other.schema)
+    for what in ("kinematics", "offsets"):
+        theirs, mine = getattr(other.schema, what), getattr(parts.schema, what)
+        if not difference and theirs != mine:
+            difference = f"{what}={theirs} instead of {mine}"
     if difference:
         raise ConfigError(f"the other model is of another world: {difference}; merge models of one schema")
     if replace(other.config, seed=parts.config.seed) != parts.config or other.open != parts.open:
@@ -95,7 +99,12 @@ def _append(parts: Parts, type_name: str, theirs: ExampleTable) -> NDArray[np.in
     signatures = [parts.signature_of(tuple(t.name for t in s.types)) for s in theirs.signatures]
     keys = theirs.stratum_keys
     numbers = [
-        table.add(signatures[s], theirs.x[k, : len(signatures[s].columns)], keys[stratum], bodies)
+        table.add(
+            signatures[s],
+            theirs.x[k, : len(signatures[s].columns)],
+            keys[stratum],
+            bodies[: len(signatures[s].types)],  # the rest is padding, as wide as their widest row
+        )
         for k, (s, stratum, bodies) in enumerate(
             zip(theirs.signature_ids.tolist(), theirs.strata.tolist(), theirs.bodies.tolist(), strict=True)
         )

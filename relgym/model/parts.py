@@ -17,7 +17,7 @@ from relgym.model.chaining import Look, in_order
 from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
-from relgym.model.scenes import mismatch
+from relgym.model.scenes import mismatch, stays
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, SceneSchema, Target
 
 __all__ = ["Parts"]
@@ -54,6 +54,7 @@ class Parts:
     """
 
     def __init__(self, schema: SceneSchema, config: ModelConfig, targets: Sequence[Target] | None) -> None:
+        check_targets(schema, targets or ())
         self.schema = schema
         self.config = config
         self.open = targets is None
@@ -75,6 +76,7 @@ class Parts:
         if config.frames == "auto":
             self.laws = Laws(schema, None if targets is None else tuple(targets), config)
         self._kin: dict[int, SceneSchema] = {}
+        self._known: dict[int, SceneLayout] = {}
         for target in targets or ():
             self.add_target(target)
 
@@ -89,7 +91,7 @@ class Parts:
                 "foretell(observation, action) makes one, or view.with_action(view.scene(observation), action)"
             )
         schema = scene.schema
-        if schema is not self.schema and id(schema) not in self._kin:
+        if schema is not self.schema and self._kin.get(id(schema)) is not schema:
             difference = mismatch(schema, self.schema)
             if difference:
                 raise ObservationError(
@@ -101,7 +103,16 @@ class Parts:
             schema.scene(scene.values())  # raises, naming object and property
 
     def checked_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """State vectors as contiguous float64; `ObservationError` for another width, NaN or infinity."""
+        """State vectors as contiguous float64; `ObservationError` for other types or width, NaN or infinity."""
+        if self._known.get(id(layout)) is not layout:
+            for t in layout.types:
+                if t not in self.schema.types:
+                    known = [(own.name, own.properties) for own in self.schema.types]
+                    raise ObservationError(
+                        f"the scenes hold objects of type {t.name!r} with the properties {t.properties}: the model "
+                        f"knows {known}; numbers and names of objects may differ, their types may not"
+                    )
+            self._known[id(layout)] = layout  # kept alive, so that its id stays its own
         vectors = np.ascontiguousarray(vectors, dtype=np.float64)
         if vectors.ndim != 2 or vectors.shape[1] != layout.width:
             raise ObservationError(f"expected vectors of shape (n, {layout.width}), got {vectors.shape}")
@@ -151,7 +162,7 @@ class Parts:
         """
         derived = {(k.type, k.property) for k in self.schema.kinematics}
         for i, t in enumerate(before.layout.types):
-            if t.name == ACTION or before.layout.names[i] not in after:
+            if t.name == ACTION or not stays(before, after, i):
                 continue
             was, now = before.vector[before.layout.slice(i)], after[before.layout.names[i]].values
             for k in np.flatnonzero((was != now) | (t.name == TASK)):
@@ -192,3 +203,33 @@ class Parts:
     def governs(self, target: Target) -> bool:
         """Whether laws of motion, not modes, predict a target."""
         return self.laws is not None and self.laws.governs(target)
+
+
+def check_targets(schema: SceneSchema, targets: Sequence[Target]) -> None:
+    """Raise an error unless targets are in causal order, each of them once.
+
+    Raises
+    ------
+    ConfigError
+        No target, one that stands there twice, or one that is given what is neither an earlier target nor follows from
+        kinematics: then the present value would be read for the next one.
+    SchemaError
+        A type or property that isn't there, or one that follows from declared kinematics.
+    """
+    derived = {(law.type, law.property) for law in schema.kinematics}
+    known: set[tuple[str, str]] = set()
+    for target in targets:
+        if not isinstance(target, Target):
+            raise ConfigError(f"target {target!r}: expected a Target, as Target('ball', 'vx')")
+        own = (target.type, target.property)
+        if own in known:
+            raise ConfigError(f"target {target} stands there twice; leave one out")
+        if own in derived:
+            raise SchemaError(f"target {target} follows from declared kinematics; leave out one of the two")
+        for pair in target.given:
+            if pair not in known | derived:
+                raise ConfigError(
+                    f"target {target} is given {'.'.join(pair)}, which is no target before it: put that one first "
+                    "(causal order), or leave it out of what is given"
+                )
+        known.add(own)

@@ -141,7 +141,7 @@ class PropertyModel(Answers):
         if binding is None or self._unexplained or not self.classifier.modes:
             return
         row = x[: len(situation.signature.columns)].tolist()
-        if not self.scope.covers_one(row):
+        if not self.scope.covers_one(row, situation.signature):
             return
         values = self._values_one(situation.signature, row, self.classifier.modes)
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])

@@ -133,7 +133,7 @@ def _derive(
     schema: SceneSchema, layout: SceneLayout, now: NDArray[np.float64], following: NDArray[np.float64]
 ) -> None:
     """Declared kinematics, in place: simulate, then derive (§4.8)."""
-    for law in schema.kinematics:
+    for law in schema.derivations:
         for index in layout.of_type(law.type):
             place, rate = layout.column(index, law.property), layout.column(index, law.rate)
             source = following if law.uses_next else now

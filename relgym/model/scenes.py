@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.errors import ObservationError
 from relgym.scene.objects import ACTION, Scene, SceneLayout, SceneSchema
 
-__all__ = ["angle_columns", "mismatch", "next_values", "unwrapped", "with_action", "wrap"]
+__all__ = ["angle_columns", "mismatch", "next_values", "stays", "unwrapped", "with_action", "wrap"]
 
 TURN = 2.0 * math.pi
 """A full turn, in radians."""
@@ -26,6 +26,12 @@ def with_action(scene: Scene, values: Sequence[float] | NDArray[np.float64]) -> 
         raise ObservationError(f"action: expected {vector[where].shape} values, got shape {np.shape(values)}")
     vector[where] = values
     return Scene(scene.schema, layout, vector)
+
+
+def stays(before: Scene, after: Scene, index: int) -> bool:
+    """Whether an object of the first scene is in the second one: of the same name, and of the same type."""
+    name = before.layout.names[index]
+    return name in after and after.layout.types[after.layout.index(name)] == before.layout.types[index]
 
 
 def mismatch(schema: SceneSchema, known: SceneSchema) -> str:

@@ -11,7 +11,7 @@ and guesses go, they never go far beyond the changes that were seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -50,26 +50,45 @@ class Scope:
     ----------
     tree
         Says yes where some mode explains what follows, or comes close to it; None: everywhere.
-    columns
-        Columns of a row that the tree looks at; they mean the same in every signature of the target.
     least, most
         Smallest and largest change that approximations and guesses may foretell, in units of the target.
     """
 
     tree: DecisionTree | None = None
-    columns: tuple[int, ...] = ()
     least: float = -np.inf
     most: float = np.inf
+    _places: dict[int, tuple[SlotSignature, tuple[int, ...] | None]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
-    def covers_one(self, x: Sequence[float]) -> bool:
-        """Whether modes speak of one row."""
-        return self.tree is None or self.tree.predict_one([x[k] for k in self.columns])
+    def covers_one(self, x: Sequence[float], signature: SlotSignature) -> bool:
+        """Whether modes speak of one row; they do where a number that the tree looks at isn't there."""
+        if self.tree is None or (places := self.places(signature)) is None:
+            return True
+        return self.tree.predict_one([x[k] for k in places])
 
-    def covers(self, x: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def covers(self, x: NDArray[np.float64], signature: SlotSignature) -> NDArray[np.bool_]:
         """Whether modes speak of rows ``(n, d)``, shape ``(n,)``; equal to `covers_one` of each."""
-        if self.tree is None:
+        if self.tree is None or (places := self.places(signature)) is None:
             return np.ones(len(x), dtype=np.bool_)
-        return self.tree.predict_batch(x[:, list(self.columns)])
+        return self.tree.predict_batch(x[:, list(places)])
+
+    def places(self, signature: SlotSignature) -> tuple[int, ...] | None:
+        """Columns of a signature's rows that the tree looks at, by name; None where one that it tests is missing.
+
+        Bodiless objects come and go: the same number stands in one column today, in another one tomorrow.
+        """
+        known = self._places.get(id(signature))
+        if known is None or known[0] is not signature:
+            known = self._places[id(signature)] = (signature, self._found(signature))
+        return known[1]
+
+    def _found(self, signature: SlotSignature) -> tuple[int, ...] | None:
+        assert self.tree is not None, "asked only where there is a tree"
+        there = {signature.named(k): k for k in range(signature.core)}
+        if any(k >= 0 and self.tree.columns[k] not in there for k in self.tree.column):
+            return None
+        return tuple(there.get(name, 0) for name in self.tree.columns)  # what it doesn't test doesn't matter
 
     def within(
         self, values: NDArray[np.float64], signature: SlotSignature, x: NDArray[np.float64], target: Target
@@ -85,15 +104,17 @@ class Scope:
             return ()
         return tuple(self.tree.path(leaf) for leaf in self.tree.leaves if not self.tree.says_yes(leaf))
 
-    def place(self, x: Sequence[float]) -> str:
-        """The tree's tests that one row passes; empty without a tree."""
-        return "" if self.tree is None else self.tree.path(self.tree.leaf_one([x[k] for k in self.columns]))
+    def place(self, x: Sequence[float], signature: SlotSignature) -> str:
+        """The tree's tests that one row passes; empty without a tree, or where it can't be asked."""
+        if self.tree is None or (places := self.places(signature)) is None:
+            return ""
+        return self.tree.path(self.tree.leaf_one([x[k] for k in places]))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
         tree = None if self.tree is None else self.tree.to_dict()
         reach = [self.least, self.most] if np.isfinite([self.least, self.most]).all() else None
-        return {"tree": tree, "columns": list(self.columns), "reach": reach}
+        return {"tree": tree, "reach": reach}
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Scope:
@@ -101,7 +122,7 @@ class Scope:
         if not data:
             return EVERYWHERE
         tree = None if data["tree"] is None else DecisionTree.from_dict(data["tree"])
-        return cls(tree, tuple(data["columns"]), *(data["reach"] or ()))
+        return cls(tree, *(data["reach"] or ()))
 
 
 EVERYWHERE: Final = Scope()
@@ -132,19 +153,19 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable, *, guessing: bool)
     least, most = float(change.min()), float(change.max())
     reach = (least - BEYOND * (most - least), most + BEYOND * (most - least))
     if not clusterer.clusters or not clusterer.noise_examples:
-        return Scope(None, (), *reach)
+        return Scope(None, *reach)
     some = spread_out(numbers, MOST_ROWS)
-    columns = tuple(k for k in range(slots.core) if _looked_at(slots, k, clusterer.target))
+    columns = [k for k in range(slots.core) if _looked_at(slots, k, clusterer.target)]
     tree = learn_tree(
-        table.x[clusterer.rows[some]][:, list(columns)],
+        table.x[clusterer.rows[some]][:, columns],
         ~_lost(clusterer, table, slots, some, guessing=guessing),
         columns=[slots.named(k) for k in columns],
         min_leaf=LEAF,
         max_depth=DEPTH,
     )
     if len({tree.says_yes(leaf) for leaf in tree.leaves}) == 1:
-        return Scope(None, (), *reach)
-    return Scope(tree, columns, *reach)
+        return Scope(None, *reach)
+    return Scope(tree, *reach)
 
 
 def _lost(

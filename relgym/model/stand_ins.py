@@ -73,12 +73,14 @@ class StandIns(ModeFunctions):
         if self.guess_beyond is None:
             return self.guess
         x = percept.rows(index, following[None], ordered=False)[0].tolist()
-        return self.guess if self.scope.covers_one(x) else self.guess_beyond
+        covered = self.scope.covers_one(x, percept.situation(index).signature)
+        return self.guess if covered else self.guess_beyond
 
     def beyond(self, percept: Percept, index: int, following: NDArray[np.float64]) -> str:
         """Tests of the place where no mode speaks, if one object of a single scene lies in one; else empty."""
         row = percept.rows(index, following[None], ordered=False)[0].tolist()
-        return "" if self.scope.covers_one(row) else self.scope.place(row)
+        signature = percept.situation(index).signature
+        return "" if self.scope.covers_one(row, signature) else self.scope.place(row, signature)
 
     def guessed(
         self, percept: Percept, index: int, following: NDArray[np.float64]
@@ -95,7 +97,7 @@ class StandIns(ModeFunctions):
         target = self.clusterer.target
         values = np.full(len(x), np.nan) if whole is None else whole.values(x)[:, 0]
         if beyond is not None:
-            values = np.where(self.scope.covers(x), values, beyond.values(x)[:, 0])
+            values = np.where(self.scope.covers(x, signature), values, beyond.values(x)[:, 0])
         return self.scope.within(values, signature, x, target)
 
     def _guessing(self, signature: SlotSignature, *, beyond: bool = False) -> Binding | None:

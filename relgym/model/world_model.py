@@ -66,6 +66,8 @@ class WorldModel:
         *,
         targets: Sequence[Target] | None = None,
     ) -> None:
+        if config is not None and not isinstance(config, ModelConfig):
+            raise ConfigError(f"config={config!r}: expected a ModelConfig")
         self._parts = Parts(schema, config or ModelConfig(), schema.targets if targets is None else targets)
         self.seen = 0
         self.frozen = False
@@ -182,7 +184,9 @@ class WorldModel:
             raise ModelFileError(
                 "a model that was loaded without its history can't be merged; keep history=True"
             )
-        merge(self._parts, other._parts, follow_laws=other.seen > self.seen)
+        whole = copy.deepcopy(self._parts)  # what fails half way leaves this model as it was
+        merge(whole, other._parts, follow_laws=other.seen > self.seen)
+        self._parts = whole
         self.seen += other.seen
         self._percept = None
         self.finish()

@@ -103,10 +103,37 @@ class SceneSchema:
                 )
             if type_name not in names:
                 raise SchemaError(f"object {name!r} has unknown type {type_name!r}; the schema has {names}")
+        self._check_derivations()
+
+    def _check_derivations(self) -> None:
+        """Each property follows from one law, and none from itself by way of next values."""
         for law in self.kinematics:
             for prop in (law.property, law.rate):
                 if prop not in self.type(law.type).properties:
                     raise SchemaError(f"kinematics {law}: type {law.type!r} has no property {prop!r}")
+            if not math.isfinite(law.step):
+                raise SchemaError(f"kinematics {law}: expected a finite step")
+        derived = [(law.type, law.property) for law in self.kinematics]
+        if twice := sorted({pair for pair in derived if derived.count(pair) > 1}):
+            raise SchemaError(
+                f"several laws of kinematics for {['.'.join(pair) for pair in twice]}; declare one each"
+            )
+        if len(self.derivations) < len(derived):
+            left = [f"{law.type}.{law.property}" for law in self.kinematics if law not in self.derivations]
+            raise SchemaError(f"the kinematics of {left} follow from one another's next values in a circle")
+
+    @cached_property
+    def derivations(self) -> tuple[Kinematics, ...]:
+        """Laws of kinematics, each after those whose next values it reads, whatever order they were declared in."""
+        waiting, found = list(self.kinematics), list[Kinematics]()
+        while waiting:
+            due = {(law.type, law.property) for law in waiting}
+            ready = [law for law in waiting if not (law.uses_next and (law.type, law.rate) in due)]
+            if not ready:
+                break
+            found += ready
+            waiting = [law for law in waiting if law not in ready]
+        return tuple(found)
 
     @cached_property
     def _types(self) -> dict[str, ObjectType]:
@@ -259,13 +286,26 @@ class Scene:
     layout
         Which objects are present.
     vector
-        float64 array of shape ``(layout.width,)``, in units of the properties. It is made read-only, not
-        copied.
+        Numbers of shape ``(layout.width,)``, in units of the properties. A float64 array is made read-only, not
+        copied; of anything else one is made.
+
+    Raises
+    ------
+    ObservationError
+        Another shape, or no numbers.
     """
 
     __slots__ = ("layout", "schema", "vector")
 
     def __init__(self, schema: SceneSchema, layout: SceneLayout, vector: Float1D) -> None:
+        try:
+            vector = np.asarray(vector, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ObservationError(f"expected {layout.width} numbers, got {vector!r}") from None
+        if vector.shape != (layout.width,):
+            raise ObservationError(
+                f"expected a state vector of shape {(layout.width,)} for {list(layout.names)}, got shape {vector.shape}"
+            )
         vector.flags.writeable = False
         self.schema = schema
         self.layout = layout

@@ -9,7 +9,7 @@ from dyna_worlds import SCHEMA, LineTask
 from relgym.baselines.ensemble import MLPEnsemble
 from relgym.baselines.neural_world import NeuralWorldModel
 from relgym.errors import ConfigError, QueryError
-from relgym.scene.objects import Scene, SceneSchema, Transition
+from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
 
 pytestmark = pytest.mark.sb3
 
@@ -88,3 +88,16 @@ def test_a_world_with_its_task(rng: np.random.Generator) -> None:
 def test_nothing_to_predict() -> None:
     with pytest.raises(ConfigError, match="nothing to predict: pass targets="):
         NeuralWorldModel(SceneSchema(SCHEMA.types, SCHEMA.objects))
+
+
+def test_angles_go_round(rng: np.random.Generator) -> None:
+    schema = SceneSchema(
+        (ObjectType("hand", ("th",), angles=("th",)),), (("hand", "hand"),), targets=(Target("hand", "th"),)
+    )
+    model = NeuralWorldModel(schema, ensemble=MLPEnsemble(hidden=32, train_steps=150))
+    turned = lambda th: (th + 0.5 + np.pi) % (2.0 * np.pi) - np.pi  # noqa: E731
+    for th in rng.uniform(-np.pi, np.pi, 300).tolist():
+        model.learn_one(Transition(schema.scene({"hand": [th]}), schema.scene({"hand": [turned(th)]})))
+    for th in (-3.0, 0.0, 2.9, 3.1):
+        found = model.predict_one(schema.scene({"hand": [th]})).scene["hand"]["th"]
+        assert abs(found - turned(th)) < 0.1

@@ -6,6 +6,7 @@ import json
 from dataclasses import FrozenInstanceError, replace
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -47,6 +48,14 @@ from relgym.errors import ConfigError
         (ClusteringConfig, {"stickiness": "glue"}, "stickiness must be one of"),
         (ModelConfig, {"geometry": "bullet"}, "geometry must be one of"),
         (ModelConfig, {"frames": "own"}, "frames must be one of"),
+        (ClusteringConfig, {"inlier_stds": 0}, "inlier_stds must be a positive number, got 0"),
+        (ClusteringConfig, {"inlier_stds": "two"}, "inlier_stds must be a number, got 'two'"),
+        (ClusteringConfig, {"draws": 2.5}, "draws must be a whole number, got 2.5"),
+        (ClassificationConfig, {"beam": None}, "beam must be a whole number, got None"),
+        (ClassificationConfig, {"beam": True}, "beam must be a whole number, got True"),
+        (ModelConfig, {"clustering": {}}, "clustering must be a ClusteringConfig, got {}"),
+        (ModelConfig, {"classification": None}, "classification must be a ClassificationConfig, got None"),
+        (ModelConfig, {"abstain": 1}, "abstain must be True or False, got 1"),
         (ModelConfig, {"seed": -1}, "seed must be at least 0, got -1"),
         (ModelConfig, {"history": 99}, "history must be at least 100, got 99"),
         (
@@ -61,6 +70,14 @@ def test_what_cannot_be_is_refused(record: Any, wrong: dict[str, object], messag
         record(**wrong)
     with pytest.raises(ConfigError, match=message):
         replace(record(), **wrong)
+
+
+def test_numpys_numbers_become_plain_ones_so_that_files_can_hold_them() -> None:
+    numbers: dict[str, Any] = {"inlier_stds": np.float32(3.0), "draws": np.int32(7)}
+    config = ModelConfig(seed=np.int64(3), clustering=ClusteringConfig(**numbers))  # type: ignore[arg-type]
+    found = (config.seed, config.clustering.inlier_stds, config.clustering.draws)
+    assert [type(n) for n in found] == [int, float, int]
+    assert json.loads(json.dumps(config.to_json()))["seed"] == 3
 
 
 def test_nobody_changes_them_under_a_model() -> None:

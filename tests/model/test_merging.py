@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError
 from relgym.model.forgetting import SLACK
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Transition
+from relgym.scene.objects import Kinematics, ObjectType, SceneSchema, Transition
 
 SCHEMA = schema_of(("v", "w"), ("a",))
 
@@ -93,3 +94,32 @@ def test_memory_stays_bounded_when_two_are_put_together() -> None:
     before = mine.history
     mine.learn_one(steps(1, -2.0, 2.0, seed=9)[0])
     assert mine.history == before + 1
+
+
+def test_the_other_one_may_have_seen_more_objects() -> None:
+    kind = ObjectType("p", ("x", "v"))
+    schema = SceneSchema((replace(kind, optional=True),), tuple((name, "p") for name in "abc"))
+
+    def seen(names: str, seed: int) -> WorldModel:
+        rng, model = np.random.default_rng(seed), WorldModel(schema)
+        for _ in range(40):
+            states = {name: rng.uniform(-1.0, 1.0, 2) for name in names}
+            after = {name: [x + v, 0.9 * v] for name, (x, v) in states.items()}
+            model.learn_one(Transition(schema.scene(states), schema.scene(after)))
+        return model
+
+    for mine, theirs in (("", "abc"), ("ab", "abc"), ("abc", "a")):
+        model = seen(mine, 0) if mine else WorldModel(schema)
+        model.merge(seen(theirs, 1))
+        told = model.predict_one(schema.scene({"a": [1.0, 1.0], "b": [0.0, -1.0]}))
+        np.testing.assert_allclose(told.scene.vector, [2.0, 0.9, -1.0, -0.9])
+
+
+def test_what_cannot_be_merged_leaves_the_model_as_it_was() -> None:
+    kind = ObjectType("p", ("x", "v"))
+    plain = SceneSchema((kind,), (("a", "p"),), kinematics=(Kinematics("p", "x", "v"),))
+    model = WorldModel(plain)
+    for what in ({"offsets": True}, {"kinematics": (Kinematics("p", "x", "v", 0.01),)}):
+        with pytest.raises(ConfigError, match=f"of another world: {next(iter(what))}="):
+            model.merge(WorldModel(replace(plain, **what)))  # type: ignore[arg-type]
+    assert model.seen == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from points import learned, schema_of, transitions
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.scope import EVERYWHERE, Scope
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Transition
+from relgym.scene.objects import ObjectType, SceneSchema, Transition
 
 SCHEMA = schema_of(("x", "v", "leg"), ("a",))
 ROOM = schema_of(("x",), ("a",), ("terminated", "reward"))
@@ -206,3 +207,41 @@ def test_a_law_that_is_slightly_off_speaks_where_nobody_guesses() -> None:
     assert part.scope.tree is None
     one = model.predict_one(SCHEMA.scene({"self": [1.05, 0.0, 0.0], "action": [2.0]}))["self", "v"]
     assert one.value == pytest.approx(2.0)
+
+
+def fanned(n: int) -> tuple[SceneSchema, WorldModel]:
+    """A cart that slows down, and where a fan blows hard goes anywhere; fan and lamp come and go."""
+    cart, fan, lamp = (
+        ObjectType("cart", ("v",)),
+        ObjectType("fan", ("s",), optional=True),
+        ObjectType("lamp", ("b",)),
+    )
+    schema = SceneSchema(
+        (cart, fan, replace(lamp, optional=True)), (("cart", "cart"), ("fan", "fan"), ("lamp", "lamp"))
+    )
+    rng, model = np.random.default_rng(0), WorldModel(schema)
+    for _ in range(n):
+        v, s = rng.uniform(-1.0, 1.0), rng.uniform(0.0, 1.0)
+        after = v - 0.1 if s <= 0.7 else rng.normal()
+        there = {"fan": [s]}
+        model.learn_one(
+            Transition(schema.scene({"cart": [v], **there}), schema.scene({"cart": [after], **there}))
+        )
+    return schema, model
+
+
+def test_what_the_tree_looks_at_is_found_by_name() -> None:
+    schema, model = fanned(600)
+    scope = model.property_model("cart", "v").scope
+    assert scope.tree is not None and scope.beyond() == tuple(t for t in scope.beyond() if "fan.s" in t)
+    blown = model.predict_one(schema.scene({"cart": [-0.5], "fan": [0.9]}))
+    assert blown.parts[0].outcome is Outcome.UNEXPLAINED
+    for others in ({}, {"lamp": [0.99]}, {"fan": [0.2], "lamp": [0.99]}):
+        found = schema.scene({"cart": [0.3], **others})
+        one = model.predict_one(found)
+        assert one.parts[0].outcome is Outcome.PREDICTED
+        assert one.scene["cart"]["v"] == pytest.approx(0.2)
+        many = model.predict_batch(found.layout, found.vector[None])
+        np.testing.assert_array_equal(many.vectors[0], one.scene.vector)
+        assert "no mode speaks" not in model.explain(found)
+    model.learn_one(Transition(schema.scene({"cart": [0.3]}), schema.scene({"cart": [0.2]})))

@@ -27,7 +27,7 @@ from relgym.config import ClusteringConfig, ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, RelgymError, SchemaError
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel, with_action
-from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import Kinematics, ObjectType, Scene, SceneSchema, Target, Transition
 
 CART = SceneSchema(
     (ObjectType("cart", ("x",)), ObjectType("action", ("u",))), (("cart", "cart"), ("action", "action"))
@@ -378,3 +378,98 @@ def test_a_model_is_shown_with_what_it_knows() -> None:
     assert repr(model) == "WorldModel(no targets yet; 0 transitions)"
     pushed(model, 30)
     assert repr(model) == "WorldModel(cart.x: 1 modes; 30 transitions)"
+
+
+# ---------------------------------------------------------------------- what is declared, and what comes in
+POINT = ObjectType("p", ("x", "v", "a"))
+
+
+def points(**declared: object) -> SceneSchema:
+    return SceneSchema((POINT,), (("one", "p"),), **declared)  # type: ignore[arg-type]
+
+
+def test_kinematics_follow_one_another_in_whatever_order_they_were_declared() -> None:
+    laws = (Kinematics("p", "x", "v"), Kinematics("p", "v", "a"))
+    for order in (laws, laws[::-1]):
+        schema = points(kinematics=order, targets=(Target("p", "a"),))
+        model = WorldModel(schema)
+        for a in (0.5, 1.0, 2.0, -1.0, 3.0):
+            was = schema.scene({"one": [0.0, 1.0, a]})
+            model.learn_one(Transition(was, was))
+        found = model.predict_one(schema.scene({"one": [0.0, 1.0, 2.0]}))
+        assert found.scene["one"].values.tolist() == [3.0, 3.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("kinematics", "message"),
+    [
+        (
+            (Kinematics("p", "x", "v"), Kinematics("p", "v", "x")),
+            "follow from one another's next values in a circle",
+        ),
+        ((Kinematics("p", "x", "x"),), "in a circle"),
+        ((Kinematics("p", "x", "v"), Kinematics("p", "x", "a")), r"several laws of kinematics for \['p.x'\]"),
+        ((Kinematics("p", "x", "v", math.nan),), "expected a finite step"),
+    ],
+)
+def test_kinematics_that_say_nothing_are_refused(kinematics: tuple[Kinematics, ...], message: str) -> None:
+    with pytest.raises(SchemaError, match=message):
+        points(kinematics=kinematics)
+
+
+@pytest.mark.parametrize(
+    ("targets", "error", "message"),
+    [
+        ([Target("p", "x", given=(("p", "v"),)), Target("p", "v")], ConfigError, "is no target before it"),
+        ([Target("p", "x", given=(("p", "x"),))], ConfigError, "is no target before it"),
+        ([Target("p", "v"), Target("p", "v")], ConfigError, "stands there twice"),
+        (["p.x"], ConfigError, r"expected a Target, as Target\('ball', 'vx'\)"),
+        ([Target("p", "a")], SchemaError, "follows from declared kinematics"),
+    ],
+)
+def test_targets_are_in_causal_order(targets: list[Target], error: type[Exception], message: str) -> None:
+    schema = points(kinematics=(Kinematics("p", "a", "x"),))
+    with pytest.raises(error, match=message):
+        WorldModel(schema, targets=targets)
+    assert WorldModel(schema, targets=[Target("p", "v"), Target("p", "x", given=(("p", "v"), ("p", "a")))])
+
+
+def test_scenes_hold_numbers_of_their_own() -> None:
+    schema = points()
+    found = Scene(schema, schema.layout(), np.array([1, 2, 3]))
+    assert (found.vector.dtype, found.replace({("one", "x"): 0.5})["one"]["x"]) == (np.float64, 0.5)
+    for bad in (np.zeros(2), [1.0, 2.0], ["a", "b", "c"], np.zeros((1, 3))):
+        with pytest.raises(ObservationError, match=r"expected (3 numbers|a state vector of shape)"):
+            Scene(schema, schema.layout(), bad)  # type: ignore[arg-type]
+
+
+def test_a_batch_of_another_world_is_refused() -> None:
+    model = WorldModel(points())
+    turned = SceneSchema((ObjectType("p", ("v", "x", "a")),), (("one", "p"),))
+    for schema in (turned, SceneSchema((ObjectType("q", ("x", "v", "a")),), (("one", "q"),))):
+        with pytest.raises(
+            ObservationError, match="numbers and names of objects may differ, their types may not"
+        ):
+            model.predict_batch(schema.layout(), np.zeros((2, 3)))
+    more = SceneSchema((POINT,), (("two", "p"), ("three", "p")))
+    assert len(model.predict_batch(more.layout(), np.zeros((2, 6))).vectors) == 2
+
+
+def test_an_object_of_another_type_is_another_object() -> None:
+    """Of what became of the first one nothing was seen, least of all that it stayed."""
+    q = ObjectType("q", ("x", "v", "a"))
+    schema = SceneSchema((POINT, q), (("one", "p"),))
+    other = SceneSchema((POINT, q), (("one", "q"),))
+    model = WorldModel(schema)
+    for k in range(20):
+        before = schema.scene({"one": [float(k), 0.5, 0.0]})
+        model.learn_one(Transition(before, before.replace({("one", "x"): k + 0.5})))
+        model.learn_one(Transition(before, other.scene({"one": [float(k), 0.5, 0.0]})))
+    assert model.predict_one(schema.scene({"one": [3.0, 0.5, 0.0]})).scene["one"]["x"] == 3.5
+    assert model.property_model("p", "x").clusterer.seen == 20
+
+
+def test_configurations_are_records() -> None:
+    for bad in ({"features": ("trig",)}, 3):
+        with pytest.raises(ConfigError, match="expected a ModelConfig"):
+            WorldModel(points(), bad)  # type: ignore[arg-type]
