@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -109,3 +110,31 @@ def test_lessons_come_in_random_order() -> None:
     assert sorted(order[1]) != order[1]
     assert len(set(order[1])) == len(order[1]) == 20
     assert order[1] == order[2]
+
+
+def test_in_a_changed_world_a_rival_takes_the_models_place() -> None:
+    """With half the gravity all friction is halved: the old laws count on, the rival knows only the new ones."""
+    before, after = (steps(n, seed=s, gravity=g) for n, s, g in ((400, 1, 10.0), (500, 2, 5.0)))
+    config, models = DynaConfig(least=50), []
+    for renew in (1_000, 0):
+        model = relgym.WorldModel(before[0].start.schema)
+        apprentice = Apprentice(model, make().get_wrapper_attr("task"), replace(config, renew=renew))
+        for real in before:
+            apprentice.take_up(real)
+        assert apprentice.gate.open and apprentice.model is model
+        known = model.describe()
+        for real in after:
+            apprentice.take_up(real)
+        assert (apprentice.gate.open, apprentice.renewals) == (bool(renew), int(bool(renew)))
+        models.append(apprentice.model)
+        if renew:
+            assert apprentice.model is not model
+            assert model.describe() != known  # it learned on for as long as nobody was better
+    weights = {
+        abs(weight)
+        for mode in models[0].modes("truck", "vx")
+        for role in mode.roles
+        for prop, weight in role.terms
+        if prop == "friction"
+    }
+    assert weights and all(round(w / 1.25, 6) in (1.0, 2.0, 3.0) for w in weights)
