@@ -131,6 +131,8 @@ class ExampleTable:
             self._stratum = np.pad(self._stratum, grow[0])
             self._bodies = np.pad(self._bodies, grow)
             self._serial = np.pad(self._serial, grow[0])
+        # What stood there before keep() is gone, behind the row as well: equal tables are equal bytes.
+        self._x[self._size, len(row) :], self._bodies[self._size, len(bodies) :] = 0.0, -1
         self._x[self._size, : len(row)] = row
         self._signature[self._size] = number
         self._stratum[self._size] = self._strata.setdefault(stratum, len(self._strata))

@@ -84,7 +84,8 @@ def predict_many(
             else:
                 verdict = parts.models[target].predict_batch(percept, index, following)
             for pair in parts.models[target].needs if lost else ():
-                verdict.outcomes[lost.get(pair, nowhere)] = _DEPENDS
+                rows = lost.get(pair, nowhere)
+                verdict.outcomes[rows], verdict.margins[rows] = _DEPENDS, 0.0
             told = np.isfinite(verdict.values)
             known = told & (verdict.outcomes == _PREDICTED)
             column = layout.column(index, target.property)

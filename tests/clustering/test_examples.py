@@ -23,3 +23,17 @@ def test_a_world_without_relations_has_one_state() -> None:
     for _ in range(3):
         table.add(ALONE, np.zeros(2), b"", [-1])
     assert not table.differences(np.arange(3)).any()
+
+
+def test_nothing_is_left_of_rows_that_are_gone() -> None:
+    """Equal tables are equal bytes, whether or not other rows stood there once."""
+    fresh, used = ExampleTable(), ExampleTable()
+    for k in range(3):
+        used.add(ALONE, np.full(2, 7.0 + k), b"", [5])
+    used.keep(np.array([False, False, True]))
+    fresh.add(ALONE, np.full(2, 9.0), b"", [5])
+    for table in (used, fresh):
+        table.add(ALONE, np.zeros(1), b"", [])
+    for name, array in fresh.to_arrays().items():
+        if name != "serial":
+            np.testing.assert_array_equal(used.to_arrays()[name], array)

@@ -461,6 +461,12 @@ def test_reward_and_end_can_be_learned() -> None:
     assert terminated.tolist() == [False, True]
 
 
+def test_what_depends_on_something_unknown_has_no_margin_alone_or_among_many() -> None:
+    model, start = lost_model(), CART_SCHEMA.scene({"cart": [0.0, 1.0], "action": [0.0], "task": [0.0, 0.0]})
+    one, many = model.predict_one(start), model.predict_batch(start.layout, start.vector[None])
+    assert [part.margin for part in one.parts] == many.margins[0].tolist() == [0.0, 0.0]
+
+
 def test_a_dream_that_knows_nothing_ends_and_the_reason_is_told() -> None:
     envs = LearnedModelVectorEnv(lost_model(), 2, autoreset_mode="Disabled", reward=lambda *_: np.ones(2))
     before, _ = envs.reset(seed=0)
