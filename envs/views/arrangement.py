@@ -81,6 +81,7 @@ def arranged(
     static: Sequence[Static],
     action: ObjectType,
     axes: tuple[str, bool],
+    precision: float,
 ) -> Arrangement:
     """Put objects together from numbers.
 
@@ -94,6 +95,8 @@ def arranged(
         Type of the action object.
     axes
         `up` and `planar` of the schema.
+    precision
+        Of the numbers.
 
     Raises
     ------
@@ -126,7 +129,9 @@ def arranged(
                 f"under a Dict's key {taken!r}: parts=[Part('other', {{'x0': '{taken}.x0', ...}})])"
             )
     objects = [(name, kind.name) for name, kind in zip(owners, kinds, strict=True)]
-    schema = SceneSchema((*merged(kinds), action), (*objects, (ACTION, ACTION)), up=axes[0], planar=axes[1])
+    up, planar = axes
+    types, shown = (*merged(kinds), action), (*objects, (ACTION, ACTION))
+    schema = SceneSchema(types, shown, up=up, planar=planar, precision=precision)
     return Arrangement(schema, schema.layout(owners), np.array(sources, np.intp), np.array(constants), pairs)
 
 

@@ -74,6 +74,7 @@ class FunctionView:
     ) -> None:
         self._function, self._inverse, self.precision = function, inverse, precision
         self._acts: Acts | None = None
+        schema = replace(schema, precision=precision) if precision else schema
         if ACTION in schema.order:
             check_action_space(schema, action_space)
             self.schema = schema

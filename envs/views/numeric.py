@@ -93,7 +93,9 @@ class NumbersView:
         ] = ()  # pairs that were guessed, or would be in place of these
         whole = default_parts(self.names, self._parts)
         self._owner = {source: part.name for part in whole for source in part.sources.values()}
-        self._how = arranged(self.names, whole, self.angles, static, self._acts.type, self._axes)
+        self._how = arranged(
+            self.names, whole, self.angles, static, self._acts.type, self._axes, self.precision
+        )
         self.schema = self._how.schema
 
     # ------------------------------------------------------------------ angles

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ class SceneView:
     ) -> None:
         check_action_space(schema, action_space)
         self._boxes = _checked_boxes(schema, observation_space)
-        self.schema = schema
+        self.schema = replace(schema, precision=self.precision) if self.precision else schema
         self._spaces = (observation_space, action_space)
         self._needed = frozenset(
             name for name in schema.order if (t := schema.type_of(name)).has_body and not t.optional

@@ -124,7 +124,10 @@ class TableView:
         identifiers("names of the objects", [name for name, _ in objects], len(objects))
         types = (*merged([*kinds, *fixed]), self._acts.type)
         everything = (*objects, (ACTION, ACTION))
-        return SceneSchema(types, everything, up=self._axes[0], planar=self._axes[1], offsets=self._offsets)
+        up, planar = self._axes
+        return SceneSchema(
+            types, everything, up=up, planar=planar, offsets=self._offsets, precision=self.precision
+        )
 
     def _kind(self, part: Rows) -> ObjectType:
         return ObjectType(

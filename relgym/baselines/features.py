@@ -16,7 +16,7 @@ import numpy as np
 from relgym.baselines.base import Float2D
 from relgym.errors import ConfigError, SchemaError
 from relgym.scene.objects import POSE, SceneLayout, SceneSchema
-from relgym.scene.relations import TOUCH_EPS, Extractor
+from relgym.scene.relations import Extractor
 
 __all__ = ["FEATURES", "ContactFeatures", "Features", "ThesisFeatures", "columns", "features"]
 
@@ -176,7 +176,7 @@ class ContactFeatures:
         every = np.arange(len(vectors))
         parts = [vectors[:, [layout.column(target, p) for p in self._free]]]
         for near in nearest.T:
-            touching = distance[every, near] <= TOUCH_EPS
+            touching = distance[every, near] <= np.ravel(relations.touch)
             parts += [touching[:, None].astype(np.float64), facts[every, near], kinds[near]]
         rows = np.hstack(parts)
         return np.pad(rows, ((0, 0), (0, len(self.names) - rows.shape[1])))

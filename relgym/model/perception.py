@@ -14,7 +14,6 @@ from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import check_entries, library_of
 from relgym.model.grouping import distinct
-from relgym.scene.contacts import APPROACH_EPS
 from relgym.scene.context import canonical_order, signature, slots
 from relgym.scene.objects import ACTION, ObjectType, SceneLayout, SceneSchema, poses
 from relgym.scene.relations import Extractor, Relations
@@ -283,7 +282,7 @@ class Percept:
         at = perception.approach
         # Contact facts are facts of touching pairs (design §4): a normal towards something far says nothing.
         contacts[~relations.touched(body)] = np.nan
-        parting = contacts[..., at] > APPROACH_EPS
+        parting = contacts[..., at] > relations.parting
         # Where bodies part, the contact does nothing any more, whichever way it faces: only that they part is said.
         contacts[parting, :at] = contacts[parting, at + 1] = np.nan
         table = perception.unary_table(self.layout)
@@ -291,7 +290,7 @@ class Percept:
         nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
         close, struck = relations.context(body), None
         if perception.parting:
-            close, struck = _without(close, parting), _approached(contacts[..., at], body)
+            close, struck = _without(close, parting), _approached(contacts[..., at], body, relations.parting)
         contacts[..., perception.gaps] = gaps
         pair = np.concatenate([contacts, numbers], axis=2)
         pair[:, body] = np.nan
@@ -330,7 +329,9 @@ def _gaps(names: tuple[str, ...]) -> list[int]:
     ]
 
 
-def _approached(approach: NDArray[np.float64], body: int) -> NDArray[np.bool_]:
+def _approached(
+    approach: NDArray[np.float64], body: int, parting: float | NDArray[np.float64]
+) -> NDArray[np.bool_]:
     """The target, and of the bodies that it touches and doesn't leave the one that it approaches fastest.
 
     Parameters
@@ -339,9 +340,11 @@ def _approached(approach: NDArray[np.float64], body: int) -> NDArray[np.bool_]:
         The target's and each touched body's relative normal velocity, NaN for the others, shape ``(n, K)``.
     body
         The target's number.
+    parting
+        Speed up to which bodies don't part.
     """
-    closing = np.where(approach <= APPROACH_EPS, approach, np.inf)
-    found: NDArray[np.bool_] = closing <= closing.min(axis=1, keepdims=True) + APPROACH_EPS
+    closing = np.where(approach <= parting, approach, np.inf)
+    found: NDArray[np.bool_] = closing <= closing.min(axis=1, keepdims=True) + parting
     found &= closing < np.inf
     found[:, body] = True
     return found

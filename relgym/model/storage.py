@@ -174,6 +174,7 @@ def schema_to_json(schema: SceneSchema) -> dict[str, Any]:
         "targets": None if schema.targets is None else [target_to_json(t) for t in schema.targets],
         "action_scale": [list(a) for a in schema.action_scale],
         **({"offsets": True} if schema.offsets else {}),
+        **({"precision": schema.precision} if schema.precision else {}),
     }
 
 
@@ -189,6 +190,7 @@ def schema_from_json(data: dict[str, Any]) -> SceneSchema:
         targets=None if targets is None else tuple(target_from_json(t) for t in targets),
         action_scale=tuple((str(p), float(low), float(high)) for p, low, high in data["action_scale"]),
         offsets=bool(data.get("offsets", False)),
+        precision=float(data.get("precision", 0.0)),
     )
 
 

@@ -76,6 +76,9 @@ class SceneSchema:
         Whether clauses may test gaps: where another body's centre lies along the world's axes, how far away it is and
         how fast the two approach, touching or not. Default: contacts only, and of these no offset. A paddle turns a
         ball by where it is hit.
+    precision
+        Relative precision of the numbers, of numbers below 1 absolute: 0 for float64, some 5e-7 for float32. Bodies
+        that are no farther from one another touch.
     """
 
     types: tuple[ObjectType, ...]
@@ -86,6 +89,7 @@ class SceneSchema:
     targets: tuple[Target, ...] | None = None
     action_scale: tuple[tuple[str, float, float], ...] = ()
     offsets: bool = False
+    precision: float = 0.0
 
     def __post_init__(self) -> None:
         if self.up not in ("x", "y", "z"):
@@ -103,6 +107,8 @@ class SceneSchema:
                 )
             if type_name not in names:
                 raise SchemaError(f"object {name!r} has unknown type {type_name!r}; the schema has {names}")
+        if not 0.0 <= self.precision < 1.0:
+            raise SchemaError(f"precision must lie in [0, 1), got {self.precision!r}")
         self._check_derivations()
 
     def _check_derivations(self) -> None:

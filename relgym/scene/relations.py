@@ -142,12 +142,22 @@ class Relations:
     def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Relations:
         """Relations of some of the scenes."""
         vectors = np.concatenate([sight.vectors for sight in self._sights])[chosen]
-        sights = [Sight(self._plan, vectors, self._sights[0].eps)]
+        sights = [Sight(self._plan, vectors, self._sights[0].eps, self._sights[0].precision)]
         return Relations(self.layout, self._axes, self.names, self._plan, sights)
 
     def touched(self, body: int) -> _Table:
         """Which bodies touch one, shape ``(n, K)``; it doesn't touch itself."""
-        return self.distances(body) <= self._sights[0].eps
+        return self.distances(body) <= self.touch
+
+    @property
+    def touch(self) -> float | FloatArray:
+        """Distance up to which bodies touch; where numbers are coarse of shape ``(n, 1)``."""
+        return _each([sight.touch for sight in self._sights])
+
+    @property
+    def parting(self) -> float | FloatArray:
+        """Speed up to which touching bodies don't part; as `touch`."""
+        return _each([sight.parting for sight in self._sights])
 
     def context(self, body: int) -> _Table:
         """Return the target's close set (`close_set`), shape ``(n, K)``."""
@@ -195,6 +205,12 @@ def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
 
 
+def _each(parts: Sequence[float | FloatArray]) -> float | FloatArray:
+    """A limit that all scenes share, or one for each, shape ``(n, 1)``."""
+    arrays = [part for part in parts if isinstance(part, np.ndarray)]
+    return np.concatenate(arrays)[:, None] if arrays else parts[0]
+
+
 def _found(axes: Axes, sight: Sight, name: str) -> _Table:
     """One relation's table in a piece of the scenes, shape ``(K, K, n)``; the diagonal means nothing."""
     if name == "intersect":
@@ -207,7 +223,7 @@ def _found(axes: Axes, sight: Sight, name: str) -> _Table:
         closing = sight.closing()
         found: _Table = closing < np.inf
         if name == "approaching-fastest":
-            found &= closing <= closing.min(axis=1, initial=np.inf, keepdims=True) + contacts.APPROACH_EPS
+            found &= closing <= closing.min(axis=1, initial=np.inf, keepdims=True) + sight.parting
         return found
     return sight.boxes.along(*axis_relations(axes)[name])
 
@@ -225,7 +241,8 @@ class Extractor:
     geometry
         ``"arrays"``: batched NumPy, exact. ``"fcl"``: the Flexible Collision Library, scene by scene.
     eps
-        Distance up to which bodies touch, in units of length. A larger value makes near bodies touch.
+        Distance up to which bodies touch, in units of length; more where the schema says that numbers are coarse
+        (`SceneSchema.precision`). A larger value makes near bodies touch.
 
     Raises
     ------
@@ -283,7 +300,8 @@ class Extractor:
         plan = self._plan(layout)
         chunk = max(1, _CHUNK // max(1, plan.pairs.number.size))
         starts = range(0, max(1, len(vectors)), chunk)
-        sights = [Sight(plan, vectors[i : i + chunk], self.eps) for i in starts]
+        coarse = self.schema.precision
+        sights = [Sight(plan, vectors[i : i + chunk], self.eps, coarse) for i in starts]
         return Relations(layout, self.axes, self.names, plan, sights)
 
     def unary(self, layout: SceneLayout) -> dict[str, _Table]:

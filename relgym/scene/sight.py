@@ -72,6 +72,15 @@ class Sight:
         State vectors, shape ``(n, width)``.
     eps
         Distance up to which bodies touch.
+    precision
+        Relative precision of the numbers (`SceneSchema.precision`): what is no farther off touches, and what is no
+        faster doesn't part.
+
+    Attributes
+    ----------
+    touch, parting
+        Distance up to which bodies touch, and speed up to which they don't part; arrays of shape ``(n,)`` where numbers
+        are coarse.
 
     Raises
     ------
@@ -79,12 +88,17 @@ class Sight:
         An extent isn't positive, or a sphere isn't round.
     """
 
-    def __init__(self, plan: Plan, vectors: FloatArray, eps: float) -> None:
+    def __init__(self, plan: Plan, vectors: FloatArray, eps: float, precision: float = 0.0) -> None:
         padded = np.concatenate([vectors, np.broadcast_to(_CONSTANTS, (len(vectors), 2))], axis=1).T
-        self.vectors, self.eps = vectors, eps
+        self.vectors, self.eps, self.precision = vectors, eps, precision
         self._plan = plan
         self.pose: FloatArray = padded.take(plan.columns, axis=0)
         self.velocity: FloatArray = padded.take(plan.velocities, axis=0)
+        self.touch: float | FloatArray = eps
+        self.parting: float | FloatArray = APPROACH_EPS
+        if precision:
+            self.touch = eps + precision * np.abs(self.pose).max(axis=(0, 1), initial=1.0)
+            self.parting = APPROACH_EPS + precision * np.abs(self.velocity).max(axis=(0, 1), initial=1.0)
         shape = (len(plan.pairs.first), len(vectors))
         self._touching: _Bools | None = None
         self._closing: FloatArray | None = None
@@ -129,19 +143,19 @@ class Sight:
         Of polyhedra only those are measured whose bounding boxes meet.
         """
         if self._arrays is None:
-            return self._measured.distance <= self.eps
+            return self._measured.distance <= self.touch
         missing = pairs & ~self._told
         if not missing.any():
             return self._touches
         slow = self._arrays.unsettled(missing & ~self._exact)
         near = missing.copy()
         near[slow] = False
-        self._touches[near] = self.measured(near).distance[near] <= self.eps
+        self._touches[near] = self.measured(near).distance[near] <= self.touch
         if len(slow):
             meet = self._meet(slow)
             m = self._measured
             self._arrays.fill_some(self.pose, self._solids, slow, meet, m.distance, m.normal)
-            self._touches[slow] = meet & (np.where(meet, m.distance[slow], np.inf) <= self.eps)
+            self._touches[slow] = meet & (np.where(meet, m.distance[slow], np.inf) <= self.touch)
         self._told |= missing
         return self._touches
 
@@ -157,9 +171,10 @@ class Sight:
         a, b = self._plan.pairs.first[pairs], self._plan.pairs.second[pairs]
         low, high = self._measured.low, self._measured.high
         meet = np.ones((len(pairs), self.pose.shape[2]), dtype=np.bool_)
+        clear = np.maximum(_CLEAR, 2.0 * np.asarray(self.touch))
         for k, axis in enumerate(self._plan.axes.used):
             offset = self.pose[axis, a] - self.pose[axis, b]
-            meet &= (low[k, a] + offset - high[k, b] <= _CLEAR) & (low[k, b] - offset - high[k, a] <= _CLEAR)
+            meet &= (low[k, a] + offset - high[k, b] <= clear) & (low[k, b] - offset - high[k, a] <= clear)
         return meet
 
     def closing(self) -> FloatArray:
@@ -179,7 +194,7 @@ class Sight:
                 pairs.second[moving], axis=1
             )
             speed = dot(relative, found.normal.take(moving, axis=1))
-            near = (speed <= APPROACH_EPS) & (found.distance.take(moving, axis=0) <= self.eps)
+            near = (speed <= self.parting) & (found.distance.take(moving, axis=0) <= self.touch)
             closing[moving] = np.where(near, speed, np.inf)
         return square(closing, pairs, np.inf)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -330,3 +331,38 @@ def test_bad_input_is_refused() -> None:
 
 def test_every_kind_is_among_the_test_scenes() -> None:
     assert set(EVERY_KIND) == set(KINDS)
+
+
+@pytest.mark.parametrize("kinds", [("box", "ball"), ("box", "box"), ("hull", "pentagon")])
+def test_coarse_numbers_touch_within_their_precision_alone_and_in_batches(kinds: tuple[str, str]) -> None:
+    precision = 0.1  # far coarser than any float, so that many pairs are near enough
+    exact = schema_of(kinds)
+    coarse = replace(exact, precision=precision)
+    layout = coarse.layout()
+    vectors = random_vectors(layout, 400, np.random.default_rng(0))
+    fine, rough = (
+        Extractor(exact).extract(exact.layout(), vectors),
+        Extractor(coarse).extract(layout, vectors),
+    )
+    poses = vectors.reshape(400, 2, 12)[:, :, : len(POSE)]
+    limit = 1e-9 + precision * np.abs(poses).max(axis=(1, 2), initial=1.0)
+    near = fine.distance[:, 0, 1] <= limit
+    assert 20 < int((near & ~fine.relation("intersect")[:, 0, 1]).sum()) < 380
+    np.testing.assert_array_equal(rough.relation("intersect")[:, 0, 1], near)
+    np.testing.assert_array_equal(rough.touched(0)[:, 1], near)
+    for k in range(0, 400, 37):
+        one = Extractor(coarse).extract(layout, vectors[k : k + 1])
+        for name in rough.names:
+            np.testing.assert_array_equal(one.relation(name)[0], rough.relation(name)[k])
+        np.testing.assert_array_equal(rough.rows(slice(k, k + 1)).touched(0)[0], one.touched(0)[0])
+
+
+def test_float32_leaves_a_gap_that_is_none() -> None:
+    scene = boxes(a=(0, -0.4, 9, 1), b=(0, float(np.float32(0.6)), 1, 1))
+    assert not holds(scene, "intersect", "a", "b")
+    coarse = replace(scene.schema, precision=4.8e-7)
+    assert holds(Scene(coarse, coarse.layout(), scene.vector.copy()), "intersect", "a", "b")
+    apart = boxes(a=(0, -0.4, 9, 1), b=(0, 0.601, 1, 1))
+    assert not holds(Scene(coarse, coarse.layout(), apart.vector.copy()), "intersect", "a", "b")
+    with pytest.raises(SchemaError, match=r"precision must lie in \[0, 1\), got 2"):
+        replace(scene.schema, precision=2.0)

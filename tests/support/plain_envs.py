@@ -161,3 +161,33 @@ class Visited(gym.Env[Any, Any]):
     def _seen(self) -> Any:
         visitor = [1, 50] if self.visits % 2 else [0, 0]
         return np.array([[1, self.x], visitor]).astype(self.dtype)
+
+
+class Crates(gym.Env[Any, Any]):
+    """Two balls of width 1, each lying on a floor, where it is slowed down, or hanging in the air; no gravity.
+
+    Observes (x, y, vx) of both as the `dtype` has it: lying at 0.6 is a hair above the floor for float32.
+    """
+
+    def __init__(self, dtype: Any) -> None:
+        self.observation_space = spaces.Box(-100.0, 100.0, (2, 3), dtype)
+        self.action_space = spaces.Discrete(1)
+        self.table = np.zeros((2, 3))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        draw = self.np_random
+        lying = draw.random(2) < 0.5
+        y = np.where(lying, 0.6, draw.uniform(2.0, 5.0, 2))
+        self.table = np.column_stack([draw.uniform(-8.0, 8.0, 2), y, draw.uniform(-0.5, 0.5, 2)])
+        return self._seen(), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        self.table[:, 2] *= np.where(self.table[:, 1] < 0.7, 0.9, 1.0)
+        self.table[:, 0] += self.table[:, 2]
+        return self._seen(), 0.0, False, False, {}
+
+    def _seen(self) -> Any:
+        return self.table.astype(self.observation_space.dtype)

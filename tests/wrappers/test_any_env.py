@@ -13,12 +13,13 @@ from carts import run
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
-from plain_envs import Slider, Wheel
+from plain_envs import Crates, Slider, Wheel
 
-from relgym.envs.views import FunctionView, NumbersView, Part, TaskView
+from relgym.envs.views import FunctionView, NumbersView, Part, Rows, Static, TableView, TaskView
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, SceneSchema
+from relgym.scene.shapes import Box, Sphere
 from relgym.wrappers import ModelLearner
 from relgym.wrappers.views import chosen_view
 
@@ -265,3 +266,32 @@ def test_parts_and_copies() -> None:
     assert (env.model.seen, twin.model.seen) == (60, 65)
     formulas = [m.formula(6) for m in env.model.modes("place", "x0")]
     assert formulas == ["x0' = x0 + 0.5 action.a + 0.8 speed.x1"]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_who_lies_on_the_floor_lies_there_in_float32_too(dtype: type, tmp_path: Path) -> None:
+    env = Crates(dtype)
+    crates = Rows(
+        "crate",
+        2,
+        shape=Sphere(),
+        pose={"px": "x", "py": "y"},
+        velocity=("vx", None, None),
+        constants={"sx": 1.0, "sy": 1.0, "sz": 1.0},
+    )
+    ground = {"py": -0.4, "sx": 200.0, "sy": 1.0, "sz": 1.0}
+    view = TableView(
+        env.observation_space,
+        env.action_space,
+        columns=("x", "y", "vx"),
+        rows=[crates],
+        static=[Static("floor", ground, shape=Box())],
+    )
+    learner = ModelLearner(env, view=view, targets=["crate.vx"])
+    run(learner, 300, block=5)
+    wrong = learner.prequential.recent
+    assert wrong < 0.1
+    learner.save(tmp_path / "crates.json")
+    loaded = WorldModel.load(tmp_path / "crates.json")
+    assert loaded.schema.precision == view.precision == (0.0 if dtype is np.float64 else view.precision)
+    assert (loaded.schema.precision > 0.0) is (dtype is np.float32)
