@@ -134,7 +134,17 @@ def _umask() -> int:
 
 
 def _canonical(data: Any) -> str:
-    return json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=True)
+    compact = (",", ":")
+    return json.dumps(
+        data, sort_keys=True, separators=compact, ensure_ascii=False, allow_nan=True, default=_plain
+    )
+
+
+def _plain(value: Any) -> Any:
+    """NumPy's numbers as Python's: users' declarations and records may hold them."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a model's file can't hold {value!r}: expected plain data")
 
 
 def _digest(body: dict[str, Any]) -> str:

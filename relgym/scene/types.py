@@ -85,6 +85,14 @@ class ObjectType:
     flags: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
+        given: object = self.properties
+        if isinstance(given, str):
+            raise SchemaError(
+                f"type {self.name!r}: expected a tuple of property names, got {self.properties!r}"
+            )
+        object.__setattr__(self, "properties", tuple(self.properties))
+        if self.shape is not None and not isinstance(self.shape, Shape):
+            raise SchemaError(f"type {self.name!r}: expected a shape such as Box(), got {self.shape!r}")
         if len(set(self.properties)) != len(self.properties):
             raise SchemaError(f"type {self.name!r}: property names must differ, got {self.properties}")
         named = [*self.pose.values(), *(v for v in self.velocity if v), *self.exogenous]

@@ -262,3 +262,23 @@ def test_a_failed_write_leaves_the_old_file_and_no_rubbish(
         write_model(path, {}, None)
     assert path.read_bytes() == files[False]
     assert [p.name for p in tmp_path.iterdir()] == ["model"]
+
+
+def test_numpys_numbers_in_declarations_can_be_kept(tmp_path: Path) -> None:
+    """Bounds of a float32 Box as an action's range, a step computed by NumPy."""
+    schema = SceneSchema(
+        (ObjectType("p", ("x", "v")), ObjectType("action", ("u",))),
+        (("one", "p"), ("action", "action")),
+        planar=np.bool_(True),  # type: ignore[arg-type]
+        kinematics=(Kinematics("p", "x", "v", np.float32(0.5)),),  # type: ignore[arg-type]
+        action_scale=(("u", np.float32(-1.5), np.float64(2.0)),),  # type: ignore[arg-type]
+    )
+    model = WorldModel(schema)
+    model.extra = {"count": np.int64(3)}
+    model.save(tmp_path / "m.json")
+    again = WorldModel.load(tmp_path / "m.json")
+    assert again.schema == schema and again.extra == {"count": 3}
+    model.extra = {"what": object()}
+    with pytest.raises(TypeError, match="a model's file can't hold <object"):
+        model.save(tmp_path / "other.json")
+    assert not (tmp_path / "other.json").exists()
