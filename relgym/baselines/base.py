@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relgym.errors import ObservationError, QueryError
 
-__all__ = ["Classifier", "Float1D", "Float2D", "Int1D", "Memory", "Regressor"]
+__all__ = ["Classifier", "Float1D", "Float2D", "Int1D", "Memory", "Regressor", "refuse_gaps"]
 
 Float1D: TypeAlias = NDArray[np.float64]
 Float2D: TypeAlias = NDArray[np.float64]
@@ -50,6 +50,12 @@ class Classifier(Protocol):
     def predict_batch(self, x: Float2D) -> Int1D:
         """Classes of rows of features of shape ``(n, d)``, shape ``(n,)``."""
         ...
+
+
+def refuse_gaps(*parts: Any) -> None:
+    """Raise `ObservationError` where an example holds NaN or infinity: what remembers sums would never be rid of it."""
+    if not all(np.isfinite(part).all() for part in parts):
+        raise ObservationError("an example holds NaN or infinity: leave it out or mend it")
 
 
 class Memory:
@@ -90,8 +96,7 @@ class Memory:
                 f"expected {self._x.shape[1]} features and {self._y.shape[1]} values as before, "
                 f"got shapes {row.shape} and {values.shape}"
             )
-        if not (np.isfinite(row).all() and np.isfinite(values).all()):
-            raise ObservationError("an example holds NaN or infinity: leave it out or mend it")
+        refuse_gaps(row, values)
         if self._used == len(self._x):
             self._x = np.concatenate([self._x, np.empty_like(self._x)])
             self._y = np.concatenate([self._y, np.empty_like(self._y)])

@@ -62,7 +62,10 @@ class _Fitted:
             from sklearn.exceptions import ConvergenceWarning
 
             warnings.simplefilter("ignore", ConvergenceWarning)  # a budget of iterations is a setting, too
-            self._estimator = self._make().fit(self._scaled(x), target(y))
+            estimator = self._make()
+            if getattr(estimator, "n_neighbors", 0) > len(x):  # as many as there are
+                estimator.set_params(n_neighbors=len(x))
+            self._estimator = estimator.fit(self._scaled(x), target(y))
 
     def _scaled(self, x: Float2D) -> Float2D:
         scaled: Float2D = (x - self._mean) / self._deviation
@@ -87,6 +90,8 @@ class FittedRegressor(_Fitted):
 
     def predict_batch(self, x: Float2D) -> Float2D:
         """Values of rows of shape ``(n, d)``, shape ``(n, m)``."""
+        if not len(x):
+            return np.empty((0, self._memory.y.shape[1]))
         units = self._memory.y.std(axis=0)
         units = np.where(units > 0.0, units, 1.0)
         if self._estimator is None:
@@ -112,7 +117,7 @@ class FittedClassifier(_Fitted):
     def predict_batch(self, x: Float2D) -> Int1D:
         """Classes of rows of shape ``(n, d)``, shape ``(n,)``."""
         labels = self._memory.y[:, 0].astype(np.int64)
-        if len(np.unique(labels)) == 1:
+        if not len(x) or len(np.unique(labels)) == 1:
             return np.full(len(x), labels[0])
         if self._estimator is None:
             self._fit(lambda y: y[:, 0].astype(np.int64))

@@ -62,6 +62,8 @@ class LocallyWeightedRegression:
     def predict_batch(self, x: Float2D) -> Float2D:
         """Values of rows of shape ``(n, d)``, shape ``(n, m)``."""
         queries = self._scaled(x)
+        if not queries.shape[1]:  # nothing ever varied: all examples lie on every query
+            return np.repeat(self._memory.y.mean(axis=0)[None], len(x), axis=0)
         parts = [self._predict(queries[k : k + _CHUNK]) for k in range(0, len(x), _CHUNK)]
         return np.concatenate(parts) if parts else np.empty((0, self._memory.y.shape[1]))
 
@@ -72,7 +74,8 @@ class LocallyWeightedRegression:
 
             learned = self._memory.x
             self._low, self._span = learned.min(axis=0), np.ptp(learned, axis=0)
-            self._tree = cKDTree(self._on_scale(learned))
+            own = self._on_scale(learned)
+            self._tree = cKDTree(own) if own.shape[1] else ()
         return self._on_scale(x)
 
     def _on_scale(self, x: Float2D) -> Float2D:

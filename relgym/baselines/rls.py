@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relgym.baselines.base import Float1D, Float2D
+from relgym.baselines.base import Float1D, Float2D, refuse_gaps
 from relgym.errors import ConfigError, QueryError
 
 __all__ = ["RecursiveLeastSquares"]
@@ -35,7 +35,8 @@ class RecursiveLeastSquares:
         self._covariance = np.empty((0, 0))
 
     def learn_one(self, x: Float1D, y: Float1D) -> None:
-        """Move the weights by the error, along the gain."""
+        """Move the weights by the error, along the gain; `ObservationError` for NaN or infinity."""
+        refuse_gaps(x, y)
         row = np.append(x, 1.0)
         if self._weights is None:
             self._weights = np.zeros((len(row), len(y)))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from relgym.baselines.base import Float1D, Float2D, Int1D
+from relgym.baselines.base import Float1D, Float2D, Int1D, refuse_gaps
 
 __all__ = ["StreamingClassifier", "StreamingRegressor"]
 
@@ -32,7 +32,8 @@ class StreamingRegressor:
         self._scaler: Any = None
 
     def learn_one(self, x: Float1D, y: Float1D) -> None:
-        """Take up one example."""
+        """Take up one example; `ObservationError` for NaN or infinity."""
+        refuse_gaps(x, y)
         if self._scaler is None:
             self._scaler, self._parts = _scaler(), [self._make() for _ in y]
         row = _row(x)
@@ -52,6 +53,8 @@ class StreamingRegressor:
 
     def predict_batch(self, x: Float2D) -> Float2D:
         """Values of rows of shape ``(n, d)``, shape ``(n, m)``; one by one, since river knows no batches."""
+        if not len(x):
+            return np.empty((0, max(1, len(self._parts))))
         return np.stack([self.predict_one(row) for row in x])
 
 
@@ -64,7 +67,8 @@ class StreamingClassifier:
         self._first = 0
 
     def learn_one(self, x: Float1D, label: int) -> None:
-        """Take up one example."""
+        """Take up one example; `ObservationError` for NaN or infinity."""
+        refuse_gaps(x)
         if self._scaler is None:
             self._scaler, self._first = _scaler(), label
         row = _row(x)

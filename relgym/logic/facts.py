@@ -196,7 +196,8 @@ def facts_from_tuples(
     Raises
     ------
     ConfigError
-        If a tuple names an unknown object, or a relation's tuples differ in length.
+        If a tuple names an unknown object, an object is named twice, a relation's tuples differ in length, or the lists
+        are of different numbers of worlds.
 
     Examples
     --------
@@ -204,8 +205,12 @@ def facts_from_tuples(
     >>> bool(facts.relations["parent"][0, number["ann"], number["bob"]])
     True
     """
-    if len(worlds) != len(objects):
-        raise ConfigError(f"Expected the objects of {len(worlds)} worlds, got {len(objects)} lists.")
+    for what, lists in (("the objects", objects), ("the numbers", worlds if numeric is None else numeric)):
+        if len(worlds) != len(lists):
+            raise ConfigError(f"Expected {what} of {len(worlds)} worlds, got {len(lists)} lists.")
+    for symbols in objects:
+        if len(set(symbols)) < len(symbols):
+            raise ConfigError(f"Expected every object of a world once, got {list(symbols)}.")
     numbers = [{symbol: number for number, symbol in enumerate(symbols)} for symbols in objects]
     size = max((len(symbols) for symbols in objects), default=0)
     exists = np.array([[slot < len(symbols) for slot in range(size)] for symbols in objects], dtype=np.bool_)

@@ -125,6 +125,11 @@ def _checked(facts: Facts, tuples: Int, what: str) -> Int:
     limits = np.array([facts.worlds, *[facts.objects] * (tuples.shape[1] - 1)])
     if ((tuples < 0) | (tuples >= limits)).any():
         raise ConfigError(f"{what}: expected a world and objects below {limits.tolist()}, got others.")
+    there = facts.exists[tuples[:, :1], tuples[:, 1:]].all(axis=1)
+    if not there.all():
+        raise ConfigError(
+            f"{what}: expected objects that exist, got {tuples[~there][0].tolist()} (world, objects)."
+        )
     return tuples.astype(np.int64)
 
 

@@ -186,3 +186,33 @@ def test_an_interaction_network_does_not_care_who_comes_first() -> None:
         InteractionNetwork(2, 3).learn_one(X[0], LINEAR[0])
     with pytest.raises(ConfigError, match="objects=0: expected at least 1"):
         InteractionNetwork(2, 0)
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_few_examples_equal_ones_none_to_ask_and_gaps(name: str) -> None:
+    def made() -> object:
+        return make_regressor(name, columns=COLUMNS, rng=np.random.default_rng(0))
+
+    for x in (X[:1], X[:3], np.ones((20, 4))):
+        model = made()
+        _taught(model, x, LINEAR[: len(x)])
+        assert np.isfinite(model.predict_batch(X[:5])).all()  # type: ignore[attr-defined]
+        assert model.predict_batch(np.empty((0, 4))).shape == (0, 2)  # type: ignore[attr-defined]
+    model = made()
+    _taught(model, X[:60], LINEAR[:60])
+    before = model.predict_one(X[70])  # type: ignore[attr-defined]
+    try:
+        model.learn_one(np.array([np.nan, 0.0, 0.0, 0.0]), LINEAR[0])  # type: ignore[attr-defined]
+    except ObservationError:
+        np.testing.assert_array_equal(model.predict_one(X[70]), before)  # type: ignore[attr-defined]
+    assert np.isfinite(model.predict_one(X[70])).all()  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("name", sorted(CLASSIFIERS))
+def test_classifiers_of_few_examples(name: str) -> None:
+    for count in (1, 3):
+        model = make_classifier(name, rng=np.random.default_rng(0))
+        for k in range(count):
+            model.learn_one(X[k], k)
+        assert model.predict_one(X[0]) in range(count)
+        assert model.predict_batch(np.empty((0, 4))).shape == (0,)

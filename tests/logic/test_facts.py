@@ -27,6 +27,10 @@ def test_unknown_symbols_and_mixed_lengths_are_refused() -> None:
         facts_from_tuples([{"parent": [("ann",), ("ann", "ann")]}], [["ann"]])
     with pytest.raises(ConfigError, match="objects of 1 worlds"):
         facts_from_tuples([{}], [])
+    with pytest.raises(ConfigError, match="numbers of 1 worlds, got 2 lists"):
+        facts_from_tuples([{}], [["ann"]], [{}, {}])
+    with pytest.raises(ConfigError, match=r"every object of a world once, got \['ann', 'ann'\]"):
+        facts_from_tuples([{}], [["ann", "ann"]])
 
 
 def test_arrays_of_other_shapes_or_types_are_refused() -> None:

@@ -305,6 +305,14 @@ def test_malformed_problems_are_refused(
         learn(facts, np.array(positives), np.array(negatives), **options)  # type: ignore[arg-type]
 
 
+def test_tuples_are_of_objects_that_exist() -> None:
+    exists = np.array([[True, True, False], [True, True, True]])
+    facts = Facts({"red": exists.copy()}, exists)
+    assert learn(facts, np.array([[0, 1]]), np.array([[1, 2]])) is not None
+    with pytest.raises(ConfigError, match=r"negatives: expected objects that exist, got \[0, 2\]"):
+        learn(facts, np.array([[0, 1]]), np.array([[1, 2], [0, 2]]))
+
+
 # --- properties ---------------------------------------------------------------------------------------------
 
 
