@@ -115,6 +115,8 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
 
     def step_wait(self) -> Any:
         """Dream on by one decision; dreams that ended begin anew."""
+        if self._imagination.model is not self._apprentice.model:  # a rival has taken its place
+            self._imagination = Imagination(self._apprentice.model, self._lens, self._apprentice.judge)
         done = self._lens.actions(self._actions)
         after, rewards, ended, known = self._imagination.follow(self._layout, self._vectors, done)
         self._vectors = np.where(known[:, None], after, self._vectors)

@@ -149,6 +149,26 @@ def test_check_ups_are_made_again_in_a_second_training() -> None:
     assert counts == [1, 2, 3]  # after 4 and 104 steps; and after 4 when counted from 0 again
 
 
+def test_dreams_are_of_the_model_at_work() -> None:
+    class Taught(LineModel):
+        """Rivals of its own know the world as it is."""
+
+        def untaught(self) -> LineModel:
+            return LineModel()
+
+    from relgym.wrappers.sb3.dreaming import DreamVecEnv, explore
+
+    found = Apprentice(Taught(), LineTask(), QUICK)
+    explore(found, world(), 40, seed=0)
+    env = DreamVecEnv(found, world(), num_envs=4, config=QUICK)
+    found.model.off = 3.0  # type: ignore[attr-defined]  # as if the world had changed
+    explore(found, world(), 40, seed=1)
+    assert found.renewals == 1 and not isinstance(found.model, Taught)
+    place = 2.0 * env.reset()[:, 0]
+    seen, *_ = env.step(np.full((4, 1), 0.25, dtype=np.float32))
+    np.testing.assert_allclose(2.0 * seen[:, 0], place + 0.5, atol=1e-5)
+
+
 def test_what_was_explored_has_all_been_learned() -> None:
     found = apprentice()
     assert len(found.model.learned) == 40  # type: ignore[attr-defined]

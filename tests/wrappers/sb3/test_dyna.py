@@ -292,6 +292,34 @@ def test_when_the_world_changes_the_dreams_are_thrown_away() -> None:
     assert not algorithm.replay_buffer.trusted
 
 
+def test_when_the_world_changes_a_rival_is_dreamed_in() -> None:
+    from relgym.wrappers.sb3.dyna import Dyna
+
+    class Taught(LineModel):
+        """Rivals of its own know the world as it is."""
+
+        def untaught(self) -> LineModel:
+            return LineModel()
+
+    world = Taught()
+    dyna = Dyna(world, DynaConfig(**QUICK, burst=30))
+    algorithm = agent("SAC", flat())
+    algorithm.learn(20, callback=dyna)
+    assert dyna.world is world
+    world.off = 3.0
+    before = algorithm._n_updates
+    algorithm.learn(40, callback=dyna, reset_num_timesteps=False)
+    assert dyna.world is not world and dyna.apprentice.renewals == 1
+    assert algorithm._n_updates - before >= 40 + 30  # it makes up for lost time once more
+    buffer = algorithm.replay_buffer
+    pool, last = buffer.imagined, buffer.imagined.size()
+    moved = 2.0 * (pool.next_observations - pool.observations)[:last, 0, 0]
+    assert last > 0
+    np.testing.assert_allclose(
+        moved, 2.0 * pool.actions[:last, 0, 0], atol=1e-5
+    )  # nothing of the old one is left
+
+
 def test_same_seed_same_weights() -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
