@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
@@ -72,7 +73,7 @@ def model_of(
     if config is not None or targets is not None:
         raise ConfigError("a loaded model keeps its targets and config: pass either model or those")
     model = WorldModel.load(path)
-    if model.schema != schema:
+    if replace(model.schema, precision=schema.precision) != schema:  # it keeps its own
         raise ConfigError(_another_world(path, schema, model.schema))
     return model
 

@@ -173,10 +173,10 @@ class ContactFeatures:
         kinds = np.array(
             [[layout.types[i].name == kind for kind in self._kinds] for i in layout.bodies], dtype=np.float64
         )
-        every = np.arange(len(vectors))
+        every, touched = np.arange(len(vectors)), relations.touched(body)
         parts = [vectors[:, [layout.column(target, p) for p in self._free]]]
         for near in nearest.T:
-            touching = distance[every, near] <= np.ravel(relations.touch)
+            touching = touched[every, near]
             parts += [touching[:, None].astype(np.float64), facts[every, near], kinds[near]]
         rows = np.hstack(parts)
         return np.pad(rows, ((0, 0), (0, len(self.names) - rows.shape[1])))

@@ -58,9 +58,10 @@ def merge(parts: Parts, other: Parts, *, follow_laws: bool) -> None:
 
 def _check(parts: Parts, other: Parts) -> None:
     difference = mismatch(other.schema, parts.schema) or mismatch(parts.schema, other.schema)
-    for what in ("kinematics", "offsets"):
+    for what in ("kinematics", "offsets", "precision"):
         theirs, mine = getattr(other.schema, what), getattr(parts.schema, what)
-        if not difference and theirs != mine:
+        same = set(theirs) == set(mine) if what == "kinematics" else theirs == mine
+        if not (difference or same):
             difference = f"{what}={theirs} instead of {mine}"
     if difference:
         raise ConfigError(f"the other model is of another world: {difference}; merge models of one schema")

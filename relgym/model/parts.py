@@ -81,7 +81,7 @@ class Parts:
             self.add_target(target)
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_kin": {}}  # keyed by identity, which a copy doesn't share
+        return self.__dict__ | {"_kin": {}, "_known": {}}  # keyed by identity, which a copy doesn't share
 
     def check(self, scene: Scene) -> None:
         """Raise `ObservationError` for NaN, infinity, what is no scene, or one of another schema."""
@@ -211,8 +211,8 @@ def check_targets(schema: SceneSchema, targets: Sequence[Target]) -> None:
     Raises
     ------
     ConfigError
-        No target, one that stands there twice, or one that is given what is neither an earlier target nor follows from
-        kinematics: then the present value would be read for the next one.
+        No target, one that stands there twice, or one that is given what is no earlier target: then the present value
+        would be read for the next one.
     SchemaError
         A type or property that isn't there, or one that follows from declared kinematics.
     """
@@ -227,9 +227,9 @@ def check_targets(schema: SceneSchema, targets: Sequence[Target]) -> None:
         if own in derived:
             raise SchemaError(f"target {target} follows from declared kinematics; leave out one of the two")
         for pair in target.given:
-            if pair not in known | derived:
+            if pair not in known:
                 raise ConfigError(
                     f"target {target} is given {'.'.join(pair)}, which is no target before it: put that one first "
-                    "(causal order), or leave it out of what is given"
+                    "(causal order; what follows from kinematics comes last, give its rate), or leave it out"
                 )
         known.add(own)

@@ -282,7 +282,7 @@ class Percept:
         at = perception.approach
         # Contact facts are facts of touching pairs (design §4): a normal towards something far says nothing.
         contacts[~relations.touched(body)] = np.nan
-        parting = contacts[..., at] > relations.parting
+        parting = contacts[..., at] > relations.parting(body)
         # Where bodies part, the contact does nothing any more, whichever way it faces: only that they part is said.
         contacts[parting, :at] = contacts[parting, at + 1] = np.nan
         table = perception.unary_table(self.layout)
@@ -290,7 +290,10 @@ class Percept:
         nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
         close, struck = relations.context(body), None
         if perception.parting:
-            close, struck = _without(close, parting), _approached(contacts[..., at], body, relations.parting)
+            close, struck = (
+                _without(close, parting),
+                _approached(contacts[..., at], body, relations.parting(body)),
+            )
         contacts[..., perception.gaps] = gaps
         pair = np.concatenate([contacts, numbers], axis=2)
         pair[:, body] = np.nan

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.errors import ConfigError, ModelFileError
+from relgym.errors import ConfigError, ModelFileError, SchemaError
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
@@ -375,7 +375,7 @@ class WorldModel:
             model.extra = dict(body["extra"])
             restore_hindsight(parts, body.get("hindsight", {}))
             return model, model.extra
-        except (KeyError, TypeError, IndexError) as error:
+        except (KeyError, TypeError, IndexError, ConfigError, SchemaError) as error:
             raise ModelFileError(
                 f"{path}: a part of the model is missing or malformed ({error!r}); save it again"
             ) from None

@@ -32,7 +32,7 @@ from relgym.scene.context import close_set
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Geometry
 from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.objects import Float2D, SceneLayout, SceneSchema, pose_columns
-from relgym.scene.sight import Pairs, Plan, Sight
+from relgym.scene.sight import Pairs, Plan, Sight, square
 from relgym.scene.unary import unary, unary_names
 
 __all__ = ["TOUCH_EPS", "Extractor", "Relations", "unary"]
@@ -147,17 +147,22 @@ class Relations:
 
     def touched(self, body: int) -> _Table:
         """Which bodies touch one, shape ``(n, K)``; it doesn't touch itself."""
-        return self.distances(body) <= self.touch
+        return self.distances(body) <= self.touch(body)
 
-    @property
-    def touch(self) -> float | FloatArray:
-        """Distance up to which bodies touch; where numbers are coarse of shape ``(n, 1)``."""
-        return _each([sight.touch for sight in self._sights])
+    def touch(self, body: int) -> float | FloatArray:
+        """Distance up to which others touch a body; where numbers are coarse of shape ``(n, K)``."""
+        return self._limits(body, [sight.touch for sight in self._sights])
 
-    @property
-    def parting(self) -> float | FloatArray:
-        """Speed up to which touching bodies don't part; as `touch`."""
-        return _each([sight.parting for sight in self._sights])
+    def parting(self, body: int) -> float | FloatArray:
+        """Speed up to which others don't part from a body that they touch; as `touch`."""
+        return self._limits(body, [sight.parting for sight in self._sights])
+
+    def _limits(self, body: int, parts: Sequence[float | FloatArray]) -> float | FloatArray:
+        arrays = [part for part in parts if isinstance(part, np.ndarray)]
+        if not arrays:
+            return parts[0]
+        both = np.concatenate([_joined(arrays), np.zeros((1, len(self)))])
+        return np.ascontiguousarray(both.take(self._plan.pairs.number[body], axis=0).T)
 
     def context(self, body: int) -> _Table:
         """Return the target's close set (`close_set`), shape ``(n, K)``."""
@@ -205,12 +210,6 @@ def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
 
 
-def _each(parts: Sequence[float | FloatArray]) -> float | FloatArray:
-    """A limit that all scenes share, or one for each, shape ``(n, 1)``."""
-    arrays = [part for part in parts if isinstance(part, np.ndarray)]
-    return np.concatenate(arrays)[:, None] if arrays else parts[0]
-
-
 def _found(axes: Axes, sight: Sight, name: str) -> _Table:
     """One relation's table in a piece of the scenes, shape ``(K, K, n)``; the diagonal means nothing."""
     if name == "intersect":
@@ -223,7 +222,10 @@ def _found(axes: Axes, sight: Sight, name: str) -> _Table:
         closing = sight.closing()
         found: _Table = closing < np.inf
         if name == "approaching-fastest":
-            found &= closing <= closing.min(axis=1, initial=np.inf, keepdims=True) + sight.parting
+            slack = sight.parting
+            if isinstance(slack, np.ndarray):
+                slack = square(slack, sight.pairs, contacts.APPROACH_EPS)
+            found &= closing <= closing.min(axis=1, initial=np.inf, keepdims=True) + slack
         return found
     return sight.boxes.along(*axis_relations(axes)[name])
 

@@ -17,6 +17,7 @@ from relgym.scene.geometry.vectors import FloatArray, dot
 __all__ = ["Pairs", "Plan", "Sight", "square"]
 
 _CLEAR = 1e-6
+_LENGTHS = [0, 1, 2, 6, 7, 8]  # of a pose: place and size; angles are no lengths
 """Gap between bounding boxes, in units of length, above which two bodies can't touch, whatever rounding does."""
 
 _Bools: TypeAlias = NDArray[np.bool_]
@@ -79,8 +80,8 @@ class Sight:
     Attributes
     ----------
     touch, parting
-        Distance up to which bodies touch, and speed up to which they don't part; arrays of shape ``(n,)`` where numbers
-        are coarse.
+        Distance up to which bodies touch, and speed up to which they don't part; where numbers are coarse for each
+        pair, by its own places, sizes and velocities, shape ``(P, n)``.
 
     Raises
     ------
@@ -91,14 +92,19 @@ class Sight:
     def __init__(self, plan: Plan, vectors: FloatArray, eps: float, precision: float = 0.0) -> None:
         padded = np.concatenate([vectors, np.broadcast_to(_CONSTANTS, (len(vectors), 2))], axis=1).T
         self.vectors, self.eps, self.precision = vectors, eps, precision
-        self._plan = plan
+        self._plan, self.pairs = plan, plan.pairs
         self.pose: FloatArray = padded.take(plan.columns, axis=0)
         self.velocity: FloatArray = padded.take(plan.velocities, axis=0)
         self.touch: float | FloatArray = eps
         self.parting: float | FloatArray = APPROACH_EPS
         if precision:
-            self.touch = eps + precision * np.abs(self.pose).max(axis=(0, 1), initial=1.0)
-            self.parting = APPROACH_EPS + precision * np.abs(self.velocity).max(axis=(0, 1), initial=1.0)
+            both = plan.pairs.first, plan.pairs.second
+            for name, least, numbers in (
+                ("touch", eps, self.pose[_LENGTHS]),
+                ("parting", APPROACH_EPS, self.velocity),
+            ):
+                size = np.abs(numbers).max(axis=0, initial=1.0)
+                setattr(self, name, least + precision * np.maximum(*(size[bodies] for bodies in both)))
         shape = (len(plan.pairs.first), len(vectors))
         self._touching: _Bools | None = None
         self._closing: FloatArray | None = None
@@ -150,12 +156,12 @@ class Sight:
         slow = self._arrays.unsettled(missing & ~self._exact)
         near = missing.copy()
         near[slow] = False
-        self._touches[near] = self.measured(near).distance[near] <= self.touch
+        self._touches[near] = self.measured(near).distance[near] <= _some(self.touch, near)
         if len(slow):
             meet = self._meet(slow)
             m = self._measured
             self._arrays.fill_some(self.pose, self._solids, slow, meet, m.distance, m.normal)
-            self._touches[slow] = meet & (np.where(meet, m.distance[slow], np.inf) <= self.touch)
+            self._touches[slow] = meet & (np.where(meet, m.distance[slow], np.inf) <= _some(self.touch, slow))
         self._told |= missing
         return self._touches
 
@@ -171,7 +177,7 @@ class Sight:
         a, b = self._plan.pairs.first[pairs], self._plan.pairs.second[pairs]
         low, high = self._measured.low, self._measured.high
         meet = np.ones((len(pairs), self.pose.shape[2]), dtype=np.bool_)
-        clear = np.maximum(_CLEAR, 2.0 * np.asarray(self.touch))
+        clear = np.maximum(_CLEAR, 2.0 * np.asarray(_some(self.touch, pairs)))
         for k, axis in enumerate(self._plan.axes.used):
             offset = self.pose[axis, a] - self.pose[axis, b]
             meet &= (low[k, a] + offset - high[k, b] <= clear) & (low[k, b] - offset - high[k, a] <= clear)
@@ -194,9 +200,15 @@ class Sight:
                 pairs.second[moving], axis=1
             )
             speed = dot(relative, found.normal.take(moving, axis=1))
-            near = (speed <= self.parting) & (found.distance.take(moving, axis=0) <= self.touch)
+            near = found.distance.take(moving, axis=0) <= _some(self.touch, moving)
+            near &= speed <= _some(self.parting, moving)
             closing[moving] = np.where(near, speed, np.inf)
         return square(closing, pairs, np.inf)
+
+
+def _some(limit: float | FloatArray, pairs: NDArray[Any]) -> float | FloatArray:
+    """Limits of some pairs; one for all stays so."""
+    return limit[pairs] if isinstance(limit, np.ndarray) else limit
 
 
 def square(found: NDArray[Any], pairs: Pairs, diagonal: float | bool) -> NDArray[Any]:

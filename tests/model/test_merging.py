@@ -119,7 +119,7 @@ def test_what_cannot_be_merged_leaves_the_model_as_it_was() -> None:
     kind = ObjectType("p", ("x", "v"))
     plain = SceneSchema((kind,), (("a", "p"),), kinematics=(Kinematics("p", "x", "v"),))
     model = WorldModel(plain)
-    for what in ({"offsets": True}, {"kinematics": (Kinematics("p", "x", "v", 0.01),)}):
+    for what in ({"offsets": True}, {"kinematics": (Kinematics("p", "x", "v", 0.01),)}, {"precision": 1e-6}):
         with pytest.raises(ConfigError, match=f"of another world: {next(iter(what))}="):
             model.merge(WorldModel(replace(plain, **what)))  # type: ignore[arg-type]
     assert model.seen == 0

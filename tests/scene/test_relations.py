@@ -344,8 +344,8 @@ def test_coarse_numbers_touch_within_their_precision_alone_and_in_batches(kinds:
         Extractor(exact).extract(exact.layout(), vectors),
         Extractor(coarse).extract(layout, vectors),
     )
-    poses = vectors.reshape(400, 2, 12)[:, :, : len(POSE)]
-    limit = 1e-9 + precision * np.abs(poses).max(axis=(1, 2), initial=1.0)
+    lengths = vectors.reshape(400, 2, 12)[:, :, [0, 1, 2, 6, 7, 8]]  # places and sizes
+    limit = 1e-9 + precision * np.abs(lengths).max(axis=(1, 2), initial=1.0)
     near = fine.distance[:, 0, 1] <= limit
     assert 20 < int((near & ~fine.relation("intersect")[:, 0, 1]).sum()) < 380
     np.testing.assert_array_equal(rough.relation("intersect")[:, 0, 1], near)
@@ -355,6 +355,16 @@ def test_coarse_numbers_touch_within_their_precision_alone_and_in_batches(kinds:
         for name in rough.names:
             np.testing.assert_array_equal(one.relation(name)[0], rough.relation(name)[k])
         np.testing.assert_array_equal(rough.rows(slice(k, k + 1)).touched(0)[0], one.touched(0)[0])
+
+
+def test_how_coarse_a_pair_is_is_its_own_affair() -> None:
+    """Something that is parked far away makes no neighbours touch."""
+    for far in (3.0, 1e6):
+        scene = boxes(a=(0, 0, 1, 1), b=(0, 1.002, 1, 1), c=(far, 0, 1, 1))
+        coarse = replace(scene.schema, precision=4.8e-7)
+        for copies in (1, 3):
+            found = Extractor(coarse).extract(coarse.layout(), np.repeat(scene.vector[None], copies, axis=0))
+            assert not found.relation("intersect").any() and not found.touched(0).any()
 
 
 def test_float32_leaves_a_gap_that_is_none() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -295,3 +296,14 @@ def test_who_lies_on_the_floor_lies_there_in_float32_too(dtype: type, tmp_path: 
     loaded = WorldModel.load(tmp_path / "crates.json")
     assert loaded.schema.precision == view.precision == (0.0 if dtype is np.float64 else view.precision)
     assert (loaded.schema.precision > 0.0) is (dtype is np.float32)
+
+
+def test_files_that_say_nothing_of_precision_are_gone_on_from(tmp_path: Path) -> None:
+    """They are of an earlier day; the model keeps what it knew."""
+    learner = ModelLearner(Wheel())
+    run(learner, 40)
+    old = WorldModel(replace(learner.model.schema, precision=0.0))
+    old.save(tmp_path / "old.json", history=True)
+    again = ModelLearner(Wheel(), view=learner.view, model=tmp_path / "old.json")
+    run(again, 20)
+    assert (again.model.seen, again.model.schema.precision) == (20, 0.0)

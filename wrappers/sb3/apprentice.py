@@ -113,7 +113,8 @@ class Apprentice:
     def _challenge(self) -> _Pupil | None:
         """The rival of a model that was trusted and is no more, if it has one."""
         patience, own = self._config.renew, self._pupil
-        if own.gate.open or not own.gate.switches or not (patience and own.learns):
+        alone = isinstance(self.judge, NeuralTask)  # which is the model itself
+        if own.gate.open or not own.gate.switches or alone or not (patience and own.learns):
             self._rival = None
         elif self._rival is None or self._rival.steps >= patience:
             untaught = getattr(own.model, "untaught", None)
@@ -257,8 +258,8 @@ def check_model(model: Any, lens: Lens, *, at_once: bool = False) -> None:
     schema = lens.recorder.view.schema
     if difference := mismatch(schema, model.schema):
         raise ConfigError(
-            f"the model was made for other scenes than the env shows: {difference}; make it with the env's schema "
-            "(env.get_wrapper_attr('schema'))"
+            f"the model was made for other scenes than the env shows: {difference}; make it with the recorder's schema "
+            "(env.get_wrapper_attr('view').schema)"
         )
     frozen = getattr(model, "frozen", False)
     if isinstance(model, WorldModel) and (frozen or at_once):

@@ -11,7 +11,8 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 
 from relgym.envs.arguments import checked_action
-from relgym.scene.objects import Scene, Transition
+from relgym.envs.views import SceneView
+from relgym.scene.objects import Scene, SceneSchema, Transition
 from relgym.wrappers.views import ViewLike, recordable, view_of
 
 __all__ = ["Experience", "TransitionRecorder"]
@@ -79,6 +80,13 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
         self._scene: Scene | None = None
         self._first = True
         self._taken: deque[Experience] = deque(maxlen=_MOST)
+
+    @property
+    def schema(self) -> SceneSchema:
+        """What the scenes are made of; only where observations are scenes: of any others ``view.schema`` tells."""
+        if not isinstance(self.view, SceneView):
+            raise AttributeError("observations aren't scenes: see view.schema")
+        return self.view.schema
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -160,6 +160,14 @@ def test_gymnasiums_repeats_count() -> None:
     assert Lens(Flat(gym.wrappers.RepeatAction(inner, 2))).repeat == 6
 
 
+def test_a_recorders_schema_knows_how_coarse_its_scenes_are() -> None:
+    coarse, fine = (TransitionRecorder(LineEnv(dtype=dtype)) for dtype in (np.float32, np.float64))
+    assert coarse.get_wrapper_attr("schema").precision == coarse.view.precision > 0.0
+    assert fine.get_wrapper_attr("schema") == SCHEMA
+    flat = TransitionRecorder(gym.make("CartPole-v1"))
+    assert not flat.has_wrapper_attr("schema") and flat.view.schema.objects[0] == ("self", "self")
+
+
 def test_a_recorder_nobody_asks_forgets_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relgym.wrappers.sb3.recorder._MOST", 3)
     env = TransitionRecorder(LineEnv())
