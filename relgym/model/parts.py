@@ -105,13 +105,15 @@ class Parts:
     def checked_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """State vectors as contiguous float64; `ObservationError` for other types or width, NaN or infinity."""
         if self._known.get(id(layout)) is not layout:
-            for t in layout.types:
-                if t not in self.schema.types:
-                    known = [(own.name, own.properties) for own in self.schema.types]
-                    raise ObservationError(
-                        f"the scenes hold objects of type {t.name!r} with the properties {t.properties}: the model "
-                        f"knows {known}; numbers and names of objects may differ, their types may not"
-                    )
+            # Types that it doesn't know are obstacles to it, and laws of contact hold for them.
+            own = {t.name: t for t in self.schema.types}
+            other = [t for t in layout.types if own.get(t.name, t) != t]
+            if other or not any(t.name in own for t in layout.types):
+                raise ObservationError(
+                    f"the scenes hold objects of the types {[(t.name, t.properties) for t in other or layout.types]}: "
+                    f"the model knows {[(t.name, t.properties) for t in self.schema.types]}; numbers and names of "
+                    "objects may differ, their types may not"
+                )
             self._known[id(layout)] = layout  # kept alive, so that its id stays its own
         vectors = np.ascontiguousarray(vectors, dtype=np.float64)
         if vectors.ndim != 2 or vectors.shape[1] != layout.width:

@@ -251,9 +251,9 @@ def test_dyna_learns_the_task_beside_the_world() -> None:
     assert 0.0 < dyna.apprentice.gate.error < 1.0
 
 
+@pytest.mark.sb3
 def test_actions_come_into_scenes_as_the_env_has_them() -> None:
     """Three choices are a number and three indicators in its scenes: a judge of one's own learns that from the env."""
-    pytest.importorskip("stable_baselines3")
     from relgym.wrappers.sb3.dreaming import explore
 
     class Paying(gym.Env[Any, Any]):
