@@ -9,7 +9,8 @@ from gymnasium import spaces
 
 from relgym.envs.arguments import checked_actions, physical_action
 from relgym.errors import ConfigError
-from relgym.scene.objects import ACTION, Float1D, Float2D, Scene, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, Float1D, Float2D, Scene, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["BatchActions", "acting", "action_values", "check_action_space", "without_action"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, TypeAlias
 
 import gymnasium as gym
@@ -14,7 +15,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from relgym.errors import ActionError, ConfigError
-from relgym.scene.objects import Float1D, SceneSchema
+from relgym.scene.objects import Float1D
+from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "Coefficient",
@@ -126,12 +128,11 @@ def checked_function(what: str, given: Any, *arguments: str) -> Any:
 
 def takes(function: Any, count: int) -> bool:
     """Whether a function may be called with so many arguments; of something written in C nobody knows, so it may."""
-    try:
-        inspect.signature(function).bind(*range(count))
-    except TypeError:
-        return False
-    except ValueError:
-        return True
+    with suppress(ValueError):  # no signature
+        try:
+            inspect.signature(function).bind(*range(count))
+        except TypeError:
+            return False
     return True
 
 
@@ -180,9 +181,7 @@ def refuse_vector_env(env: Any) -> None:
 
 def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:
     """`checked_action` for `count` actions at once, first axis first; they come back as one array."""
-    if isinstance(
-        space, spaces.MultiBinary
-    ):  # a batch of them is a Box of int8, which other integers aren't in
+    if isinstance(space, spaces.MultiBinary):  # Gymnasium's batch of them is a Box of int8: no other integers
         array = np.asarray(actions)
         if array.shape != (count, *space.shape) or not np.isin(array, (0, 1)).all():
             raise ActionError(f"expected {count} actions of {space}, got {actions!r}")

@@ -15,7 +15,8 @@ from relgym.envs.base import SceneEnv
 from relgym.envs.physics import BallWorld, Contact, Obstacle, Point
 from relgym.envs.tasks import Task
 from relgym.errors import ConfigError
-from relgym.scene.objects import POSE, Float1D, Kinematics, ObjectType, SceneSchema, Target
+from relgym.scene.objects import POSE, Float1D, Kinematics, ObjectType, Target
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Sphere, Wedge, outline
 
 __all__ = ["BallEnv", "body_values"]

@@ -16,7 +16,8 @@ from relgym.envs.arguments import checked_action
 from relgym.envs.flat import FlatSpec
 from relgym.envs.tasks import Judgement, Task
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import ACTION, POSE, Float1D, Scene, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, POSE, Float1D, Scene, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "DEFAULT_BOUNDS",

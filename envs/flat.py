@@ -16,7 +16,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
-from relgym.scene.objects import ACTION, Float2D, ObjectType, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, Float2D, ObjectType, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["LIMIT", "FlatSpec", "Flattener"]
 

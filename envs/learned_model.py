@@ -26,7 +26,8 @@ from relgym.envs.views import View
 from relgym.errors import ConfigError
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import TASK, Scene, SceneSchema
+from relgym.scene.objects import TASK, Scene
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Judge", "LearnedModelEnv"]
 
@@ -155,7 +156,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         self.flat_spec = place.flat_spec
         check_judges(reward, terminated, self.task, place.model, batched=False, at_once=snapshot)
         self._given = reward, terminated
-        self._judges: Judges | None = None
+        self._judges = Judges(None, None)  # settled when a dream begins
         self._start = checked_function("start", start, "random generator")
         self._horizon = None if horizon is None else checked_count("horizon", horizon, 1, 10**9)
         self._min_margin = checked_least("min_margin", min_margin, 0.0)
@@ -207,7 +208,6 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         if (end := self._end(prediction, after)) is not None:
             self._steps += 1
             return self._observation(), 0.0, False, True, {**info, **_told(*end)}
-        assert self._judges is not None, "there is a scene"
         reward, ended = self._judges(before, taken, after)
         if math.isnan(reward):
             self._steps += 1
@@ -272,8 +272,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
 
     def _end(self, prediction: ScenePrediction, after: Scene) -> tuple[Cause, str] | None:
         """Why a prediction can't be followed; None if it can."""
-        overruled = self._judges.overruled if self._judges is not None else frozenset()
-        if (told := explained(parts_of(prediction), self._min_margin, overruled)) is not None:
+        if (told := explained(parts_of(prediction), self._min_margin, self._judges.overruled)) is not None:
             return told
         left = self._setting.shown.outside(after)
         return (Cause.LEFT, left) if left else None

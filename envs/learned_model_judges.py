@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import takes
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
+from relgym.scene.objects import TASK, Float1D, Float2D, Scene, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "LEARNED",

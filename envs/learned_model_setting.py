@@ -22,7 +22,8 @@ from relgym.envs.model_files import EnvRecord, copied, schema_like, world_like
 from relgym.envs.views import REWARD, TERMINATED, TaskView, View, view_from_json
 from relgym.errors import ConfigError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Setting", "check_knowledge", "recorded"]
 

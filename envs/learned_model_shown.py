@@ -16,7 +16,8 @@ from relgym.envs.arguments import checked_actions
 from relgym.envs.views import SceneView, TaskView, View
 from relgym.envs.views.base import in_batches_too, is_whole, limits_of
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Boxes", "BoxesShown", "Deeds", "Shown", "ViewShown", "checked_boxes", "is_plain", "shown_at_once"]
 

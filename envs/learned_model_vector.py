@@ -38,7 +38,8 @@ from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Float1D, Float2D, Scene, SceneSchema
+from relgym.scene.objects import Float1D, Float2D, Scene
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["LearnedModelVectorEnv"]
 
@@ -113,6 +114,9 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     Cost: `docs/architecture.md` has the figures. Memory: some 8 KB for each dream of seven objects.
     """
 
+    schema: SceneSchema
+    """Of the scenes; only where observations are scenes."""
+
     def __init__(
         self,
         model: WorldModel | str | os.PathLike[str],
@@ -167,9 +171,6 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._viewer: Any = None
         self._cameras: dict[int, Any] = {}
         self.prediction: BatchPrediction | None = None
-
-    schema: SceneSchema
-    """Of the scenes; only where observations are scenes."""
 
     # ------------------------------------------------------------------ the Gymnasium contract
     def reset(

@@ -13,7 +13,8 @@ from gymnasium import spaces
 
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.errors import ConfigError, ModelFileError, ObservationError
-from relgym.scene.objects import TASK, Scene, SceneSchema
+from relgym.scene.objects import TASK, Scene
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["EnvRecord", "copied", "schema_like", "world_like"]
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from relgym.envs.truck_goal import GOAL, GOAL_TARGET
 from relgym.envs.truck_scenes import Placed
-from relgym.scene.objects import ACTION, POSE, Float1D, Kinematics, ObjectType, SceneSchema, Target
+from relgym.scene.objects import ACTION, POSE, Float1D, Kinematics, ObjectType, Target
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box
 
 __all__ = ["body_values", "truck_schema"]

@@ -12,7 +12,8 @@ from typing import Any
 
 import gymnasium as gym
 
-from relgym.scene.objects import ObjectType, SceneSchema
+from relgym.scene.objects import ObjectType
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers import FunctionView, ModelLearner
 
 MOVES = ("south", "north", "east", "west", "pickup", "dropoff")

@@ -16,7 +16,8 @@ from relgym.clustering.features import functions_of, register_function
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Scene, SceneSchema, Transition
+from relgym.scene.objects import Scene, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers.prequential import Prequential, compared
 
 __all__ = ["Background"]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import refuse_vector_env
 from relgym.envs.flat import FlatSpec, Flattener
 from relgym.errors import ConfigError
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers.views import SceneView, view_of
 
 __all__ = ["FlatView", "VectorFlatView"]

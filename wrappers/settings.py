@@ -12,7 +12,8 @@ from relgym.errors import ConfigError
 from relgym.model.scenes import mismatch
 from relgym.model.storage import target_from_json
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import TASK, SceneSchema, Target
+from relgym.scene.objects import TASK, Target
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["PlainTarget", "config_of", "model_of", "target_of"]
 

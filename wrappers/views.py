@@ -14,7 +14,7 @@ from relgym.envs.arguments import checked_action
 from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "SceneView",

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from relgym.envs.views.records import Angle, Part, Static, identifier, identifiers, merged
 from relgym.errors import ConfigError
-from relgym.scene.objects import ACTION, TASK, Float1D, ObjectType, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, TASK, Float1D, ObjectType, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["SELF", "Arrangement", "arranged", "default_parts", "numbered"]
 

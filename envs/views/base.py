@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ObservationError
-from relgym.scene.objects import Scene, SceneSchema
+from relgym.scene.objects import Scene
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["View", "as_shown", "cast_to", "in_batches_too", "is_whole", "limits_of", "precision_of"]
 

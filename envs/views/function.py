@@ -11,7 +11,8 @@ from gymnasium import spaces
 from relgym.envs.actions import acting, check_action_space
 from relgym.envs.views.acts import Acts
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import ACTION, ObjectType, Scene, SceneSchema
+from relgym.scene.objects import ACTION, ObjectType, Scene
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["FunctionView", "Seen"]
 

@@ -15,7 +15,8 @@ from relgym.envs.views.base import as_shown, precision_of
 from relgym.envs.views.matching import matched
 from relgym.envs.views.records import Rows, Static, identifiers, merged
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import ACTION, Float2D, ObjectType, Scene, SceneSchema
+from relgym.scene.objects import ACTION, Float2D, ObjectType, Scene
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["TableView"]
 

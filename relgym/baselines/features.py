@@ -15,8 +15,9 @@ import numpy as np
 
 from relgym.baselines.base import Float2D
 from relgym.errors import ConfigError, SchemaError
-from relgym.scene.objects import POSE, SceneLayout, SceneSchema
+from relgym.scene.objects import POSE, SceneLayout
 from relgym.scene.relations import Extractor
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["FEATURES", "ContactFeatures", "Features", "ThesisFeatures", "columns", "features"]
 

@@ -16,7 +16,8 @@ from relgym.baselines.ensemble import MLPEnsemble
 from relgym.errors import ConfigError
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.scenes import unwrapped, wrap
-from relgym.scene.objects import ACTION, Float2D, Scene, SceneLayout, SceneSchema, Target, Transition
+from relgym.scene.objects import ACTION, Float2D, Scene, SceneLayout, Target, Transition
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Features", "NeuralWorldModel"]
 

@@ -10,7 +10,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.scene.objects import Float2D, Scene, SceneLayout, SceneSchema, Transition
+from relgym.scene.objects import Float2D, Scene, SceneLayout, Transition
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Block", "Truth"]
 

@@ -30,7 +30,8 @@ from relgym.experiments.analytic import (
     truck_modes,
 )
 from relgym.experiments.blocks import Block, Truth
-from relgym.scene.objects import Float1D, Float2D, SceneLayout, SceneSchema
+from relgym.scene.objects import Float1D, Float2D, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["BALL_EXPERIMENTS", "BallExperiment", "Block", "Truth", "ball_blocks", "truck_blocks"]
 

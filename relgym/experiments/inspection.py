@@ -18,7 +18,8 @@ from gymnasium.envs.registration import load_env_creator
 import relgym  # noqa: F401 - registers the envs
 from relgym.errors import ConfigError
 from relgym.model.text import Cell, indented, table
-from relgym.scene.objects import Scene, SceneSchema
+from relgym.scene.objects import Scene
+from relgym.scene.schema import SceneSchema
 from relgym.scene.state import relational_state
 
 __all__ = ["Finding", "diagnosis", "inspected"]

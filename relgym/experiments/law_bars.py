@@ -28,8 +28,9 @@ from relgym.experiments.rollouts import largest_errors
 from relgym.experiments.rooms import rooms
 from relgym.model.report import report as report_of
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import SceneSchema, Transition
+from relgym.scene.objects import Transition
 from relgym.scene.relations import Extractor
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["main"]
 

@@ -12,7 +12,8 @@ from typing import Final
 import gymnasium as gym
 import numpy as np
 
-from relgym.scene.objects import ACTION, ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import ACTION, ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Sphere
 
 __all__ = ["CLASSICS", "Classic", "classic_transitions"]

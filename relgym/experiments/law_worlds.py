@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.scene.objects import POSE, Kinematics, ObjectType, SceneSchema, Target
+from relgym.scene.objects import POSE, Kinematics, ObjectType, Target
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Sphere
 
 __all__ = ["Ball", "Block", "Material", "World", "block_room"]

@@ -21,7 +21,8 @@ from relgym.experiments.blocks import Block
 from relgym.experiments.data import ball_blocks
 from relgym.experiments.online import learned
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import SceneLayout, SceneSchema
+from relgym.scene.objects import SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "SIGMAS",

@@ -10,17 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from relgym.envs.physics import BallWorld, Obstacle, Point
-from relgym.scene.objects import (
-    POSE,
-    Float2D,
-    Kinematics,
-    ObjectType,
-    Scene,
-    SceneLayout,
-    SceneSchema,
-    Target,
-    Transition,
-)
+from relgym.scene.objects import POSE, Float2D, Kinematics, ObjectType, Scene, SceneLayout, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Prism, Sphere, Wedge, outline
 
 __all__ = ["Room", "room_schema", "rooms"]

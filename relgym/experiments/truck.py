@@ -18,7 +18,7 @@ from relgym.experiments.evaluate import evaluate
 from relgym.experiments.online import learned
 from relgym.experiments.truck_check import truck_mode_of
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "BystanderOutcome",

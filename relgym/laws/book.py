@@ -17,7 +17,8 @@ from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
 from relgym.laws.shares import EXTENT, share_values
 from relgym.laws.touching import Cast, Contacts, Group
 from relgym.scene.geometry.vectors import FloatArray
-from relgym.scene.objects import SceneLayout, SceneSchema
+from relgym.scene.objects import SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["LawBook", "Motion"]
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.scene.axes import WORLD, Axes
-from relgym.scene.objects import ObjectType, SceneLayout, SceneSchema, Target
+from relgym.scene.objects import ObjectType, SceneLayout, Target
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Sphere
 
 __all__ = ["Sources", "spin_of", "vector_types"]

@@ -19,7 +19,7 @@ from relgym.laws.store import Store
 from relgym.laws.touching import Contacts
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.vectors import FloatArray
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["EncounterStore"]
 

@@ -23,7 +23,8 @@ from relgym.laws.ledger import Ledger
 from relgym.laws.pair import fit_pair
 from relgym.laws.records import FreeLaw, PairLaw, Share
 from relgym.laws.touching import Cast, Contacts
-from relgym.scene.objects import SceneSchema, Target
+from relgym.scene.objects import Target
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["LawLearner"]
 

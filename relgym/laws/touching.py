@@ -14,8 +14,9 @@ from relgym.laws.records import Kind
 from relgym.scene.axes import Axes
 from relgym.scene.contacts import velocity_columns
 from relgym.scene.geometry.vectors import FloatArray, norm
-from relgym.scene.objects import SceneLayout, SceneSchema, poses
+from relgym.scene.objects import SceneLayout, poses
 from relgym.scene.relations import Relations
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Cast", "Contacts", "Group"]
 

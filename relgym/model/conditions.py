@@ -18,7 +18,8 @@ from relgym.classification.binary import BinaryClassifier
 from relgym.classification.examples import Vocabulary
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.mode import Mode
-from relgym.scene.objects import TASK, SceneSchema, Target
+from relgym.scene.objects import TASK, Target
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Conditions", "needed"]
 

@@ -18,7 +18,8 @@ from relgym.laws.touching import Contacts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
 from relgym.model.property_model import PropertyModel, Verdict
-from relgym.scene.objects import ACTION, SceneSchema, Target
+from relgym.scene.objects import ACTION, Target
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["FREE", "TOUCHING", "Laws", "mode_bits", "possible_targets"]
 

@@ -18,7 +18,8 @@ from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch, stays
-from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, SceneSchema, Target
+from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Parts"]
 

@@ -15,8 +15,9 @@ from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import check_entries, library_of
 from relgym.model.grouping import distinct
 from relgym.scene.context import canonical_order, signature, slots
-from relgym.scene.objects import ACTION, ObjectType, SceneLayout, SceneSchema, poses
+from relgym.scene.objects import ACTION, ObjectType, SceneLayout, poses
 from relgym.scene.relations import Extractor, Relations
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["Percept", "Perception", "Situation"]
 

@@ -27,7 +27,8 @@ from relgym.model.perception import Situation
 from relgym.model.scope import EVERYWHERE, LEAF, Scope, find_scope
 from relgym.model.spread import Spreads, measure
 from relgym.model.stops import Stops, find_stops
-from relgym.scene.objects import SceneSchema, Target
+from relgym.scene.objects import Target
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 

@@ -13,7 +13,8 @@ from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.property_model import PropertyModel, Verdict
 from relgym.model.scenes import wrap
-from relgym.scene.objects import Scene, SceneLayout, SceneSchema, Target
+from relgym.scene.objects import Scene, SceneLayout, Target
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["predict", "predict_many"]
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ObservationError
-from relgym.scene.objects import ACTION, Scene, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, Scene, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["angle_columns", "mismatch", "next_values", "stays", "unwrapped", "with_action", "wrap"]
 

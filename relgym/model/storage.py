@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ModelFileError
-from relgym.scene.objects import Kinematics, ObjectType, SceneSchema, Target
+from relgym.scene.objects import Kinematics, ObjectType, Target
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
 
 __all__ = [

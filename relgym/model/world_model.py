@@ -25,7 +25,8 @@ from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.scenes import with_action
 from relgym.model.storage import read_model, write_model
-from relgym.scene.objects import Scene, SceneLayout, SceneSchema, Target, Transition
+from relgym.scene.objects import Scene, SceneLayout, Target, Transition
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["LearnReport", "WorldModel", "with_action"]
 
@@ -45,7 +46,8 @@ class WorldModel:
 
     Examples
     --------
-    >>> from relgym.scene.objects import ObjectType, SceneSchema, Target, Transition
+    >>> from relgym.scene.objects import ObjectType, Target, Transition
+    >>> from relgym.scene.schema import SceneSchema
     >>> ball = ObjectType("ball", ("v",))
     >>> schema = SceneSchema((ball,), (("b", "ball"),), targets=(Target("ball", "v"),))
     >>> model = WorldModel(schema)

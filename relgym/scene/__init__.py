@@ -2,17 +2,9 @@
 
 from relgym.scene.contacts import CONTACT_FEATURES, contact_features
 from relgym.scene.context import canonical_order, signature
-from relgym.scene.objects import (
-    Kinematics,
-    ObjectType,
-    Scene,
-    SceneLayout,
-    SceneObject,
-    SceneSchema,
-    Target,
-    Transition,
-)
+from relgym.scene.objects import Kinematics, ObjectType, Scene, SceneLayout, SceneObject, Target, Transition
 from relgym.scene.relations import TOUCH_EPS, Extractor, Relations, unary
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
 from relgym.scene.state import RelationalState, relational_state
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["WORLD", "Axes"]
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.vectors import FloatArray, dot, norm
-from relgym.scene.objects import SceneLayout, SceneSchema
+from relgym.scene.objects import SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["APPROACH_EPS", "CONTACT_FEATURES", "contact_features", "motion", "velocity_columns"]
 

@@ -31,7 +31,8 @@ from relgym.scene.boxes import axis_relations
 from relgym.scene.context import close_set
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Geometry
 from relgym.scene.geometry.vectors import FloatArray
-from relgym.scene.objects import Float2D, SceneLayout, SceneSchema, pose_columns
+from relgym.scene.objects import Float2D, SceneLayout, pose_columns
+from relgym.scene.schema import SceneSchema
 from relgym.scene.sight import Pairs, Plan, Sight, square
 from relgym.scene.unary import unary, unary_names
 

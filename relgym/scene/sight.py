@@ -95,16 +95,8 @@ class Sight:
         self._plan, self.pairs = plan, plan.pairs
         self.pose: FloatArray = padded.take(plan.columns, axis=0)
         self.velocity: FloatArray = padded.take(plan.velocities, axis=0)
-        self.touch: float | FloatArray = eps
-        self.parting: float | FloatArray = APPROACH_EPS
-        if precision:
-            both = plan.pairs.first, plan.pairs.second
-            for name, least, numbers in (
-                ("touch", eps, self.pose[_LENGTHS]),
-                ("parting", APPROACH_EPS, self.velocity),
-            ):
-                size = np.abs(numbers).max(axis=0, initial=1.0)
-                setattr(self, name, least + precision * np.maximum(*(size[bodies] for bodies in both)))
+        self.touch = self._limit(eps, self.pose[_LENGTHS]) if precision else eps
+        self.parting = self._limit(APPROACH_EPS, self.velocity) if precision else APPROACH_EPS
         shape = (len(plan.pairs.first), len(vectors))
         self._touching: _Bools | None = None
         self._closing: FloatArray | None = None
@@ -121,6 +113,13 @@ class Sight:
             self._measured = plan.geometry.measure(self.pose)
         position = self.pose.take(plan.axes.used, axis=0)
         self.boxes = BoxRelations(plan.axes, position, self._measured.low, self._measured.high)
+
+    def _limit(self, least: float, numbers: FloatArray) -> float | FloatArray:
+        """What coarse numbers, shape ``(…, K, n)``, add to a limit, pair by pair, shape ``(P, n)``."""
+        size = np.abs(numbers).max(axis=0, initial=1.0)
+        pairs = self.pairs
+        found: FloatArray = least + self.precision * np.maximum(size[pairs.first], size[pairs.second])
+        return found
 
     # ------------------------------------------------------------------ distances and normals
     def measured(self, pairs: _Bools) -> Measured:

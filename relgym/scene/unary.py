@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.scene.objects import SceneLayout, SceneSchema
+from relgym.scene.objects import SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["unary", "unary_names"]
 

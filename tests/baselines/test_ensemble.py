@@ -9,7 +9,8 @@ from dyna_worlds import SCHEMA, LineTask
 from relgym.baselines.ensemble import MLPEnsemble
 from relgym.baselines.neural_world import NeuralWorldModel
 from relgym.errors import ConfigError, QueryError
-from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 
 pytestmark = pytest.mark.sb3
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from relgym.clustering.columns import SlotSignature, slot_order
-from relgym.scene.objects import ObjectType, SceneSchema, Target
+from relgym.scene.objects import ObjectType, Target
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Sphere
 
 BALL = ObjectType("ball", ("px", "vx", "mass"), Sphere())

@@ -11,7 +11,8 @@ from relgym.envs.ball_box_ramp import BallBoxRampEnv
 from relgym.envs.flat import LIMIT, FlatSpec, Flattener
 from relgym.envs.truck_push import TruckPushEnv
 from relgym.errors import ConfigError
-from relgym.scene.objects import ObjectType, SceneSchema
+from relgym.scene.objects import ObjectType
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box
 
 CAR = ObjectType("car", ("x", "y", "length", "speed"), Box(), pose={"px": "x", "py": "y", "sx": "length"})

@@ -9,7 +9,8 @@ from relgym.envs import BallBoxRampEnv, BallGoalEnv, SceneEnv, TruckPushEnv, ren
 from relgym.envs.rendering import Camera, View, scene_view
 from relgym.envs.tasks import Region
 from relgym.errors import ConfigError
-from relgym.scene.objects import POSE, ObjectType, Scene, SceneSchema
+from relgym.scene.objects import POSE, ObjectType, Scene
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
 
 pytest.importorskip("pygame")

@@ -5,7 +5,8 @@ import pytest
 
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.free import FreeLearner, free_motion
-from relgym.scene.objects import POSE, ObjectType, SceneSchema, Target
+from relgym.scene.objects import POSE, ObjectType, Target
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Sphere
 
 BALL = ObjectType("thing", (*POSE, "vx", "vy", "heat"), Sphere(), velocity=("vx", "vy", None))

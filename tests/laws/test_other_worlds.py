@@ -13,7 +13,7 @@ from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.laws.book import LawBook
 from relgym.laws.learner import LawLearner
 from relgym.laws.text import law_rows
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 
 ROUGH = Material(0.9, 0.2)
 

@@ -12,7 +12,8 @@ from points import formulas, learned, schema_of, transitions
 from relgym.model.advice import LAST_RESORT, Advice, _choose, _Trial, _try
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, SceneSchema, Target, Transition
+from relgym.scene.objects import ObjectType, Target, Transition
+from relgym.scene.schema import SceneSchema
 
 SCHEMA = schema_of(("x", "v"), ("a",))
 

@@ -11,7 +11,8 @@ from relgym.model.limits import Limits
 from relgym.model.prediction import Outcome, Prediction
 from relgym.model.report import describe
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 
 SCHEMA = SceneSchema(
     (ObjectType("cart", ("v", "grip")), ObjectType("action", ("push", "drag"))),

@@ -14,7 +14,8 @@ from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError
 from relgym.model.forgetting import SLACK
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Kinematics, ObjectType, SceneSchema, Transition
+from relgym.scene.objects import Kinematics, ObjectType, Transition
+from relgym.scene.schema import SceneSchema
 
 SCHEMA = schema_of(("v", "w"), ("a",))
 

@@ -11,7 +11,8 @@ from relgym.errors import ObservationError
 from relgym.experiments.data import truck_blocks
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, Scene, SceneSchema
+from relgym.scene.objects import ObjectType, Scene
+from relgym.scene.schema import SceneSchema
 
 
 @pytest.fixture(scope="module")

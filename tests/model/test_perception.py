@@ -9,7 +9,8 @@ import pytest
 from worlds import ROOM_TARGETS, Raw, room, scene, schema_of
 
 from relgym.model.perception import Percept, Perception
-from relgym.scene.objects import ObjectType, Scene, SceneSchema
+from relgym.scene.objects import ObjectType, Scene
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Sphere
 
 BALL = ObjectType("ball", ("px", "py", "vx", "mass"), Sphere(), velocity=("vx", None, None))

@@ -14,7 +14,8 @@ from relgym.experiments.data import truck_blocks
 from relgym.model.explain import explanations
 from relgym.model.report import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport, report
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ACTION, ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import ACTION, ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 
 BALL = ObjectType("ball", ("v",))
 SCHEMA = SceneSchema((BALL,), (("b", "ball"),), targets=(Target("ball", "v"),))

@@ -12,7 +12,8 @@ from points import learned, schema_of, transitions
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.scope import EVERYWHERE, Scope
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, SceneSchema, Transition
+from relgym.scene.objects import ObjectType, Transition
+from relgym.scene.schema import SceneSchema
 
 SCHEMA = schema_of(("x", "v", "leg"), ("a",))
 ROOM = schema_of(("x",), ("a",), ("terminated", "reward"))

@@ -11,7 +11,8 @@ from points import learned, schema_of, transitions
 from relgym.model.spread import FEW_ACTIONS, Spread, Spreads, _by_action
 from relgym.model.spread_text import labels, spread_text
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ACTION, ObjectType, Scene, SceneSchema, Transition
+from relgym.scene.objects import ACTION, ObjectType, Scene, Transition
+from relgym.scene.schema import SceneSchema
 
 SCHEMA = schema_of(("v",), ("a",))
 

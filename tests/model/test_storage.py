@@ -19,7 +19,8 @@ from relgym.errors import ModelFileError
 from relgym.experiments.data import ball_blocks
 from relgym.model.storage import read_model, schema_from_json, schema_to_json, write_model
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Kinematics, ObjectType, SceneSchema, Target
+from relgym.scene.objects import Kinematics, ObjectType, Target
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Sphere, Wedge
 
 SCHEMA = SceneSchema(

@@ -27,7 +27,8 @@ from relgym.config import ClusteringConfig, ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, RelgymError, SchemaError
 from relgym.model.prediction import Outcome
 from relgym.model.world_model import WorldModel, with_action
-from relgym.scene.objects import Kinematics, ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import Kinematics, ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 
 CART = SceneSchema(
     (ObjectType("cart", ("x",)), ObjectType("action", ("u",))), (("cart", "cart"), ("action", "action"))

@@ -8,8 +8,9 @@ from scenes import random_vectors, schema_of
 
 from relgym.scene import Extractor, canonical_order, signature
 from relgym.scene.context import close_set
-from relgym.scene.objects import SceneSchema, poses
+from relgym.scene.objects import poses
 from relgym.scene.relations import Relations
+from relgym.scene.schema import SceneSchema
 
 KINDS = ("box", "ball", "box", "ramp", "box", "ball", "box")
 

@@ -15,17 +15,8 @@ from worlds import LINE_TARGETS, ROOM_TARGETS, RawStep, learned, line, room, sce
 from relgym.config import ModelConfig
 from relgym.envs.model_files import EnvRecord
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import (
-    ACTION,
-    TASK,
-    Float2D,
-    ObjectType,
-    Scene,
-    SceneLayout,
-    SceneSchema,
-    Target,
-    Transition,
-)
+from relgym.scene.objects import ACTION, TASK, Float2D, ObjectType, Scene, SceneLayout, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers import ModelLearner
 
 ROOM_STEPS = room(0, 260)

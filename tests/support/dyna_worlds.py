@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from relgym.envs.tasks import Judgement
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.scene.objects import Float2D, ObjectType, Scene, SceneLayout, SceneSchema, Target, Transition
+from relgym.scene.objects import Float2D, ObjectType, Scene, SceneLayout, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box
 
 SCHEMA = SceneSchema(

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from relgym.laws.book import LawBook, Motion
 from relgym.laws.learner import LawLearner
 from relgym.laws.touching import Contacts
-from relgym.scene.objects import SceneLayout, SceneSchema
+from relgym.scene.objects import SceneLayout
 from relgym.scene.relations import Extractor
+from relgym.scene.schema import SceneSchema
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from relgym.config import ModelConfig
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ACTION, TASK, ObjectType, SceneSchema, Transition
+from relgym.scene.objects import ACTION, TASK, ObjectType, Transition
+from relgym.scene.schema import SceneSchema
 
 Step = Callable[[np.ndarray, np.ndarray], Sequence[float]]
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from relgym.scene.objects import SceneLayout, SceneSchema
+from relgym.scene.objects import SceneLayout
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
 from relgym.scene.types import POSE, ObjectType
 

@@ -12,7 +12,8 @@ from typing import TypeAlias
 import numpy as np
 
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Kinematics, ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import Kinematics, ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Shape, Sphere
 
 Raw: TypeAlias = dict[str, tuple[str, dict[str, float]]]

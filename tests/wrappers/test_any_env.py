@@ -19,7 +19,8 @@ from plain_envs import Crates, Slider, Wheel
 from relgym.envs.views import FunctionView, NumbersView, Part, Rows, Static, TableView, TaskView
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, SceneSchema
+from relgym.scene.objects import ObjectType
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Sphere
 from relgym.wrappers import ModelLearner
 from relgym.wrappers.views import chosen_view

@@ -8,7 +8,8 @@ import pytest
 
 from relgym.errors import ConfigError
 from relgym.model.prediction import Outcome, Prediction, ScenePrediction
-from relgym.scene.objects import ObjectType, SceneSchema
+from relgym.scene.objects import ObjectType
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers.prequential import Prequential, compared
 
 A, B = ("ball", "vx"), ("ball", "vy")

@@ -15,7 +15,8 @@ from plain_envs import Slider
 from relgym.config import ModelConfig
 from relgym.envs.views import FunctionView, NumbersView, Part, SceneView, TableView, TaskView
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import ObjectType, SceneSchema
+from relgym.scene.objects import ObjectType
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers import ModelLearner
 
 PUSHES = Slider().action_space

@@ -14,7 +14,8 @@ from plain_envs import Slider, Wheel
 from relgym.envs.views import FunctionView, NumbersView
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, SceneSchema, Transition
+from relgym.scene.objects import ObjectType, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers import ModelLearner, VectorModelLearner
 from relgym.wrappers.vector_model_learner import info_at
 

@@ -12,7 +12,8 @@ from carts import SCHEMA, CartEnv
 from gymnasium import spaces
 
 from relgym.errors import ConfigError, ObservationError
-from relgym.scene.objects import ObjectType, SceneSchema
+from relgym.scene.objects import ObjectType
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Sphere
 from relgym.wrappers.views import SceneView, view_of
 

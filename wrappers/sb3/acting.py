@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
-from relgym.scene.objects import ACTION, Float2D, SceneLayout, SceneSchema
+from relgym.scene.objects import ACTION, Float2D, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["acting_all"]
 

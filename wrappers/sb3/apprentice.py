@@ -13,7 +13,8 @@ from relgym.errors import ConfigError
 from relgym.model.motion import possible_targets
 from relgym.model.scenes import mismatch
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import TASK, Scene, SceneSchema
+from relgym.scene.objects import TASK, Scene
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers.sb3.config import DynaConfig, checked_config
 from relgym.wrappers.sb3.gate import Key, TrustGate, Verdict
 from relgym.wrappers.sb3.judges import (

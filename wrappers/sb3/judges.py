@@ -17,17 +17,8 @@ from relgym.errors import ConfigError, ModelFileError, SchemaError
 from relgym.model.prediction import BatchPrediction
 from relgym.model.storage import schema_from_json, schema_to_json
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import (
-    ACTION,
-    TASK,
-    Float1D,
-    Float2D,
-    ObjectType,
-    SceneLayout,
-    SceneSchema,
-    Target,
-    Transition,
-)
+from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, ObjectType, SceneLayout, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers.sb3.acting import acting_all
 
 __all__ = ["Acting", "Judge", "LearnedTask", "NeuralModel", "NeuralTask", "check_rewards"]

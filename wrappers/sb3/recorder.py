@@ -12,7 +12,8 @@ from gymnasium.utils import RecordConstructorArgs
 
 from relgym.envs.arguments import checked_action
 from relgym.envs.views import SceneView
-from relgym.scene.objects import Scene, SceneSchema, Transition
+from relgym.scene.objects import Scene, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers.views import ViewLike, recordable, view_of
 
 __all__ = ["Experience", "TransitionRecorder"]

@@ -19,7 +19,7 @@ from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_block
 from relgym.model.report import report
 from relgym.model.text import plain
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 
 __all__ = ["config_of", "fresh_blocks", "lesson", "taught_blocks"]
 

@@ -10,7 +10,8 @@ from gymnasium import spaces
 
 from relgym.envs.views import FunctionView, TaskView, view_from_json
 from relgym.errors import ConfigError, ModelFileError, ObservationError
-from relgym.scene.objects import ObjectType, SceneSchema
+from relgym.scene.objects import ObjectType
+from relgym.scene.schema import SceneSchema
 
 BALL, PADDLE = ObjectType("ball", ("y", "vy"), optional=True), ObjectType("paddle", ("y",))
 SCHEMA = SceneSchema((BALL, PADDLE), (("ball", "ball"), ("paddle", "paddle")))

@@ -11,8 +11,8 @@ import pytest
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies
 from relgym.scene.geometry.fcl import FclGeometry
-from relgym.scene.objects import SceneSchema
 from relgym.scene.relations import TOUCH_EPS
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Sphere, Wedge
 
 PENTAGON = Prism(tuple((math.cos(a) / 2, math.sin(a) / 2) for a in np.arange(5) * 2 * math.pi / 5))

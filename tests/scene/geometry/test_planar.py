@@ -10,7 +10,7 @@ import shapely
 
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Measured
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge, outline
 
 PLANE = Axes.of(SceneSchema((), (), up="y", planar=True))

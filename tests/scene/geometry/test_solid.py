@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Measured
 from relgym.scene.geometry.mesh import mesh
-from relgym.scene.objects import SceneSchema
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
 
 SPACE = Axes.of(SceneSchema((), (), up="y", planar=False))

@@ -14,7 +14,8 @@ import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
 from relgym.envs.scripted import ball_home, push_knowing
 from relgym.errors import ConfigError, ModelFileError
-from relgym.scene.objects import ObjectType, SceneSchema, Target, Transition
+from relgym.scene.objects import ObjectType, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers.sb3.apprentice import Apprentice
 from relgym.wrappers.sb3.judges import LearnedTask
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder

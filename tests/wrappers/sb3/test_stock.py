@@ -10,7 +10,8 @@ from dyna_worlds import SCHEMA, LineModel
 
 from relgym.errors import ConfigError
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, Scene, SceneSchema, Target, Transition
+from relgym.scene.objects import ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.stock import SceneStock, free_properties, permuted
