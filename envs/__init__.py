@@ -20,7 +20,7 @@ _HOMES = {
     "SceneEnv": "relgym.envs.base",
     "Task": "relgym.envs.tasks",
     "TruckPushEnv": "relgym.envs.truck_push",
-    "drawn_from": "relgym.envs.learned_model_judges",
+    "drawn_from": "relgym.envs.learned_model_starts",
     "in_batches": "relgym.envs.learned_model_judges",
     "render_scene": "relgym.envs.rendering",
 }

@@ -20,8 +20,9 @@ from relgym.envs.arguments import (
     checked_options,
 )
 from relgym.envs.learned_model_ends import Cause, explained, horizon_reached, parts_of
-from relgym.envs.learned_model_judges import Judge, Judges, Start, TaskFunctions, check_judges, marked
+from relgym.envs.learned_model_judges import Judge, Judges, TaskFunctions, check_judges, marked
 from relgym.envs.learned_model_setting import Setting, check_knowledge
+from relgym.envs.learned_model_starts import Start
 from relgym.envs.views import View
 from relgym.errors import ConfigError
 from relgym.model.prediction import ScenePrediction

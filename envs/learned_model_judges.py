@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Protocol, TypeAlias
 
@@ -19,14 +19,10 @@ __all__ = [
     "LEARNED",
     "BatchJudge",
     "BatchJudges",
-    "BatchStart",
-    "Drawn",
     "Judge",
     "Judges",
-    "Start",
     "TaskFunctions",
     "check_judges",
-    "drawn_from",
     "in_batches",
     "marked",
 ]
@@ -36,12 +32,6 @@ Judge: TypeAlias = Callable[[Scene, Any, Scene], float]
 
 BatchJudge: TypeAlias = Callable[[SceneLayout, Float2D, Any, Float2D], NDArray[Any]]
 """The same for n scenes: layout, state vectors before, actions, state vectors after; returns shape ``(n,)``."""
-
-Start: TypeAlias = Callable[[np.random.Generator], Scene]
-"""Draws a first scene."""
-
-BatchStart: TypeAlias = Callable[[np.random.Generator, int], Float2D]
-"""Draws the state vectors of n first scenes, shape ``(n, layout.width)``."""
 
 LEARNED: Final = "learned"
 """Stands for a reward or termination that the model predicts, as a property of the `task` object."""
@@ -335,62 +325,3 @@ def in_batches(schema: SceneSchema, judge: Judge) -> BatchJudge:
         return np.array(told, dtype=np.float64)
 
     return judged
-
-
-class Drawn:
-    """First scenes of a batch of dreams, drawn uniformly: see `drawn_from`.
-
-    Parameters
-    ----------
-    scenes
-        Scenes, or state vectors.
-    """
-
-    def __init__(self, scenes: Sequence[Scene] | Float2D) -> None:
-        given: Any = scenes
-        if not isinstance(given, np.ndarray) and not (
-            isinstance(given, Sequence) and all(isinstance(scene, Scene) for scene in given)
-        ):
-            raise ConfigError(
-                f"expected scenes, or an array of state vectors, got {given!r}; take env.scene, or "
-                "schema.scene(observation)"
-            )
-        if not len(scenes) or (isinstance(scenes, np.ndarray) and scenes.ndim != 2):
-            came = f"an array of shape {scenes.shape}" if isinstance(scenes, np.ndarray) else "none"
-            raise ConfigError(f"expected some scenes with the same objects, got {came}")
-        self._scenes = scenes
-        self._vectors: Float2D | None = None
-        if isinstance(scenes, np.ndarray):
-            self._vectors = scenes.astype(np.float64)
-        elif len({scene.layout for scene in scenes}) == 1:
-            self._vectors = np.array([scene.vector for scene in scenes])
-
-    def fit(self, vector_of: Callable[[Scene], Float1D]) -> Drawn:
-        """The same with state vectors as a world's dreams have them."""
-        if isinstance(self._scenes, np.ndarray):
-            return self
-        return Drawn(np.array([vector_of(scene) for scene in self._scenes]))
-
-    def __call__(self, rng: np.random.Generator, count: int) -> Float2D:
-        """State vectors of so many first scenes."""
-        if self._vectors is None:
-            raise ConfigError("the scenes hold different objects, or the same ones in another order")
-        drawn: Float2D = self._vectors[rng.integers(len(self._vectors), size=count)]
-        return drawn
-
-
-def drawn_from(scenes: Sequence[Scene] | Float2D) -> BatchStart:
-    """First scenes for `LearnedModelVectorEnv`, drawn uniformly from scenes with the same objects.
-
-    Parameters
-    ----------
-    scenes
-        Scenes, with their objects in any order; or state vectors without an action, as the dreams have them: shape
-        ``(m, layout.width)``, the columns of ``vectors``.
-
-    Raises
-    ------
-    ConfigError
-        Something else, or none. Scenes with other objects are refused by the env: `ObservationError`.
-    """
-    return Drawn(scenes)

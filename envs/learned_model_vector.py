@@ -27,13 +27,12 @@ from relgym.envs.learned_model_infos import masked, told_of
 from relgym.envs.learned_model_judges import (
     BatchJudge,
     BatchJudges,
-    BatchStart,
-    Drawn,
     TaskFunctions,
     check_judges,
     marked,
 )
 from relgym.envs.learned_model_setting import Setting, check_knowledge
+from relgym.envs.learned_model_starts import BatchStart, Drawn
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import BatchPrediction
