@@ -100,6 +100,14 @@ class ModeClassifier:
         """Rank the modes for n examples; equal to `rank` of each. `values` has shape ``(n, len(modes))``."""
         return self._voting.rank_batch(batch, values, self.counts, self._familiarity())
 
+    def remembered(self) -> tuple[View, Floats, RankingBatch]:
+        """The examples that are remembered, how many each stands for, and how they are ranked now.
+
+        There is at least one mode and one example.
+        """
+        view, weights = self._current_view()
+        return view, weights, self._voting.rank_view(view, self.counts, self._familiarity())
+
     def explain(self, example: Example, values: Sequence[float]) -> list[Verdict]:
         """How the winner fared against every other mode, in the order of the ranking."""
         ranking = self.rank(example, values)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.scenes import with_action
 from relgym.model.storage import read_model, write_model
-from relgym.scene.objects import Scene, SceneLayout, Target, Transition
+from relgym.scene.objects import ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LearnReport", "WorldModel", "with_action"]
@@ -292,6 +292,12 @@ class WorldModel:
         from relgym.model.report import describe
 
         return describe(self, digits=digits, frame=frame, incline=incline)
+
+    def layouts_seen(self) -> Iterator[tuple[ObjectType, ...]]:
+        """Types of the objects of each kind of scene that it remembers having learned from."""
+        for table in self._parts.tables.values():
+            for signature in table.signatures:
+                yield signature.types
 
     def law_lines(self, scene: Scene, index: int, digits: int = 7) -> tuple[str, ...]:
         """What laws of motion say of an object: its free law, then every contact, a line each."""

@@ -1,0 +1,365 @@
+"""From what was learned to rule lists: votes of pairs of modes become one ordered list of branches.
+
+The votes are a function of the conditions that classifiers test. So is a decision list over the same conditions: it is
+learned from the examples that the classifiers remember, labelled by who wins the vote there (not by what really held),
+and says the same for each of them. Where several modes predict the same value, the simplest one is named: what rests
+rests, and doesn't bounce with no velocity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.binary import BinaryClassifier
+from relgym.classification.role_classifier import RoleKind
+from relgym.classification.views import View
+from relgym.clustering.mode import Mode
+from relgym.laws.frames import axis_names
+from relgym.logic.batch import matches
+from relgym.logic.clause import Clause, Literal
+from relgym.numeric.decision_list import Rule, decision_list
+from relgym.model.property_model import PropertyModel
+from relgym.model.spread import ROUNDING
+from relgym.numeric.tree import DecisionTree
+from relgym.reporting.conditions import Condition, Test, equal_to, parts_of, tests_of
+from relgym.reporting.functions import Sum
+from relgym.reporting.motion import MotionRules
+from relgym.reporting.naming import named
+from relgym.reporting.rules import Bound, Branch, Derivation, PropertyRules, RuleList, RuleRole
+from relgym.scene.axes import Axes
+from relgym.scene.objects import Target
+
+if TYPE_CHECKING:
+    from relgym.model.world_model import WorldModel
+
+__all__ = ["rule_list"]
+
+_EXACT: Final = 17
+"""Significant digits of numbers within conditions, which decide."""
+
+
+def rule_list(model: WorldModel) -> RuleList:
+    """The rules of a model that remembers what it learned from.
+
+    Cost: some 10 ms for each property with several modes.
+    """
+    advice = {a.target: str(a) for a in model.advice()}
+    parts = [
+        model.property_model(target.type, target.property)
+        for target in model.targets
+        if not model.governs(target)
+    ]
+    properties = tuple(replace(_property(part), advice=advice.get(str(part.target), "")) for part in parts)
+    laws = tuple(
+        Derivation(k.type, k.property, k.rate, k.step, k.uses_next) for k in model.schema.derivations
+    )
+    return RuleList(model.seen, _scope(model), properties, _motion(model), laws)
+
+
+def _scope(model: WorldModel) -> tuple[tuple[str, int, int], ...]:
+    """Numbers of objects of each type with a body in what was learned from."""
+    counts: dict[str, list[int]] = {}
+    bodies = [t.name for t in model.schema.types if t.has_body]
+    for types in model.layouts_seen():
+        for name in bodies:
+            counts.setdefault(name, []).append(sum(t.name == name for t in types))
+    return tuple((name, min(n), max(n)) for name, n in counts.items() if max(n))
+
+
+def _motion(model: WorldModel) -> MotionRules | None:
+    book = model.laws
+    if book is None or not model.governed:
+        return None
+    names = sorted(model.governed)
+    letters = "" if book.pair is None else axis_names(book.pair.frame, len(Axes.of(book.schema).used))
+    return MotionRules(
+        tuple(book.free[name] for name in names if name in book.free),
+        tuple((name, tuple(book.components(name))) for name in names),
+        book.pair,
+        "".join(letters),
+        tuple(sorted(book.shares.items())),
+        book.tolerance,
+    )
+
+
+def _property(part: PropertyModel) -> PropertyRules:
+    target = part.target
+    branches, roles = (), tuple[RuleRole, ...]()
+    if part.classifier.modes:
+        functions, roles = _functions(part)
+        branches = (*_beyond(part), *_branches(part, functions))
+    doubt = "nothing tells yet which of these holds" if part.undecided else ""
+    if part._lost:
+        doubt = "no law of the form that is looked for describes it"
+    steps = part.clusterer.noise_examples + sum(mode.examples for mode in part.modes)
+    return PropertyRules(
+        target.type,
+        target.property,
+        named(branches, target.property),
+        tuple(_bounds(part)),
+        roles,
+        steps,
+        part.clusterer.noise_examples,
+        doubt if part.modes or part._lost else "nothing learned yet",
+    )
+
+
+# ------------------------------------------------------------------ functions and roles
+def _functions(part: PropertyModel) -> tuple[dict[int, Sum], tuple[RuleRole, ...]]:
+    """The modes' functions, their roles named differently wherever they mean different objects."""
+    functions: dict[int, Sum] = {}
+    roles: dict[tuple[str, int, tuple[Condition, ...]], RuleRole] = {}
+    letters = iter("abcdefghijklmnopqrstuvwxyz")
+    for number in part.classifier.modes:
+        mode = part.mode(number)
+        labels = _labels(part, mode, roles, letters)
+        functions[number] = _sum(mode, labels)
+    return functions, tuple(roles.values())
+
+
+def _sum(mode: Mode, labels: Sequence[str]) -> Sum:
+    terms = [
+        (weight, f"{label}.{name}" if label else name)
+        for label, role in zip(labels, mode.roles, strict=True)
+        for name, weight in role.terms
+    ]
+    return Sum(tuple(terms), mode.intercept)
+
+
+def _labels(
+    part: PropertyModel,
+    mode: Mode,
+    known: dict[tuple[str, int, tuple[Condition, ...]], RuleRole],
+    letters: Iterator[str],
+) -> list[str]:
+    labels = list(mode.role_labels())
+    described = part.casting.classifiers.get(mode.id)
+    rules = {d.kind: d.definition for d in described.descriptions} if described is not None else {}
+    embodied = [role in part.casting.embodied(mode) for role in mode.roles[1:]]
+    kinds: dict[RoleKind, list[int]] = {}
+    for place, (role, body) in enumerate(zip(mode.roles[1:], embodied, strict=True), start=1):
+        if body:
+            kinds.setdefault(RoleKind(*role.kind), []).append(place)
+    for kind, places in kinds.items():
+        definition = rules.get(kind)
+        alternatives: tuple[Condition, ...] = ()
+        if definition is not None:
+            alternatives = tuple(tests_of(clause, "all") for clause in definition.clauses)
+        if not alternatives and len(places) == 1 and labels[places[0]] == kind.type:
+            continue  # the only one there is
+        key = (kind.type, len(places), alternatives)
+        if key not in known:
+            new = tuple(f"{kind.type}_{next(letters)}" for _ in places)
+            known[key] = RuleRole(new, kind.type, alternatives)
+        for place, label in zip(places, known[key].labels, strict=True):
+            labels[place] = label
+    return labels
+
+
+# ------------------------------------------------------------------ branches
+@dataclass(frozen=True, slots=True)
+class _Atom:
+    """A condition that classifiers test, and where it holds among the remembered examples."""
+
+    test: Test
+    truth: NDArray[np.bool_]
+
+
+def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, ...]:
+    modes = part.classifier.modes
+    if len(modes) == 1 or not len(part.classifier.exemplars.rows):
+        most = max(modes, key=lambda m: part.mode(m).examples)
+        return (_branch(part, (), most, functions, part.mode(most).examples),)
+    view, weights, ranking = part.classifier.remembered()
+    atoms = _atoms(part, view, functions)
+    allowed = _allowed(part, view, ranking.modes[:, 0])
+    truth = np.array([atom.truth for atom in atoms]).T.reshape(len(view), len(atoms))
+    cost = [1 + len(atom.test.clause) + (atom.test.context == "all" and atom.test.clause.variables > 1) for atom in atoms]
+    rules = decision_list(truth, allowed, weights, cost)
+    return tuple(_of_rule(part, rule, atoms, modes, functions) for rule in rules)
+
+
+def _of_rule(
+    part: PropertyModel, rule: Rule, atoms: Sequence[_Atom], modes: Sequence[int], functions: dict[int, Sum]
+) -> Branch:
+    tests = [atoms[k].test if yes else atoms[k].test.opposite for k, yes in rule.tests]
+    return _branch(part, tuple(dict.fromkeys(tests)), modes[rule.label], functions, round(rule.weight))
+
+
+def _branch(
+    part: PropertyModel, condition: Condition, mode: int, functions: dict[int, Sum], steps: int
+) -> Branch:
+    return Branch(condition, functions[mode], steps=steps, spread=_spread(part, mode))
+
+
+def _spread(part: PropertyModel, mode: int) -> float:
+    known = part.spreads.by_mode.get(mode)
+    if known is None or known.whole <= max(part.clusterer.floor, ROUNDING * part.clusterer.scale.sigma):
+        return 0.0
+    return known.whole
+
+
+def _allowed(part: PropertyModel, view: View, winners: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which modes may be named for each example, shape ``(n, modes)``: the simplest that says what the winner says."""
+    modes = part.classifier.modes
+    winner = np.searchsorted(np.array(sorted(modes)), winners)
+    place = np.array([modes.index(m) for m in sorted(modes)])[winner]
+    values = view.values
+    said = values[np.arange(len(values)), place]
+    slack = part.clusterer.scale.tolerance
+    agree = np.abs(values - said[:, None]) <= slack
+    agree[np.arange(len(values)), place] = True
+    simple = np.array([(part.mode(m).parameters, -part.mode(m).examples) for m in modes], dtype=np.float64)
+    order = np.lexsort((simple[:, 1], simple[:, 0]))
+    first = order[np.argmax(agree[:, order], axis=1)]
+    allowed = np.zeros_like(agree)
+    allowed[np.arange(len(values)), first] = True
+    return allowed
+
+
+def _atoms(part: PropertyModel, view: View, functions: dict[int, Sum]) -> list[_Atom]:
+    """All that classifiers test, each condition once."""
+    found: dict[Test, _Atom] = {}
+    rows = np.arange(len(view))
+    for classifier in part.classifier.classifiers:
+        facts = view.facts(classifier.context, classifier.scope)
+        spelled = _spelled(part, classifier, functions)
+        for clause in _clauses(classifier):
+            for piece in parts_of(clause):
+                if any(spelled.get(literal.relation) == "" for literal in piece):
+                    continue  # tests a function that can't be written out
+                test = _as_test(piece, classifier.context, spelled)
+                if test not in found and test.opposite not in found:
+                    found[test] = _Atom(test, matches(piece, facts, view.tuples(rows)))
+    for atom in _at_rest(part, view):
+        if atom.test not in found and atom.test.opposite not in found:
+            found[atom.test] = atom
+    return list(found.values())
+
+
+def _clauses(classifier: BinaryClassifier) -> Iterator[Clause]:
+    """All that a classifier tests: its clauses, and with the nodes of their trees."""
+    clauses = classifier.definition.clauses
+    yield from clauses
+    trees = (*classifier.clause_trees, classifier.fall_through_tree)
+    for stage, tree in enumerate(trees):
+        if tree is None:
+            continue
+        clause = clauses[stage] if stage < len(clauses) else Clause(())
+        scalars = len(classifier.scope.scalars)
+        pair = [name for name, _ in classifier.scope.pair]
+        for column, threshold in zip(tree.column, tree.threshold, strict=True):
+            if column < 0:
+                continue
+            if column < scalars:
+                yield Clause((Literal(classifier.scope.scalars[column], (), False, "<=", threshold),))
+            else:
+                variable, feature = divmod(column - scalars, len(pair))
+                literal = Literal(pair[feature], (0, variable + 1), False, "<=", threshold)
+                yield Clause((*clause.literals, literal))
+
+
+def _as_test(clause: Clause, context: str, spelled: dict[str, str]) -> Test:
+    """A clause as a test, modes' functions written out."""
+    literals = tuple(
+        Literal(spelled.get(each.relation, each.relation), each.args, each.negated, each.op, each.threshold)
+        for each in clause.literals
+    )
+    return tests_of(Clause(literals, clause.arity), context)[0]
+
+
+def _spelled(part: PropertyModel, classifier: BinaryClassifier, functions: dict[int, Sum]) -> dict[str, str]:
+    """Names of numbers that hold modes' functions, written out; empty where a role keeps that from being done."""
+    scope = classifier.scope
+    if not scope.modes:
+        return {}
+    texts: dict[str, str] = {}
+    plain = scope.scalars[len(scope.own) :]
+    i, j = (functions[mode] for mode in scope.modes)
+    sums: list[Sum | None] = [i, j, _plus(i, j, -1.0)]
+    sums += [_plus(Sum(((1.0, name),)), f, k) for name, _, k in scope.follows for f in (i, j)]
+    closed = all(part.mode(m).roles[1:] == () or not _open(part, m) for m in scope.modes)
+    for name, found in zip(plain, sums, strict=False):
+        texts[name] = found.text(_EXACT) if found is not None and closed else ""
+    turned = plain[len(sums) :]
+    names = [name for name, _ in scope.present]
+    for name, (own, f) in zip(turned, ((p, f) for p in names for f in (i, j)), strict=True):
+        texts[name] = f"({f.text(_EXACT)}) * {own}" if closed else ""
+    return texts
+
+
+def _open(part: PropertyModel, mode: int) -> bool:
+    """Whether several objects may play some role of a mode."""
+    return any(role in part.casting.embodied(part.mode(mode)) for role in part.mode(mode).roles[1:])
+
+
+def _plus(a: Sum, b: Sum, weight: float) -> Sum:
+    total: dict[str, float] = {}
+    for w, name in (*a.terms, *((weight * w, name) for w, name in b.terms)):
+        total[name] = total.get(name, 0.0) + w
+    terms = tuple((w, name) for name, w in total.items() if w != 0.0)
+    return Sum(terms, a.constant + weight * b.constant)
+
+
+def _at_rest(part: PropertyModel, view: View) -> Iterator[_Atom]:
+    """Where a function of one own property says what a constant mode says: ``v = 0``."""
+    own = part.classifier.vocabulary.own
+    constants = [m for m in part.classifier.modes if not any(r.terms for r in part.mode(m).roles)]
+    for constant in constants:
+        for mode in part.classifier.modes:
+            terms = [(w, name) for role in part.mode(mode).roles for name, w in role.terms]
+            if len(terms) != 1 or terms[0][1] not in own or part.mode(mode).roles[0].terms == ():
+                continue
+            weight, name = terms[0]
+            value = (part.mode(constant).intercept - part.mode(mode).intercept) / weight
+            value = 0.0 if abs(value) <= part.clusterer.scale.tolerance else value
+            test = Test(Clause((equal_to(name, value + 0.0),)), "all")
+            yield _Atom(test, view.own[:, own.index(name)] == value)
+
+
+# ------------------------------------------------------------------ what modes don't say
+def _beyond(part: PropertyModel) -> tuple[Branch, ...]:
+    """Branches of the places where no mode speaks."""
+    tree = part.scope.tree
+    if tree is None:
+        return ()
+    leaves = [leaf for leaf in tree.leaves if not tree.says_yes(leaf)]
+    return tuple(Branch(_path(tree, leaf), None, reason="unexplained there") for leaf in leaves)
+
+
+def _path(tree: DecisionTree, leaf: int) -> Condition:
+    """Tests on the way to a leaf."""
+    parents = {}
+    for node, column in enumerate(tree.column):
+        if column >= 0:
+            parents[tree.below[node]], parents[tree.above[node]] = (node, "<="), (node, ">")
+    tests: list[Test] = []
+    while leaf in parents:
+        leaf, op = parents[leaf]
+        literal = Literal(tree.columns[tree.column[leaf]], (), False, op, tree.threshold[leaf])
+        tests += tests_of(Clause((literal,)), "all")
+    return tuple(reversed(tests))
+
+
+def _bounds(part: PropertyModel) -> Iterator[Bound]:
+    if part.clusterer.approximate and np.isfinite([part.scope.least, part.scope.most]).all():
+        yield Bound("change within", part.scope.least, part.scope.most)
+    limits = part.limits
+    for mode, kind, value in ((limits.low, "at least", limits.least), (limits.high, "at most", limits.most)):
+        if mode in limits:
+            yield Bound(kind, value, steps=part.mode(mode).examples)
+    rate = f"{part.target.property}'"
+    for stop in part.stops.stops:
+        led = Sum(((1.0, stop.property), (stop.step, rate)))
+        sign = 1.0 if stop.side < 0.0 else -1.0
+        text = Sum(tuple((sign * w, name) for w, name in led.terms)).text(_EXACT)
+        tests = tests_of(Clause((Literal(text, (), False, "<=", sign * stop.bound),)), "all")
+        yield Bound("if", stop.value, tests=tests, steps=part.mode(stop.mode).examples)
+    for landing in part.stops.landings:
+        tests = tests_of(Clause((equal_to(f"{landing.property}'", landing.at + 0.0, landing.slack),)), "all")
+        yield Bound("if", landing.value, tests=tests, steps=part.mode(landing.mode).examples)

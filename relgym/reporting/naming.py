@@ -1,0 +1,62 @@
+"""Names for conditions, from what happens where they hold: ``bouncing``, ``resting on floor``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Final
+
+from relgym.reporting.conditions import Condition, condition_text
+from relgym.reporting.functions import Sum
+from relgym.reporting.rules import Branch
+
+__all__ = ["named", "word_for"]
+
+SHORT: Final = 28
+"""Conditions of fewer characters tell themselves."""
+
+
+def named(branches: Iterable[Branch], prop: str) -> tuple[Branch, ...]:
+    """The branches with names for the conditions that are too long to be told in place.
+
+    Parameters
+    ----------
+    branches
+        In order.
+    prop
+        The property that they predict.
+    """
+    found: list[Branch] = []
+    used: dict[str, int] = {}
+    for branch in branches:
+        if not branch.condition or branch.function is None or len(condition_text(branch.condition)) < SHORT:
+            found.append(branch)
+            continue
+        name = word_for(branch.function, prop)
+        used[name] = used.get(name, 0) + 1
+        found.append(replace(branch, name=name if used[name] == 1 else f"{name} {_letter(used[name])}"))
+    return tuple(found)
+
+
+def word_for(function: Sum, prop: str) -> str:
+    """What a property does where a function holds, in a word."""
+    weights = {name: float(f"{weight:.9g}") for weight, name in function.terms}
+    own = weights.get(prop, 0.0)
+    if not weights:
+        return "at rest" if function.constant == 0.0 else "held"
+    if set(weights) == {prop}:
+        if own == 1.0:
+            return "steady" if function.constant == 0.0 else "drifting"
+        return "bouncing" if own < 0.0 else "changing"
+    if own == 1.0:
+        return "driven"
+    return "deflected" if own else "led"
+
+
+def _letter(number: int) -> str:
+    return chr(ord("a") + number - 1) if number <= 26 else f"a{number}"
+
+
+def condition_of(branches: Iterable[Branch], name: str) -> Condition | None:
+    """The condition of that name, if there is one."""
+    return next((b.condition for b in branches if b.name == name), None)
