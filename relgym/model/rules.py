@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.classification.binary import BinaryClassifier
+from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.role_classifier import RoleKind
 from relgym.classification.views import View
 from relgym.clustering.mode import Mode
@@ -27,7 +28,7 @@ from relgym.model.property_model import PropertyModel
 from relgym.model.spread import ROUNDING
 from relgym.numeric.tree import DecisionTree
 from relgym.reporting.conditions import Condition, Test, equal_to, parts_of, tests_of
-from relgym.reporting.functions import Sum
+from relgym.reporting.functions import Sum, parse_sum
 from relgym.reporting.motion import MotionRules
 from relgym.reporting.naming import named
 from relgym.reporting.rules import Bound, Branch, Derivation, PropertyRules, RuleList, RuleRole
@@ -39,8 +40,11 @@ if TYPE_CHECKING:
 
 __all__ = ["rule_list"]
 
-_EXACT: Final = 17
-"""Significant digits of numbers within conditions, which decide."""
+_EXACT: Final = 9
+"""Significant digits of numbers within conditions."""
+
+DOUBT: Final = 2e-4
+"""The list may differ from the votes for so large a share of the examples, if nothing explains those anyway."""
 
 
 def rule_list(model: WorldModel) -> RuleList:
@@ -173,15 +177,25 @@ class _Atom:
 def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, ...]:
     modes = part.classifier.modes
     if len(modes) == 1 or not len(part.classifier.exemplars.rows):
-        most = max(modes, key=lambda m: part.mode(m).examples)
-        return (_branch(part, (), most, functions, part.mode(most).examples),)
+        most = max(modes, key=lambda m: (_counts(part)[m], -m))
+        return (_branch(part, (), most, functions, _counts(part)[most]),)
     view, weights, ranking = part.classifier.remembered()
     atoms = _atoms(part, view, functions)
     allowed = _allowed(part, view, ranking.modes[:, 0])
     truth = np.array([atom.truth for atom in atoms]).T.reshape(len(view), len(atoms))
     cost = [1 + len(atom.test.clause) + (atom.test.context == "all" and atom.test.clause.variables > 1) for atom in atoms]
-    rules = decision_list(truth, allowed, weights, cost)
-    return tuple(_of_rule(part, rule, atoms, modes, functions) for rule in rules)
+    nobody = part.classifier.exemplars.assigned == UNKNOWN
+    rules = decision_list(truth, allowed, weights, cost, doubtful=nobody, budget=DOUBT)
+    found: list[Branch] = []
+    for rule in rules:
+        branch = _of_rule(part, rule, atoms, modes, functions)
+        if found and branch.cases and found[-1].function == branch.function:
+            found[-1] = replace(
+                found[-1], cases=(*found[-1].cases, *branch.cases), steps=found[-1].steps + branch.steps
+            )
+        else:
+            found.append(branch)
+    return tuple(found)
 
 
 def _of_rule(
@@ -194,7 +208,7 @@ def _of_rule(
 def _branch(
     part: PropertyModel, condition: Condition, mode: int, functions: dict[int, Sum], steps: int
 ) -> Branch:
-    return Branch(condition, functions[mode], steps=steps, spread=_spread(part, mode))
+    return Branch((condition,) if condition else (), functions[mode], steps=steps, spread=_spread(part, mode))
 
 
 def _spread(part: PropertyModel, mode: int) -> float:
@@ -202,6 +216,11 @@ def _spread(part: PropertyModel, mode: int) -> float:
     if known is None or known.whole <= max(part.clusterer.floor, ROUNDING * part.clusterer.scale.sigma):
         return 0.0
     return known.whole
+
+
+def _counts(part: PropertyModel) -> dict[int, int]:
+    """Training examples of each mode."""
+    return {mode.id: mode.examples for mode in part.modes}
 
 
 def _allowed(part: PropertyModel, view: View, winners: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -214,7 +233,8 @@ def _allowed(part: PropertyModel, view: View, winners: NDArray[np.int64]) -> NDA
     slack = part.clusterer.scale.tolerance
     agree = np.abs(values - said[:, None]) <= slack
     agree[np.arange(len(values)), place] = True
-    simple = np.array([(part.mode(m).parameters, -part.mode(m).examples) for m in modes], dtype=np.float64)
+    counts = _counts(part)
+    simple = np.array([(part.mode(m).parameters, -counts[m]) for m in modes], dtype=np.float64)
     order = np.lexsort((simple[:, 1], simple[:, 0]))
     first = order[np.argmax(agree[:, order], axis=1)]
     allowed = np.zeros_like(agree)
@@ -267,10 +287,23 @@ def _clauses(classifier: BinaryClassifier) -> Iterator[Clause]:
 def _as_test(clause: Clause, context: str, spelled: dict[str, str]) -> Test:
     """A clause as a test, modes' functions written out."""
     literals = tuple(
-        Literal(spelled.get(each.relation, each.relation), each.args, each.negated, each.op, each.threshold)
+        _simplified(spelled[each.relation], each) if each.relation in spelled else each
         for each in clause.literals
     )
     return tests_of(Clause(literals, clause.arity), context)[0]
+
+
+def _simplified(text: str, literal: Literal) -> Literal:
+    """A comparison of a sum; a single term stands alone."""
+    threshold, op = float(f"{literal.threshold:.{_EXACT}g}"), literal.op
+    found = None if text.startswith("(") else parse_sum(text)
+    if found is not None and len(found.terms) == 1 and op is not None:
+        weight, name = found.terms[0]
+        threshold = float(f"{(threshold - found.constant) / weight:.{_EXACT}g}") + 0.0
+        if weight > 0.0:
+            return Literal(name, (), literal.negated, op, threshold)
+        return Literal(f"-{name}", (), literal.negated, op, 0.0 - threshold)
+    return Literal(text, (), literal.negated, op, threshold)
 
 
 def _spelled(part: PropertyModel, classifier: BinaryClassifier, functions: dict[int, Sum]) -> dict[str, str]:
@@ -302,7 +335,8 @@ def _plus(a: Sum, b: Sum, weight: float) -> Sum:
     total: dict[str, float] = {}
     for w, name in (*a.terms, *((weight * w, name) for w, name in b.terms)):
         total[name] = total.get(name, 0.0) + w
-    terms = tuple((w, name) for name, w in total.items() if w != 0.0)
+    most = max((abs(w) for w, _ in (*a.terms, *b.terms)), default=1.0)
+    terms = tuple((w, name) for name, w in total.items() if abs(w) > 1e-9 * most)
     return Sum(terms, a.constant + weight * b.constant)
 
 
@@ -329,7 +363,7 @@ def _beyond(part: PropertyModel) -> tuple[Branch, ...]:
     if tree is None:
         return ()
     leaves = [leaf for leaf in tree.leaves if not tree.says_yes(leaf)]
-    return tuple(Branch(_path(tree, leaf), None, reason="unexplained there") for leaf in leaves)
+    return tuple(Branch((_path(tree, leaf),), None, reason="unexplained there") for leaf in leaves)
 
 
 def _path(tree: DecisionTree, leaf: int) -> Condition:
@@ -349,17 +383,17 @@ def _path(tree: DecisionTree, leaf: int) -> Condition:
 def _bounds(part: PropertyModel) -> Iterator[Bound]:
     if part.clusterer.approximate and np.isfinite([part.scope.least, part.scope.most]).all():
         yield Bound("change within", part.scope.least, part.scope.most)
-    limits = part.limits
+    limits, counts = part.limits, _counts(part)
     for mode, kind, value in ((limits.low, "at least", limits.least), (limits.high, "at most", limits.most)):
         if mode in limits:
-            yield Bound(kind, value, steps=part.mode(mode).examples)
+            yield Bound(kind, value, steps=counts[mode])
     rate = f"{part.target.property}'"
     for stop in part.stops.stops:
         led = Sum(((1.0, stop.property), (stop.step, rate)))
         sign = 1.0 if stop.side < 0.0 else -1.0
         text = Sum(tuple((sign * w, name) for w, name in led.terms)).text(_EXACT)
         tests = tests_of(Clause((Literal(text, (), False, "<=", sign * stop.bound),)), "all")
-        yield Bound("if", stop.value, tests=tests, steps=part.mode(stop.mode).examples)
+        yield Bound("if", stop.value, tests=tests, steps=counts[stop.mode])
     for landing in part.stops.landings:
         tests = tests_of(Clause((equal_to(f"{landing.property}'", landing.at + 0.0, landing.slack),)), "all")
-        yield Bound("if", landing.value, tests=tests, steps=part.mode(landing.mode).examples)
+        yield Bound("if", landing.value, tests=tests, steps=counts[landing.mode])

@@ -9,7 +9,7 @@ algorithm", Machine Learning 3 (1989).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import permutations
 from typing import Final
 
@@ -21,8 +21,13 @@ __all__ = ["Rule", "decision_list"]
 BEAM: Final = 12
 """So many conjunctions are grown at once."""
 
+TRIED, MOST_TRIES = 3, 1_500
+"""So many lists, the shortest, are improved, with so many changes at most."""
+
 _Bools = NDArray[np.bool_]
 _Floats = NDArray[np.float64]
+_Draft = tuple[tuple[int, ...], int]
+"""Literals (condition k, or number of conditions + k for its negation) and the label."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +50,13 @@ class Rule:
 
 
 def decision_list(
-    truth: _Bools, allowed: _Bools, weights: _Floats, cost: Sequence[float] | None = None
+    truth: _Bools,
+    allowed: _Bools,
+    weights: _Floats,
+    cost: Sequence[float] | None = None,
+    *,
+    doubtful: _Bools | None = None,
+    budget: float = 0.0,
 ) -> tuple[Rule, ...]:
     """A short list that gives every example a label that is allowed for it.
 
@@ -59,6 +70,8 @@ def decision_list(
         Of the examples, shape ``(n,)``.
     cost
         What it costs to mention a condition; default: 1 each.
+    doubtful, budget
+        Examples that may be given another label, shape ``(n,)``, up to this share of all weight.
 
     Returns
     -------
@@ -71,27 +84,34 @@ def decision_list(
     O(labels * rules * `BEAM` * distinct rows * conditions).
     """
     prices = np.ones(truth.shape[1]) if cost is None else np.asarray(cost, dtype=np.float64)
-    rows, labels, heavy = _distinct(truth, allowed, weights)
-    literals = np.concatenate([rows, ~rows], axis=1)
-    both = np.concatenate([prices, prices])
-    found = []
+    rows, labels, heavy, unsure = _distinct(truth, allowed, weights, doubtful)
+    table = _Table(
+        np.concatenate([rows, ~rows], axis=1),
+        labels,
+        heavy,
+        np.concatenate([prices, prices]),
+        unsure,
+        budget * float(heavy.sum()),
+    )
+    drafts = []
     for default in np.flatnonzero(labels.any(axis=0)).tolist():
         for by_weight in (True, False):
-            size = heavy if by_weight else np.ones(len(heavy))
-            rules = _covered(literals, labels, size, both, default)
-            rules = _improved(literals, labels, _pruned(literals, labels, rules, default), both, default)
-            price = _price(rules, both)
-            share = float(heavy[labels[:, default]].sum())
-            found.append(((price, -share, default), rules, default))
-    _, rules, default = min(found, key=lambda each: each[0])
-    return _weighed(literals, heavy, rules, default, truth.shape[1])
+            rules = table.pruned(_covered(table, heavy if by_weight else np.ones(len(heavy)), default), default)
+            drafts.append((table.price(rules), -float(heavy[labels[:, default]].sum()), default, rules))
+    drafts.sort(key=lambda each: each[:3])
+    found = []
+    for _, share, default, rules in drafts[:TRIED]:
+        better = _improved(table, rules, default)
+        found.append((table.price(better), share, default, better))
+    _, _, default, rules = min(found, key=lambda each: each[:3])
+    return _weighed(table, rules, default)
 
 
-_Draft = tuple[tuple[int, ...], int]
-"""Literals (condition k, or number of conditions + k for its negation) and the label."""
 
 
-def _distinct(truth: _Bools, allowed: _Bools, weights: _Floats) -> tuple[_Bools, _Bools, _Floats]:
+def _distinct(
+    truth: _Bools, allowed: _Bools, weights: _Floats, doubtful: _Bools | None
+) -> tuple[_Bools, _Bools, _Floats, _Bools]:
     """Rows that differ in conditions; where they disagree about the label, the weightier one decides."""
     rows, which = np.unique(truth, axis=0, return_inverse=True)
     which = which.reshape(-1)
@@ -101,17 +121,91 @@ def _distinct(truth: _Bools, allowed: _Bools, weights: _Floats) -> tuple[_Bools,
     labels = votes >= heavy[:, None] * (1.0 - 1e-9)
     none = ~labels.any(axis=1)
     labels[none] = votes[none] >= votes[none].max(axis=1, keepdims=True)
-    return rows, labels, heavy
+    unsure = np.ones(len(rows), dtype=np.bool_)
+    np.logical_and.at(unsure, which, np.zeros(len(which), dtype=np.bool_) if doubtful is None else doubtful)
+    return rows, labels, heavy, unsure
 
 
-def _covered(literals: _Bools, labels: _Bools, size: _Floats, prices: _Floats, default: int) -> list[_Draft]:
+@dataclass(eq=False)
+class _Table:
+    """Rows to be decided.
+
+    Attributes
+    ----------
+    literals
+        Truth of every condition, then of every negation, shape ``(n, 2 * conditions)``.
+    labels
+        Labels allowed, shape ``(n, labels)``.
+    heavy, prices
+        Weight of each row, and price of each literal.
+    unsure, budget
+        Rows that may be decided wrongly, of so much weight in all.
+    """
+
+    literals: _Bools
+    labels: _Bools
+    heavy: _Floats
+    prices: _Floats
+    unsure: _Bools
+    budget: float
+    _masks: dict[tuple[int, ...], _Bools] = field(default_factory=dict)
+
+    def where(self, tests: tuple[int, ...]) -> _Bools:
+        """Rows of which some tests hold."""
+        known = self._masks.get(tests)
+        if known is None:
+            known = self._masks[tests] = self.literals[:, tests].all(axis=1)
+        return known
+
+    def price(self, rules: Sequence[_Draft]) -> float:
+        """What it costs to write down the rules; one more case of the rule before it is cheap."""
+        total, last = 0.0, -1
+        for tests, label in rules:
+            total += (2.0 if label != last else 0.5) + float(self.prices[list(tests)].sum())
+            last = label
+        return total
+
+    def right(self, rules: Sequence[_Draft], default: int) -> bool:
+        """Whether rules decide every row as they may."""
+        left, lost = np.ones(len(self.literals), dtype=np.bool_), 0.0
+        for tests, label in (*rules, ((), default)):
+            here = left & self.where(tests) if tests else left
+            wrong = here & ~self.labels[:, label]
+            if wrong.any():
+                if (wrong & ~self.unsure).any():
+                    return False
+                lost += float(self.heavy[wrong].sum())
+                if lost > self.budget:
+                    return False
+            left = left & ~here
+        return True
+
+    def pruned(self, rules: list[_Draft], default: int) -> list[_Draft]:
+        """The rules without tests, and the list without rules, that nothing depends on."""
+        number = len(rules) - 1
+        while number >= 0:
+            without = [*rules[:number], *rules[number + 1 :]]
+            if self.right(without, default):
+                rules = without
+            else:
+                for test in rules[number][0]:
+                    tests, label = rules[number]
+                    shorter = (tuple(k for k in tests if k != test), label)
+                    changed = [*rules[:number], shorter, *rules[number + 1 :]]
+                    if shorter[0] and self.right(changed, default):
+                        rules = changed
+            number -= 1
+        return rules
+
+
+def _covered(table: _Table, size: _Floats, default: int) -> list[_Draft]:
     """Rules for all rows for which the default won't do, in the order in which they are found."""
-    left = np.ones(len(literals), dtype=np.bool_)
+    left = np.ones(len(table.literals), dtype=np.bool_)
     rules: list[_Draft] = []
-    while (left & ~labels[:, default]).any():
-        rule = _best(literals[left], labels[left], size[left], prices, default)
+    while (left & ~table.labels[:, default]).any():
+        rule = _best(table.literals[left], table.labels[left], size[left], table.prices, default)
         rules.append(rule)
-        left &= ~literals[:, rule[0]].all(axis=1)
+        left &= ~table.where(rule[0])
     return rules
 
 
@@ -154,37 +248,19 @@ def _score(counts: tuple[float, float], tests: tuple[int, ...], prices: _Floats)
     return float(np.log2(1.0 + gained) - 2.0 * np.log2(1.0 + wrong) - 0.25 * prices[list(tests)].sum())
 
 
-def _pruned(literals: _Bools, labels: _Bools, rules: list[_Draft], default: int) -> list[_Draft]:
-    """The rules without tests, and the list without rules, that nothing depends on."""
-    number = len(rules) - 1
-    while number >= 0:
-        without = [*rules[:number], *rules[number + 1 :]]
-        if _right(literals, labels, without, default):
-            rules = without
-        else:
-            for test in rules[number][0]:
-                tests, label = rules[number]
-                shorter = (tuple(k for k in tests if k != test), label)
-                changed = [*rules[:number], shorter, *rules[number + 1 :]]
-                if shorter[0] and _right(literals, labels, changed, default):
-                    rules = changed
-        number -= 1
-    return rules
-
-
-def _improved(
-    literals: _Bools, labels: _Bools, rules: list[_Draft], prices: _Floats, default: int
-) -> list[_Draft]:
+def _improved(table: _Table, rules: list[_Draft], default: int) -> list[_Draft]:
     """The rules in an order, and with tests in others' places, that let more of them be left out."""
-    price = _price(rules, prices)
-    better = True
-    while better:
+    price, tries, better = table.price(rules), 0, True
+    while better and tries < MOST_TRIES:
         better = False
         for changed in _variants(rules):
-            if not _right(literals, labels, changed, default):
+            tries += 1
+            if tries >= MOST_TRIES:
+                break
+            if not table.right(changed, default):
                 continue
-            shorter = _pruned(literals, labels, changed, default)
-            if (found := _price(shorter, prices)) < price - 1e-9:
+            shorter = table.pruned(changed, default)
+            if (found := table.price(shorter)) < price - 1e-9:
                 rules, price, better = shorter, found, True
                 break
     return rules
@@ -198,33 +274,16 @@ def _variants(rules: list[_Draft]) -> Iterator[list[_Draft]]:
         yield moved
         if rules[i][1] == rules[j][1]:
             yield [(rules[j][0], label) if k == i else (tests, label) for k, (tests, label) in enumerate(rules)]
-            at = moved.index(rules[i])
-            yield [(rules[j][0], r[1]) if k == at else r for k, r in enumerate(moved)]
+            yield [(rules[j][0], r[1]) if k == j else r for k, r in enumerate(moved)]
 
 
-def _price(rules: Sequence[_Draft], prices: _Floats) -> float:
-    """What it costs to write down the rules."""
-    return float(sum(2.0 + sum(prices[k] for k in tests) for tests, _ in rules))
-
-
-def _right(literals: _Bools, labels: _Bools, rules: Sequence[_Draft], default: int) -> bool:
-    left = np.ones(len(literals), dtype=np.bool_)
-    for tests, label in rules:
-        here = left & literals[:, tests].all(axis=1)
-        if (here & ~labels[:, label]).any():
-            return False
-        left &= ~here
-    return bool(labels[left, default].all())
-
-
-def _weighed(
-    literals: _Bools, heavy: _Floats, rules: Sequence[_Draft], default: int, conditions: int
-) -> tuple[Rule, ...]:
-    left = np.ones(len(literals), dtype=np.bool_)
+def _weighed(table: _Table, rules: Sequence[_Draft], default: int) -> tuple[Rule, ...]:
+    left = np.ones(len(table.literals), dtype=np.bool_)
+    conditions = table.literals.shape[1] // 2
     found = []
     for tests, label in rules:
-        here = left & literals[:, tests].all(axis=1)
+        here = left & table.where(tests)
         pairs = tuple((k % conditions, k < conditions) for k in tests)
-        found.append(Rule(pairs, label, float(heavy[here].sum())))
+        found.append(Rule(pairs, label, float(table.heavy[here].sum())))
         left &= ~here
-    return (*found, Rule((), default, float(heavy[left].sum())))
+    return (*found, Rule((), default, float(table.heavy[left].sum())))

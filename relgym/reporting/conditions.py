@@ -156,8 +156,8 @@ def _plain(literal: Literal) -> str:
     equal = _EQUAL.fullmatch(name)
     if equal and literal.op == "<=" and literal.threshold == 0.0:
         return f"{equal['name']} = {number_text(float(equal['value']))}"
-    if literal.op == "<=" and name.startswith("-") and not literal.args:  # at least, from the other side
-        return f"{_turned(name)} >= {number_text(-literal.threshold)}"
+    if name.startswith("-") and not literal.args:  # told from the other side
+        return f"{_turned(name)} {'>=' if literal.op == '<=' else '<'} {number_text(0.0 - literal.threshold)}"
     return f"{name} {literal.op} {number_text(literal.threshold)}"
 
 
@@ -234,9 +234,10 @@ def _literals(body: str, context: str, whole: str) -> list[Literal]:
 
 
 def _parse_literal(text: str, whole: str) -> Literal:
-    if " >= " in text:
-        name, value = text.rsplit(" >= ", 1)
-        return Literal(_turned(name), (), False, "<=", -_number(value, whole))
+    for mark, op in ((" >= ", "<="), (" < ", ">")):
+        if mark in text:
+            name, value = text.rsplit(mark, 1)
+            return Literal(_turned(name), (), False, op, 0.0 - _number(value, whole))
     for op in (" <= ", " > "):
         if op in text:
             name, value = text.rsplit(op, 1)

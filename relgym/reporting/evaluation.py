@@ -283,7 +283,7 @@ def _wrap(layout: SceneLayout, found: Evaluated) -> None:
 def _needs(part: PropertyRules) -> frozenset[tuple[str, str]]:
     """(type, property) pairs whose next values functions or conditions read."""
     texts = [b.function.text() for b in part.branches if b.function is not None]
-    texts += [test.text for b in part.branches for test in b.condition]
+    texts += [test.text for b in part.branches for case in b.cases for test in case]
     texts += [test.text for bound in part.bounds for test in bound.tests]
     found = set()
     for name in _PRIMED.findall(" ".join(texts)):
@@ -296,7 +296,7 @@ def branches_of(part: PropertyRules, sight: Sight, index: int) -> Iterator[tuple
     """Each branch's number, and in which scenes it is reached and holds, shape ``(n,)``."""
     waiting = np.ones(len(sight), dtype=np.bool_)
     for number, branch in enumerate(part.branches):
-        here = waiting & holds(sight, index, branch.condition)
+        here = waiting & _some(sight, index, branch.cases)
         if branch.function is not None and _absent(part, sight.layout, index, branch.function):
             continue
         yield number, here
@@ -310,6 +310,14 @@ def holds(
     found = np.ones(len(sight), dtype=np.bool_)
     for test in condition:
         found &= sight.holds(index, test, numbers)
+    return found
+
+
+def _some(sight: Sight, index: int, cases: tuple[Condition, ...]) -> _Bools:
+    """Where one of some cases holds; everywhere if there are none."""
+    found = np.full(len(sight), not cases, dtype=np.bool_)
+    for case in cases:
+        found |= holds(sight, index, case)
     return found
 
 

@@ -126,7 +126,9 @@ def piece_word(piece: Piece, letter: str) -> str:
     weights = dict(piece.terms)
     own, free = f"v_{letter}", f"u_{letter}"
     if piece.releases(free):
-        return "friction slows the slip" if len(weights) > 1 else "the contact does nothing"
+        if len(weights) > 1:
+            return "friction slows the slip"
+        return "it lets go" if letter == "n" else "nothing acts"
     if set(weights) == {own}:
         return "it bounces; at rest, it stays so" if weights[own] < 0 else "it is slowed down"
     if not weights:

@@ -6,13 +6,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
-from relgym.reporting.conditions import Condition, condition_text
 from relgym.reporting.functions import Sum
 from relgym.reporting.rules import Branch
 
 __all__ = ["named", "word_for"]
 
-SHORT: Final = 28
+SHORT: Final = 24
 """Conditions of fewer characters tell themselves."""
 
 
@@ -29,7 +28,7 @@ def named(branches: Iterable[Branch], prop: str) -> tuple[Branch, ...]:
     found: list[Branch] = []
     used: dict[str, int] = {}
     for branch in branches:
-        if not branch.condition or branch.function is None or len(condition_text(branch.condition)) < SHORT:
+        if not branch.cases or branch.function is None or len(branch.text) < SHORT:
             found.append(branch)
             continue
         name = word_for(branch.function, prop)
@@ -55,8 +54,3 @@ def word_for(function: Sum, prop: str) -> str:
 
 def _letter(number: int) -> str:
     return chr(ord("a") + number - 1) if number <= 26 else f"a{number}"
-
-
-def condition_of(branches: Iterable[Branch], name: str) -> Condition | None:
-    """The condition of that name, if there is one."""
-    return next((b.condition for b in branches if b.name == name), None)

@@ -16,7 +16,7 @@ __all__ = ["parse_rules"]
 
 _LEARNED = re.compile(r"Learned from ([\d,]+) transitions?\.")
 _SCOPE = re.compile(r"Scenes held (.*); other numbers of objects were never seen\.")
-_COUNT = re.compile(r"(\d+)(?: to (\d+))? (\S+)")
+_COUNT = re.compile(r"(\S+) × (\d+)(?: to (\d+))?")
 _TARGET = re.compile(r"(?P<type>[^\s.]+)\.(?P<property>\S+)'  \((?P<steps>[\d,]+) steps?\)")
 _STEPS = re.compile(r"([\d,]+) steps?")
 _UNEXPLAINED = re.compile(r"([\d,]+) of these steps \(.*\) follow none of these functions")
@@ -37,7 +37,7 @@ class _Draft:
     heads: list[str] = field(default_factory=list)
     bounds: list[Bound] = field(default_factory=list)
     roles: list[RuleRole] = field(default_factory=list)
-    names: dict[str, Condition] = field(default_factory=dict)
+    names: dict[str, tuple[Condition, ...]] = field(default_factory=dict)
     unexplained: int = 0
     doubt: str = ""
     advice: str = ""
@@ -60,8 +60,8 @@ class _Draft:
         if not head:
             return branch
         if head in self.names:
-            return replace(branch, condition=self.names[head], name=head)
-        return replace(branch, condition=parse_condition(head))
+            return replace(branch, cases=self.names[head], name=head)
+        return replace(branch, cases=_cases(head))
 
 
 def parse_rules(text: str) -> RuleList:
@@ -101,7 +101,7 @@ def _blocks(text: str) -> Iterator[list[str]]:
         if not stripped or stripped.startswith("#"):
             continue
         if stripped.startswith("| ") and block:
-            block[-1] += f" {stripped[2:]}"
+            block[-1] += f" {stripped[2:].strip()}"
         elif line[0] != " " and block and not _continues(block, line):
             yield block
             block = [line.rstrip()]
@@ -127,7 +127,7 @@ def _head(lines: list[str]) -> tuple[int, tuple[tuple[str, int, int], ...]]:
         raise ConfigError(f"rules: expected 'Learned from N transitions.' at the beginning, got {text[:60]!r}")
     scope = _SCOPE.search(text)
     counts = [] if scope is None else [_COUNT.fullmatch(part) for part in scope[1].split(", ")]
-    return _int(learned[1]), tuple((c[3], int(c[1]), int(c[2] or c[1])) for c in counts if c)
+    return _int(learned[1]), tuple((c[1], int(c[2]), int(c[3] or c[2])) for c in counts if c)
 
 
 def _derivation(line: str) -> Derivation:
@@ -212,13 +212,17 @@ def _rest(draft: _Draft, text: str) -> bool:
             draft.roles.append(RuleRole(tuple(name.split(", ")), said.removeprefix("any ")))
         elif said.startswith("the ") and " B where " in said:
             kind, rules = said.removeprefix("the ").split(" B where ", 1)
-            alternatives = tuple(parse_condition(part, arity=2) for part in split_outside(rules, " or "))
+            alternatives = _cases(rules, arity=2)
             draft.roles.append(RuleRole(tuple(name.split(", ")), kind, alternatives))
         else:
-            draft.names[name] = parse_condition(said)
+            draft.names[name] = _cases(said)
     else:
         return False
     return True
+
+
+def _cases(text: str, arity: int = 1) -> tuple[Condition, ...]:
+    return tuple(parse_condition(part.strip(), arity) for part in split_outside(text, " or "))
 
 
 def _int(text: str) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 from relgym.reporting.conditions import Condition, condition_text
-from relgym.reporting.functions import Sum
+from relgym.reporting.functions import Sum, split_outside
 from relgym.reporting.motion import MotionRules
 
 if TYPE_CHECKING:
@@ -37,10 +37,10 @@ class Branch:
 
     Attributes
     ----------
-    condition
-        When it holds, provided that no earlier branch does; empty: always.
+    cases
+        Conditions of which one must hold, provided that no earlier branch does; none: always.
     name
-        What the condition is called; empty: it is told in full.
+        What they are called; empty: they are told in full.
     function
         The property's next value; ``None``: no prediction.
     reason
@@ -51,12 +51,17 @@ class Branch:
         Standard deviation of what it leaves, in units of the property; 0 where that is rounding.
     """
 
-    condition: Condition
+    cases: tuple[Condition, ...]
     function: Sum | None
     name: str = ""
     reason: str = ""
     steps: int = 0
     spread: float = 0.0
+
+    @property
+    def text(self) -> str:
+        """The condition in full."""
+        return " or ".join(map(condition_text, self.cases))
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,16 +149,15 @@ class PropertyRules:
         return f"{self.type}.{self.property}"
 
     @property
-    def names(self) -> dict[str, Condition]:
-        """Named conditions."""
-        return {b.name: b.condition for b in self.branches if b.name}
+    def names(self) -> dict[str, str]:
+        """Named conditions, in full."""
+        return {b.name: b.text for b in self.branches if b.name}
 
     def renamed(self, names: Mapping[str, str]) -> PropertyRules:
         """The list with other names for conditions: their present name or their text to the new one."""
         found = []
         for branch in self.branches:
-            text = condition_text(branch.condition)
-            new = names.get(text, names.get(branch.name, branch.name)) if branch.condition else ""
+            new = names.get(branch.text, names.get(branch.name, branch.name)) if branch.cases else ""
             found.append(replace(branch, name=new))
         return replace(self, branches=tuple(found))
 
@@ -230,7 +234,7 @@ class RuleList:
         raise KeyError(f"no rules of {target!r}; there are {[p.target for p in self.properties]}")
 
     @property
-    def names(self) -> dict[str, dict[str, Condition]]:
+    def names(self) -> dict[str, dict[str, str]]:
         """Named conditions of every property."""
         return {p.target: p.names for p in self.properties}
 
@@ -327,11 +331,11 @@ def check_name(name: str) -> None:
 
 
 def scope_text(scope: Iterable[tuple[str, int, int]]) -> str:
-    """What was seen: ``Seen with 1 ball, 2 to 3 boxes; other numbers of objects never were.``"""
+    """What was seen: ``Scenes held ball × 1, box × 2 to 3; other numbers of objects were never seen.``"""
     told = []
     for name, least, most in scope:
         count = f"{least}" if least == most else f"{least} to {most}"
-        told.append(f"{count} {name}")
+        told.append(f"{name} × {count}")
     return f"Scenes held {', '.join(told)}; other numbers of objects were never seen."
 
 
@@ -351,8 +355,8 @@ def _amount(count: int, noun: str) -> str:
 def _branch_lines(rules: PropertyRules, digits: int) -> list[str]:
     rows = []
     for number, branch in enumerate(rules.branches):
-        if branch.condition:
-            head = f"{'elif' if number else 'if  '} {branch.name or condition_text(branch.condition)}:"
+        if branch.cases:
+            head = f"{'elif' if number else 'if  '} {branch.name or branch.text}:"
         else:
             head = "else:" if number else "always:"
         if branch.function is None:
@@ -405,13 +409,14 @@ def _role_lines(roles: Iterable[RuleRole]) -> list[str]:
 
 
 def _name_lines(branches: Iterable[Branch]) -> list[str]:
-    named = {b.name: b.condition for b in branches if b.name}
+    named = {b.name: b.text for b in branches if b.name}
     width = max(map(len, named), default=0)
     lines = []
-    for name, condition in named.items():
-        first, *rest = _wrapped(condition_text(condition), WIDTH - width - 6, (" and ",))
-        lines.append(f"  {name.ljust(width)} := {first}")
-        lines += [f"  {' ' * width}  | {line}" for line in rest]
+    for name, text in named.items():
+        for number, case in enumerate(split_outside(text, " or ")):
+            first, *rest = _wrapped(case, WIDTH - width - 10, (" and ",))
+            lines.append(f"  {name.ljust(width)} := {first}" if not number else f"  {' ' * width}  | or {first}")
+            lines += [f"  {' ' * width}  |    {line}" for line in rest]
     return lines
 
 
@@ -419,12 +424,8 @@ def _wrapped(text: str, width: int, marks: tuple[str, ...]) -> list[str]:
     """Lines of at most so many characters, broken at the blank before (or after) a mark, if there is one."""
     lines, rest = [], text
     while len(rest) > width:
-        cut = -1
-        for mark in marks:
-            at = rest.rfind(mark, 1, width)
-            if at > 0:
-                cut = at + (1 if mark in ("; ", ", ") else 0)
-                break
+        cuts = [at + (mark in ("; ", ", ")) for mark in marks if (at := rest.rfind(mark, 1, width)) > 0]
+        cut = max(cuts, default=-1)
         if cut < 0:
             found = [at for mark in marks if (at := rest.find(mark, 1)) > 0]
             if not found:
