@@ -18,7 +18,7 @@ from source_tree import FOLDERS, ROOT, Import, Module, modules, room_of
 FOUNDATION = frozenset({"errors", "config"})
 ROOMS = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ROOMS | {"clustering", "classification", "laws"}
-CORE = LEARNERS | {"model"}
+CORE = LEARNERS | {"reporting", "model"}
 
 MAY_IMPORT = {
     "errors": frozenset(),
@@ -29,7 +29,8 @@ MAY_IMPORT = {
     "clustering": ROOMS,
     "classification": ROOMS,
     "laws": ROOMS | {"clustering"},
-    "model": LEARNERS,
+    "reporting": ROOMS | {"clustering", "laws"},
+    "model": LEARNERS | {"reporting"},
     "baselines": CORE,
     "envs": CORE,
     "wrappers": CORE | {"envs"},

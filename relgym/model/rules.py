@@ -8,7 +8,7 @@ rests, and doesn't bounce with no velocity.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -24,6 +24,7 @@ from relgym.laws.frames import axis_names
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause, Literal
 from relgym.numeric.decision_list import Rule, decision_list
+from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.property_model import PropertyModel
 from relgym.model.spread import ROUNDING
 from relgym.numeric.tree import DecisionTree
@@ -33,12 +34,18 @@ from relgym.reporting.motion import MotionRules
 from relgym.reporting.naming import named
 from relgym.reporting.rules import Bound, Branch, Derivation, PropertyRules, RuleList, RuleRole
 from relgym.scene.axes import Axes
-from relgym.scene.objects import Target
+from relgym.scene.objects import Scene, SceneLayout
+from relgym.scene.schema import SceneSchema
 
 if TYPE_CHECKING:
     from relgym.model.world_model import WorldModel
 
-__all__ = ["rule_list"]
+__all__ = ["agreement", "doubted", "rule_list"]
+
+_PREDICTED: Final = OUTCOMES.index(Outcome.PREDICTED)
+
+_CLOSE: Final = 1e-4
+"""Values that differ by no more than this part of what usually changes are the same but for digits."""
 
 _EXACT: Final = 9
 """Significant digits of numbers within conditions."""
@@ -63,6 +70,66 @@ def rule_list(model: WorldModel) -> RuleList:
         Derivation(k.type, k.property, k.rate, k.step, k.uses_next) for k in model.schema.derivations
     )
     return RuleList(model.seen, _scope(model), properties, _motion(model), laws)
+
+
+def agreement(model: WorldModel, rules: RuleList, scenes: Iterable[Scene]) -> tuple[RuleList, float]:
+    """Compare what rules say of scenes, and nothing but the rules, with what the model says.
+
+    Parameters
+    ----------
+    model
+        The model.
+    rules
+        Its rules, such as they were read back from their text.
+    scenes
+        Where to compare.
+
+    Returns
+    -------
+    The rules with the result in `RuleList.agreement`, and the share of predictions that agree: of equal value, but for
+    a ten-thousandth of the root mean square change (the digits that the text shows), or both without a prediction.
+    """
+    groups: dict[SceneLayout, tuple[SceneSchema, list[NDArray[np.float64]]]] = {}
+    for scene in scenes:
+        groups.setdefault(scene.layout, (scene.schema, []))[1].append(scene.vector)
+    pairs: dict[tuple[str, str], list[NDArray[np.float64]]] = {}
+    for layout, (schema, rows) in groups.items():
+        vectors = np.array(rows)
+        found = model.predict_batch(layout, vectors)
+        said = rules.predict_batch(schema, layout, vectors)
+        for k, (name, prop) in enumerate(found.parts):
+            index = layout.index(name)
+            column = layout.column(index, prop)
+            value = np.where(found.outcomes[:, k] == _PREDICTED, found.vectors[:, column], np.nan)
+            rule = said.get((name, prop), np.full(len(vectors), np.nan))
+            pair = np.stack([value, rule, vectors[:, column]])
+            pairs.setdefault((layout.types[index].name, prop), []).append(pair)
+    total = same = silent = 0
+    for parts in pairs.values():
+        value, rule, now = np.concatenate(parts, axis=1)
+        equal, none = _same(value, rule, now)
+        total, same, silent = total + len(now), same + int(equal.sum()), silent + int(none.sum())
+    steps = sum(len(rows) for _, rows in groups.values())
+    share = same / total if total else 1.0
+    text = f"on {steps:,} steps these rules say what the model says of {100.0 * _floor(share):.5g} % of {total:,} values"
+    text += f"; both make no prediction of {silent:,} of them" if silent else ""
+    return replace(rules, agreement=f"{text}."), share
+
+
+def _same(
+    value: NDArray[np.float64], rule: NDArray[np.float64], now: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which predictions agree, and which are none on either side."""
+    none = np.isnan(value) & np.isnan(rule)
+    change = np.square(value - now)[~np.isnan(value)]
+    slack = _CLOSE * float(np.sqrt(change.mean())) if len(change) else 0.0
+    with np.errstate(invalid="ignore"):
+        return none | (np.abs(value - rule) <= slack), none
+
+
+def _floor(share: float) -> float:
+    """A share that isn't rounded up to 1."""
+    return min(share, 0.99999) if share < 1.0 else 1.0
 
 
 def _scope(model: WorldModel) -> tuple[tuple[str, int, int], ...]:
@@ -97,9 +164,6 @@ def _property(part: PropertyModel) -> PropertyRules:
     if part.classifier.modes:
         functions, roles = _functions(part)
         branches = (*_beyond(part), *_branches(part, functions))
-    doubt = "nothing tells yet which of these holds" if part.undecided else ""
-    if part._lost:
-        doubt = "no law of the form that is looked for describes it"
     steps = part.clusterer.noise_examples + sum(mode.examples for mode in part.modes)
     return PropertyRules(
         target.type,
@@ -109,8 +173,25 @@ def _property(part: PropertyModel) -> PropertyRules:
         roles,
         steps,
         part.clusterer.noise_examples,
-        doubt if part.modes or part._lost else "nothing learned yet",
+        _doubt(part),
     )
+
+
+def doubted(rules: RuleList, models: Iterable[PropertyModel]) -> RuleList:
+    """The rules, with what is known by now of whether they are right (`relgym.model.hindsight`)."""
+    known = {str(part.target): _doubt(part) for part in models}
+    return replace(
+        rules, properties=tuple(replace(p, doubt=known.get(p.target, p.doubt)) for p in rules.properties)
+    )
+
+
+def _doubt(part: PropertyModel) -> str:
+    """Why a property's list predicts nothing; empty if it does."""
+    if part._lost:
+        return "no law of the form that is looked for describes it"
+    if not part.modes:
+        return "no mode learned yet"
+    return "nothing tells yet which of these holds" if part.undecided else ""
 
 
 # ------------------------------------------------------------------ functions and roles

@@ -30,7 +30,7 @@ _QUANTIFIER = re.compile(
     rf"(?P<sign>some|no) (?:(?P<word>struck|close) )?(?P<names>{_VARIABLE}(?:, {_VARIABLE})*) \[(?P<body>.*)\]"
 )
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
-_EQUAL = re.compile(rf"\|(?P<name>.+) - (?P<value>{_NUMBER})\|")
+_EQUAL = re.compile(rf"\|(?P<name>.+) (?P<sign>[-+]) (?P<value>{_NUMBER})\|")
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,8 @@ def _plain(literal: Literal) -> str:
         return name
     equal = _EQUAL.fullmatch(name)
     if equal and literal.op == "<=" and literal.threshold == 0.0:
-        return f"{equal['name']} = {number_text(float(equal['value']))}"
+        sign = "-" if equal["sign"] == "+" else ""
+        return f"{equal['name']} = {sign}{number_text(float(equal['value']))}"
     if name.startswith("-") and not literal.args:  # told from the other side
         return f"{_turned(name)} {'>=' if literal.op == '<=' else '<'} {number_text(0.0 - literal.threshold)}"
     return f"{name} {literal.op} {number_text(literal.threshold)}"
@@ -164,12 +165,13 @@ def _plain(literal: Literal) -> str:
 def _turned(text: str) -> str:
     """The negative of a sum."""
     found = parse_sum(text)
-    return Sum(tuple((-weight, name) for weight, name in found.terms), -found.constant).text(17)
+    return Sum(tuple((-weight, name) for weight, name in found.terms), -found.constant).text(9)
 
 
 def equal_to(name: str, value: float, slack: float = 0.0) -> Literal:
     """The literal that a number is another one, within some slack."""
-    return Literal(f"|{name} - {number_text(value)}|", (), False, "<=", slack)
+    apart = f"{'-' if value >= 0.0 else '+'} {number_text(abs(value))}"
+    return Literal(f"|{name} {apart}|", (), False, "<=", slack)
 
 
 def number_text(value: float, digits: int = 6) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Final
 
+from relgym.errors import ConfigError
 from relgym.reporting.functions import Sum
-from relgym.reporting.rules import Branch
+from relgym.reporting.rules import Branch, RuleList
 
-__all__ = ["named", "word_for"]
+__all__ = ["named", "named_text", "word_for"]
 
 SHORT: Final = 24
 """Conditions of fewer characters tell themselves."""
@@ -50,6 +51,28 @@ def word_for(function: Sum, prop: str) -> str:
     if own == 1.0:
         return "driven"
     return "deflected" if own else "led"
+
+
+def named_text(rules: RuleList, condition: str) -> str:
+    """The text of a condition, given that or its name; with ``target: name`` that of one property only.
+
+    Raises
+    ------
+    ConfigError
+        There is no such condition, or there are several.
+    """
+    target, _, bare = condition.rpartition(": ")
+    found = {
+        branch.text
+        for part in rules.properties
+        for branch in part.branches
+        if branch.cases and (not target or part.target == target) and bare in (branch.name, branch.text)
+    }
+    if len(found) != 1:
+        known = [f"{p.target}: {name}" for p in rules.properties for name in p.names]
+        problem = "several conditions are" if found else "no condition is"
+        raise ConfigError(f"{problem} called {condition!r}; there are {known}, or give a condition's text")
+    return found.pop()
 
 
 def _letter(number: int) -> str:

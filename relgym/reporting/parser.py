@@ -15,6 +15,7 @@ from relgym.reporting.rules import Bound, Branch, Derivation, PropertyRules, Rul
 __all__ = ["parse_rules"]
 
 _LEARNED = re.compile(r"Learned from ([\d,]+) transitions?\.")
+_NOTHING = re.compile(r"No targets yet: nothing changed in ([\d,]+) transitions?\.")
 _SCOPE = re.compile(r"Scenes held (.*); other numbers of objects were never seen\.")
 _COUNT = re.compile(r"(\S+) × (\d+)(?: to (\d+))?")
 _TARGET = re.compile(r"(?P<type>[^\s.]+)\.(?P<property>\S+)'  \((?P<steps>[\d,]+) steps?\)")
@@ -77,7 +78,8 @@ def parse_rules(text: str) -> RuleList:
         A line that says nothing in this language; the message quotes it.
     """
     head, *blocks = list(_blocks(text))
-    found = RuleList(*_head(head))
+    transitions, scope, agreement = _head(head)
+    found = RuleList(transitions, scope, agreement=agreement)
     for block in blocks:
         first = block[0]
         if first == HEADING:
@@ -118,16 +120,16 @@ def _continues(block: list[str], line: str) -> bool:
     )
 
 
-def _head(lines: list[str]) -> tuple[int, tuple[tuple[str, int, int], ...]]:
-    text = " ".join(lines)
-    if text.startswith("No targets yet"):
-        return 0, ()
+def _head(lines: list[str]) -> tuple[int, tuple[tuple[str, int, int], ...], str]:
+    text, _, agreement = " ".join(lines).partition(" Agreement: ")
+    if nothing := _NOTHING.match(text):
+        return _int(nothing[1]), (), ""
     learned = _LEARNED.match(text)
     if learned is None:
         raise ConfigError(f"rules: expected 'Learned from N transitions.' at the beginning, got {text[:60]!r}")
     scope = _SCOPE.search(text)
     counts = [] if scope is None else [_COUNT.fullmatch(part) for part in scope[1].split(", ")]
-    return _int(learned[1]), tuple((c[1], int(c[2]), int(c[3] or c[2])) for c in counts if c)
+    return _int(learned[1]), tuple((c[1], int(c[2]), int(c[3] or c[2])) for c in counts if c), agreement
 
 
 def _derivation(line: str) -> Derivation:

@@ -414,9 +414,20 @@ def _name_lines(branches: Iterable[Branch]) -> list[str]:
     lines = []
     for name, text in named.items():
         for number, case in enumerate(split_outside(text, " or ")):
-            first, *rest = _wrapped(case, WIDTH - width - 10, (" and ",))
+            first, *rest = _filled(split_outside(case, " and "), WIDTH - width - 10)
             lines.append(f"  {name.ljust(width)} := {first}" if not number else f"  {' ' * width}  | or {first}")
             lines += [f"  {' ' * width}  |    {line}" for line in rest]
+    return lines
+
+
+def _filled(parts: list[str], width: int) -> list[str]:
+    """Conjuncts on lines of at most so many characters."""
+    lines = [parts[0]]
+    for part in parts[1:]:
+        if len(lines[-1]) + 5 + len(part) <= width:
+            lines[-1] += f" and {part}"
+        else:
+            lines.append(f"and {part}")
     return lines
 
 
