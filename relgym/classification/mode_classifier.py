@@ -18,7 +18,7 @@ from relgym.classification.learning import Lesson
 from relgym.classification.owners import Owners
 from relgym.classification.pairs import PairState, covered_by, pair_labels
 from relgym.classification.ranking import Ranking, RankingBatch, Verdict
-from relgym.classification.views import Scope, View
+from relgym.classification.views import Context, Scope, View
 from relgym.classification.voting import Voting
 from relgym.config import ClassificationConfig
 
@@ -107,6 +107,15 @@ class ModeClassifier:
         """
         view, weights = self._current_view()
         return view, weights, self._voting.rank_view(view, self.counts, self._familiarity())
+
+    def experience(self) -> tuple[tuple[tuple[Context, tuple[str, ...], tuple[str, ...]], ...], frozenset[int]]:
+        """Binary and unary relations that clauses look at, by context, and the situations that were seen of them."""
+        known, v = self._familiarity(), self.vocabulary
+        names = tuple(
+            (context, tuple(v.relations[k] for k in relations), tuple(v.unary[k] for k in unary))
+            for context, relations, unary in known.used
+        )
+        return names, frozenset(known.seen)
 
     def explain(self, example: Example, values: Sequence[float]) -> list[Verdict]:
         """How the winner fared against every other mode, in the order of the ranking."""

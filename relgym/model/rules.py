@@ -32,7 +32,7 @@ from relgym.reporting.conditions import Condition, Test, equal_to, parts_of, tes
 from relgym.reporting.functions import Sum, parse_sum
 from relgym.reporting.motion import MotionRules
 from relgym.reporting.naming import named
-from relgym.reporting.rules import Bound, Branch, Derivation, PropertyRules, RuleList, RuleRole
+from relgym.reporting.rules import Bound, Branch, Derivation, Experience, PropertyRules, RuleList, RuleRole
 from relgym.scene.axes import Axes
 from relgym.scene.objects import Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
@@ -174,7 +174,17 @@ def _property(part: PropertyModel) -> PropertyRules:
         steps,
         part.clusterer.noise_examples,
         _doubt(part),
+        experience=_experience(part),
     )
+
+
+def _experience(part: PropertyModel) -> Experience | None:
+    if not part.config.abstain or len(part.classifier.modes) < 2:
+        return None
+    relations, seen = part.classifier.experience()
+    if not any(binary or unary for _, binary, unary in relations) and len(seen) <= 1:
+        return None
+    return Experience(relations, tuple(sorted({each >> 32 for each in map(int, seen)})))
 
 
 def doubted(rules: RuleList, models: Iterable[PropertyModel]) -> RuleList:

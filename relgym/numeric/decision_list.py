@@ -21,7 +21,10 @@ __all__ = ["Rule", "decision_list"]
 BEAM: Final = 12
 """So many conjunctions are grown at once."""
 
-TRIED, MOST_TRIES = 3, 1_500
+DEFAULTS: Final = 4
+"""So many labels, the commonest, are tried as the default."""
+
+TRIED, MOST_TRIES = 2, 800
 """So many lists, the shortest, are improved, with so many changes at most."""
 
 _Bools = NDArray[np.bool_]
@@ -80,7 +83,7 @@ def decision_list(
 
     Notes
     -----
-    Every label is tried as the default; of the lists found the cheapest is returned. Cost
+    The commonest labels are tried as the default; of the lists found the cheapest is returned. Cost
     O(labels * rules * `BEAM` * distinct rows * conditions).
     """
     prices = np.ones(truth.shape[1]) if cost is None else np.asarray(cost, dtype=np.float64)
@@ -94,7 +97,8 @@ def decision_list(
         budget * float(heavy.sum()),
     )
     drafts = []
-    for default in np.flatnonzero(labels.any(axis=0)).tolist():
+    usual = np.argsort(-(labels * heavy[:, None]).sum(axis=0), kind="stable")[:DEFAULTS]
+    for default in usual[labels.any(axis=0)[usual]].tolist():
         for by_weight in (True, False):
             rules = table.pruned(_covered(table, heavy if by_weight else np.ones(len(heavy)), default), default)
             drafts.append((table.price(rules), -float(heavy[labels[:, default]].sum()), default, rules))
@@ -212,40 +216,49 @@ def _covered(table: _Table, size: _Floats, default: int) -> list[_Draft]:
 def _best(literals: _Bools, labels: _Bools, size: _Floats, prices: _Floats, default: int) -> _Draft:
     """The conjunction that decides most rows for its price and is right of all of them."""
     needed = np.where(labels[:, default], 0.0, size)
-    most = literals.shape[1] // 2
     best: tuple[float, _Draft] | None = None
     for label in range(labels.shape[1]):
-        good = labels[:, label]
-        if not (good & (needed > 0)).any():
-            continue
-        beam: list[tuple[int, ...]] = [()]
-        for _ in range(most):
-            grown: dict[tuple[int, ...], tuple[float, float]] = {}
-            for tests in beam:
-                here = literals[:, tests].all(axis=1)
-                gain = (here * good * needed) @ literals
-                wrong = (here & ~good).astype(np.float64) @ literals
-                for k in np.flatnonzero(gain > 0).tolist():
-                    if k in tests or (k + most) % (2 * most) in tests:
-                        continue
-                    grown[tuple(sorted((*tests, k)))] = (float(wrong[k]), float(gain[k]))
-            scored = sorted(grown.items(), key=lambda g: (-_score(g[1], g[0], prices), g[0]))
-            for tests, (wrong_rows, gained) in scored:
-                if wrong_rows == 0:
-                    value = gained / (2.0 + prices[list(tests)].sum())
-                    if best is None or value > best[0] + 1e-12:
-                        best = (value, (tests, label))
-            if best is not None or not grown:
-                break
-            beam = [tests for tests, _ in scored[:BEAM]]
+        found = _conjunction(literals, labels[:, label], needed, prices)
+        if found is not None and (best is None or found[0] > best[0] + 1e-12):
+            best = (found[0], (found[1], label))
     assert best is not None, "rows that differ in no condition have a common label"
     return best[1]
 
 
-def _score(counts: tuple[float, float], tests: tuple[int, ...], prices: _Floats) -> float:
-    """How promising a conjunction is, from the rows that it gets wrong and what it gains."""
-    wrong, gained = counts
-    return float(np.log2(1.0 + gained) - 2.0 * np.log2(1.0 + wrong) - 0.25 * prices[list(tests)].sum())
+def _conjunction(
+    literals: _Bools, good: _Bools, needed: _Floats, prices: _Floats
+) -> tuple[float, tuple[int, ...]] | None:
+    """The best conjunction that holds of good rows alone, by what it gains for its price; None if none gains."""
+    if not (good & (needed > 0.0)).any():
+        return None
+    count = literals.shape[1]
+    beam: list[tuple[int, ...]] = [()]
+    for _ in range(count // 2):
+        masks = np.array([literals[:, tests].all(axis=1) for tests in beam])
+        gain = (masks * (good * needed)) @ literals
+        wrong = (masks & ~good).astype(np.float64) @ literals
+        price = np.array([prices[list(tests)].sum() for tests in beam])[:, None] + prices
+        for row, tests in enumerate(beam):  # neither the same test again nor its negation
+            gain[row, list(tests)] = 0.0
+            gain[row, [(k + count // 2) % count for k in tests]] = 0.0
+        pure = (wrong == 0.0) & (gain > 0.0)
+        if pure.any():
+            value = np.where(pure, gain / (2.0 + price), -np.inf)
+            row, k = np.unravel_index(int(np.argmax(value)), value.shape)
+            return float(value[row, k]), tuple(sorted((*beam[row], int(k))))
+        # What holds of most rows that it gains, and of few others, is promising.
+        promise = np.log2(1.0 + gain) - 2.0 * np.log2(1.0 + wrong) - 0.25 * price
+        promise[gain <= 0.0] = -np.inf
+        grown: dict[tuple[int, ...], None] = {}
+        for place in np.argsort(-promise, axis=None, kind="stable")[: BEAM * BEAM].tolist():
+            row, k = divmod(place, count)
+            if promise[row, k] == -np.inf or len(grown) == BEAM:
+                break
+            grown[tuple(sorted((*beam[row], k)))] = None
+        if not grown:
+            return None
+        beam = list(grown)
+    return None
 
 
 def _improved(table: _Table, rules: list[_Draft], default: int) -> list[_Draft]:

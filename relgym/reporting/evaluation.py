@@ -19,9 +19,10 @@ from relgym.laws.touching import Contacts
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause
 from relgym.logic.facts import Facts
+from relgym.logic.situations import mixed, situation
 from relgym.reporting.conditions import Condition, Test
 from relgym.reporting.functions import Sum, evaluated
-from relgym.reporting.rules import Bound, PropertyRules, RuleList, RuleRole
+from relgym.reporting.rules import Bound, Experience, PropertyRules, RuleList, RuleRole
 from relgym.scene.objects import SceneLayout
 from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
@@ -113,6 +114,23 @@ class Sight:
         for test in condition:
             found &= self._matches(index, test.clause, test.context, (rows, body), {}) != test.negated
         return found
+
+    def familiar(self, index: int, experience: Experience) -> _Bools:
+        """Whether a situation is one that was seen, shape ``(n,)``."""
+        embodied = index in self.layout.bodies
+        count = len(self.layout.bodies) if embodied else 1
+        n = len(self)
+        target = np.full(n, self.layout.bodies.index(index) if embodied else 0, dtype=np.int64)
+        prints = np.zeros(n, dtype=np.uint64)
+        for context, binary, unary in experience.relations:
+            table = np.zeros((n, len(binary), count, count), dtype=np.bool_)
+            for k, name in enumerate(binary):
+                table[:, k] = self._relation(name, count, embodied)
+            own = np.zeros((n, len(unary), count), dtype=np.bool_)
+            for k, name in enumerate(unary):
+                own[:, k] = self._relation(name, count, embodied)
+            prints = mixed(prints + situation(table, own, target, self._shown(index, context, count)))
+        return np.isin((prints >> np.uint64(32)).astype(np.int64), experience.seen)
 
     def _matches(
         self,
@@ -336,6 +354,8 @@ def _values(
             playing.setdefault(label, np.full(len(sight), -1, dtype=np.int64))[here] = bodies[here]
         read = sight._reader(index, numbers)
         values[here] = function.values(read, values)[here]
+    if part.experience is not None:
+        values[~sight.familiar(index, part.experience)] = np.nan
     for bound in part.bounds:
         values = _bounded(part, bound, sight, index, values)
     return values, decided, playing

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from relgym.errors import ConfigError
-from relgym.reporting.conditions import Condition, parse_condition
+from relgym.reporting.conditions import CONTEXTS, Condition, parse_condition
 from relgym.reporting.functions import Sum, parse_sum, split_outside
 from relgym.reporting.motion import HEADING, parse_motion
-from relgym.reporting.rules import Bound, Branch, Derivation, PropertyRules, RuleList, RuleRole
+from relgym.reporting.rules import Bound, Branch, Derivation, Experience, PropertyRules, RuleList, RuleRole
 
 __all__ = ["parse_rules"]
 
@@ -24,6 +24,8 @@ _UNEXPLAINED = re.compile(r"([\d,]+) of these steps \(.*\) follow none of these 
 _BOUND = re.compile(r"then (at least|at most) (\S+?)(?:  \(([\d,]+) steps?\))?")
 _IF = re.compile(r"then if (.*): (\S+?)(?:  \(([\d,]+) steps?\))?")
 _WITHIN = re.compile(r"the change within (\S+) and (\S+)")
+_EXPERIENCE = re.compile(r"no prediction in other situations than the [\d,]+ seen, told by (.*): ([0-9a-f ]+)")
+_CONTEXT = {word or "all": context for context, word in CONTEXTS.items()}
 _KINEMATICS = re.compile(r"([^\s.]+)\.(\S+)' = (.*)")
 
 
@@ -42,6 +44,7 @@ class _Draft:
     unexplained: int = 0
     doubt: str = ""
     advice: str = ""
+    experience: Experience | None = None
 
     def rules(self) -> PropertyRules:
         branches = tuple(self._named(*pair) for pair in zip(self.branches, self.heads, strict=True))
@@ -55,6 +58,7 @@ class _Draft:
             self.unexplained,
             self.doubt,
             self.advice,
+            self.experience,
         )
 
     def _named(self, branch: Branch, head: str) -> Branch:
@@ -202,7 +206,13 @@ def _bound(draft: _Draft, text: str) -> bool:
 
 
 def _rest(draft: _Draft, text: str) -> bool:
-    if text.startswith("no prediction: "):
+    if match := _EXPERIENCE.fullmatch(text):
+        told = [
+            (_CONTEXT[part[1]], _list(part[2]), _list(part[3]))
+            for part in re.finditer(r"(\w+) \((.*?); (.*?)\)", match[1])
+        ]
+        draft.experience = Experience(tuple(told), tuple(int(each, 16) for each in match[2].split()))
+    elif text.startswith("no prediction: "):
         draft.doubt = text.removeprefix("no prediction: ")
     elif text.startswith("advice: "):
         draft.advice = text.removeprefix("advice: ")
@@ -221,6 +231,10 @@ def _rest(draft: _Draft, text: str) -> bool:
     else:
         return False
     return True
+
+
+def _list(text: str) -> tuple[str, ...]:
+    return () if text == "-" else tuple(text.split(", "))
 
 
 def _cases(text: str, arity: int = 1) -> tuple[Condition, ...]:

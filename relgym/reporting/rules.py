@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
-from relgym.reporting.conditions import Condition, condition_text
+from relgym.reporting.conditions import CONTEXTS, Condition, condition_text
 from relgym.reporting.functions import Sum, split_outside
 from relgym.reporting.motion import MotionRules
 
 if TYPE_CHECKING:
     from relgym.scene.objects import Scene, SceneLayout
 
-__all__ = ["Bound", "Branch", "Derivation", "PropertyRules", "RuleList", "RuleRole", "scope_text", "steps_text"]
+__all__ = ["Bound", "Branch", "Derivation", "Experience", "PropertyRules", "RuleList", "RuleRole", "scope_text", "steps_text"]
 
 WIDTH = 96
 """Longest line, in characters, if its parts allow it."""
@@ -110,6 +110,34 @@ class RuleRole:
 
 
 @dataclass(frozen=True, slots=True)
+class Experience:
+    """The situations that a property's rules were learned from; of others they say nothing.
+
+    Attributes
+    ----------
+    relations
+        For each context the binary and the unary relations that are looked at, in order.
+    seen
+        Fingerprints of the situations (`relgym.logic.situations`): their upper 32 bits, ascending.
+    """
+
+    relations: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]
+    seen: tuple[int, ...]
+
+    def __str__(self) -> str:
+        return f"no prediction in other situations than the {len(self.seen):,} seen, told by {self._told()}: " + " ".join(
+            f"{print_:08x}" for print_ in self.seen
+        )
+
+    def _told(self) -> str:
+        parts = []
+        for context, binary, unary in self.relations:
+            word = CONTEXTS[context] or "all"
+            parts.append(f"{word} ({', '.join(binary) or '-'}; {', '.join(unary) or '-'})")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
 class PropertyRules:
     """The list of one property of all objects of a type.
 
@@ -131,6 +159,8 @@ class PropertyRules:
         Why the list makes no prediction although it has branches; empty: it predicts.
     advice
         What the property lacks, a sentence.
+    experience
+        Situations outside which there is no prediction; None: there is one everywhere.
     """
 
     type: str
@@ -142,6 +172,7 @@ class PropertyRules:
     unexplained: int = 0
     doubt: str = ""
     advice: str = ""
+    experience: Experience | None = None
 
     @property
     def target(self) -> str:
@@ -177,6 +208,9 @@ class PropertyRules:
         told = [*_role_lines(self.roles), *_name_lines(self.branches)]
         if told:
             lines += ["", *told]
+        if self.experience is not None:
+            first, *rest = _wrapped(str(self.experience), WIDTH - 2, (" ",))
+            lines += ["", f"  {first}", *(f"    | {line}" for line in rest)]
         if self.advice:
             first, *rest = _wrapped(self.advice, WIDTH - 10, ("; ", " + ", " - ", ", ", " "))
             lines += ["", f"  advice: {first}", *(f"    | {line}" for line in rest)]
