@@ -40,7 +40,7 @@ from relgym.scene.schema import SceneSchema
 if TYPE_CHECKING:
     from relgym.model.world_model import WorldModel
 
-__all__ = ["agreement", "doubted", "rule_list"]
+__all__ = ["agreement", "doubted", "functions_of", "rule_list", "tested"]
 
 _PREDICTED: Final = OUTCOMES.index(Outcome.PREDICTED)
 
@@ -162,7 +162,7 @@ def _property(part: PropertyModel) -> PropertyRules:
     target = part.target
     branches, roles = (), tuple[RuleRole, ...]()
     if part.classifier.modes:
-        functions, roles = _functions(part)
+        functions, roles = functions_of(part)
         branches = (*_beyond(part), *_branches(part, functions))
     steps = part.clusterer.noise_examples + sum(mode.examples for mode in part.modes)
     return PropertyRules(
@@ -184,7 +184,7 @@ def _experience(part: PropertyModel) -> Experience | None:
     relations, seen = part.classifier.experience()
     if not any(binary or unary for _, binary, unary in relations) and len(seen) <= 1:
         return None
-    return Experience(relations, tuple(sorted({each >> 32 for each in map(int, seen)})))
+    return Experience(relations, tuple(sorted({each >> 40 for each in map(int, seen)})))
 
 
 def doubted(rules: RuleList, models: Iterable[PropertyModel]) -> RuleList:
@@ -205,7 +205,7 @@ def _doubt(part: PropertyModel) -> str:
 
 
 # ------------------------------------------------------------------ functions and roles
-def _functions(part: PropertyModel) -> tuple[dict[int, Sum], tuple[RuleRole, ...]]:
+def functions_of(part: PropertyModel) -> tuple[dict[int, Sum], tuple[RuleRole, ...]]:
     """The modes' functions, their roles named differently wherever they mean different objects."""
     functions: dict[int, Sum] = {}
     roles: dict[tuple[str, int, tuple[Condition, ...]], RuleRole] = {}
@@ -339,18 +339,25 @@ def _atoms(part: PropertyModel, view: View, functions: dict[int, Sum]) -> list[_
     rows = np.arange(len(view))
     for classifier in part.classifier.classifiers:
         facts = view.facts(classifier.context, classifier.scope)
-        spelled = _spelled(part, classifier, functions)
-        for clause in _clauses(classifier):
-            for piece in parts_of(clause):
-                if any(spelled.get(literal.relation) == "" for literal in piece):
-                    continue  # tests a function that can't be written out
-                test = _as_test(piece, classifier.context, spelled)
-                if test not in found and test.opposite not in found:
-                    found[test] = _Atom(test, matches(piece, facts, view.tuples(rows)))
+        for piece, test in tested(part, classifier, functions):
+            if test not in found and test.opposite not in found:
+                found[test] = _Atom(test, matches(piece, facts, view.tuples(rows)))
     for atom in _at_rest(part, view):
         if atom.test not in found and atom.test.opposite not in found:
             found[atom.test] = atom
     return list(found.values())
+
+
+def tested(
+    part: PropertyModel, classifier: BinaryClassifier, functions: dict[int, Sum]
+) -> Iterator[tuple[Clause, Test]]:
+    """All that a classifier tests, piece by piece, and how that is told."""
+    spelled = _spelled(part, classifier, functions)
+    for clause in _clauses(classifier):
+        for piece in parts_of(clause):
+            # What tests a function that can't be written out is left out.
+            if not any(spelled.get(literal.relation) == "" for literal in piece):
+                yield piece, _as_test(piece, classifier.context, spelled)
 
 
 def _clauses(classifier: BinaryClassifier) -> Iterator[Clause]:

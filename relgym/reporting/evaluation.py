@@ -28,7 +28,7 @@ from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
 from relgym.scene.surroundings import surroundings
 
-__all__ = ["Evaluated", "Sight", "branches_of", "evaluate", "holds"]
+__all__ = ["Evaluated", "Sight", "bounds_reached", "branches_of", "evaluate", "holds"]
 
 _Bools = NDArray[np.bool_]
 _Floats = NDArray[np.float64]
@@ -130,7 +130,7 @@ class Sight:
             for k, name in enumerate(unary):
                 own[:, k] = self._relation(name, count, embodied)
             prints = mixed(prints + situation(table, own, target, self._shown(index, context, count)))
-        return np.isin((prints >> np.uint64(32)).astype(np.int64), experience.seen)
+        return np.isin((prints >> np.uint64(40)).astype(np.int64), experience.seen)
 
     def _matches(
         self,
@@ -371,6 +371,21 @@ def _bounded(part: PropertyRules, bound: Bound, sight: Sight, index: int, values
         return np.asarray(np.clip(values, now + bound.value, now + bound.most))
     reached = holds(sight, index, bound.tests, {f"{part.property}'": values}) & np.isfinite(values)
     return np.where(reached, bound.value, values)
+
+
+def bounds_reached(
+    part: PropertyRules, sight: Sight, index: int, function: Sum
+) -> tuple[Bound, ...]:
+    """Bounds that change what a function says of the only scene there is."""
+    numbers, _ = _cast(part, sight, index, function)
+    values = function.values(sight._reader(index, numbers), np.empty(len(sight)))
+    found = []
+    for bound in part.bounds:
+        after = _bounded(part, bound, sight, index, values)
+        if after[0] != values[0]:
+            found.append(bound)
+        values = after
+    return tuple(found)
 
 
 def _absent(part: PropertyRules, layout: SceneLayout, index: int, function: Sum) -> bool:

@@ -10,7 +10,17 @@ from relgym.errors import ConfigError
 from relgym.reporting.conditions import CONTEXTS, Condition, parse_condition
 from relgym.reporting.functions import Sum, parse_sum, split_outside
 from relgym.reporting.motion import HEADING, parse_motion
-from relgym.reporting.rules import Bound, Branch, Derivation, Experience, PropertyRules, RuleList, RuleRole
+from relgym.reporting.rules import (
+    SEEN,
+    Bound,
+    Branch,
+    Derivation,
+    Experience,
+    PropertyRules,
+    RuleList,
+    RuleRole,
+    seen_of,
+)
 
 __all__ = ["parse_rules"]
 
@@ -24,7 +34,7 @@ _UNEXPLAINED = re.compile(r"([\d,]+) of these steps \(.*\) follow none of these 
 _BOUND = re.compile(r"then (at least|at most) (\S+?)(?:  \(([\d,]+) steps?\))?")
 _IF = re.compile(r"then if (.*): (\S+?)(?:  \(([\d,]+) steps?\))?")
 _WITHIN = re.compile(r"the change within (\S+) and (\S+)")
-_EXPERIENCE = re.compile(r"no prediction in other situations than the [\d,]+ seen, told by (.*): ([0-9a-f ]+)")
+_EXPERIENCE = re.compile(r"(\S+): [\d,]+, told apart by (.*)")
 _CONTEXT = {word or "all": context for context, word in CONTEXTS.items()}
 _KINEMATICS = re.compile(r"([^\s.]+)\.(\S+)' = (.*)")
 
@@ -44,7 +54,6 @@ class _Draft:
     unexplained: int = 0
     doubt: str = ""
     advice: str = ""
-    experience: Experience | None = None
 
     def rules(self) -> PropertyRules:
         branches = tuple(self._named(*pair) for pair in zip(self.branches, self.heads, strict=True))
@@ -58,7 +67,6 @@ class _Draft:
             self.unexplained,
             self.doubt,
             self.advice,
-            self.experience,
         )
 
     def _named(self, branch: Branch, head: str) -> Branch:
@@ -90,6 +98,8 @@ def parse_rules(text: str) -> RuleList:
             found = replace(found, motion=parse_motion(block))
         elif first == "Declared kinematics":
             found = replace(found, kinematics=tuple(map(_derivation, block[1:])))
+        elif first == SEEN:
+            found = replace(found, properties=_experienced(found.properties, block[1:]))
         elif (match := _TARGET.fullmatch(first)) is not None:
             draft = _Draft(match["type"], match["property"], _int(match["steps"]))
             _read(draft, block[1:])
@@ -120,7 +130,7 @@ def _blocks(text: str) -> Iterator[list[str]]:
 def _continues(block: list[str], line: str) -> bool:
     """Whether a line belongs to the head, the only block whose lines aren't indented."""
     return block[0].startswith(("Learned", "No targets")) and line != HEADING and not (
-        line == "Declared kinematics" or _TARGET.fullmatch(line)
+        line in ("Declared kinematics", SEEN) or _TARGET.fullmatch(line)
     )
 
 
@@ -134,6 +144,30 @@ def _head(lines: list[str]) -> tuple[int, tuple[tuple[str, int, int], ...], str]
     scope = _SCOPE.search(text)
     counts = [] if scope is None else [_COUNT.fullmatch(part) for part in scope[1].split(", ")]
     return _int(learned[1]), tuple((c[1], int(c[2]), int(c[3] or c[2])) for c in counts if c), agreement
+
+
+def _experienced(properties: tuple[PropertyRules, ...], lines: list[str]) -> tuple[PropertyRules, ...]:
+    known = {part.target: part for part in properties}
+    target = ""
+    for line in lines:
+        text = line.strip()
+        if match := _EXPERIENCE.fullmatch(text):
+            target = match[1]
+            told = [
+                (_CONTEXT[part[1]], _list(part[2]), _list(part[3]))
+                for part in re.finditer(r"(\w+) \((.*?); (.*?)\)", match[2])
+            ]
+            experience = Experience(tuple(told), ())
+        elif text.startswith("= ") and target in known:
+            before = known[target].experience
+            assert before is not None, "the line before told what is looked at"
+            experience = replace(before, seen=(*before.seen, *seen_of(text[2:])))
+        else:
+            raise ConfigError(f"rules: expected fingerprints of situations, got {text!r}")
+        if target not in known:
+            raise ConfigError(f"rules: situations of {target!r}, of which there are no rules")
+        known[target] = replace(known[target], experience=experience)
+    return tuple(known.values())
 
 
 def _derivation(line: str) -> Derivation:
@@ -206,13 +240,7 @@ def _bound(draft: _Draft, text: str) -> bool:
 
 
 def _rest(draft: _Draft, text: str) -> bool:
-    if match := _EXPERIENCE.fullmatch(text):
-        told = [
-            (_CONTEXT[part[1]], _list(part[2]), _list(part[3]))
-            for part in re.finditer(r"(\w+) \((.*?); (.*?)\)", match[1])
-        ]
-        draft.experience = Experience(tuple(told), tuple(int(each, 16) for each in match[2].split()))
-    elif text.startswith("no prediction: "):
+    if text.startswith("no prediction: "):
         draft.doubt = text.removeprefix("no prediction: ")
     elif text.startswith("advice: "):
         draft.advice = text.removeprefix("advice: ")

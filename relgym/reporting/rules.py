@@ -6,6 +6,7 @@ follows a scene (`relgym.reporting.evaluation`).
 
 from __future__ import annotations
 
+import base64
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -22,10 +23,13 @@ from relgym.reporting.motion import MotionRules
 if TYPE_CHECKING:
     from relgym.scene.objects import Scene, SceneLayout
 
-__all__ = ["Bound", "Branch", "Derivation", "Experience", "PropertyRules", "RuleList", "RuleRole", "scope_text", "steps_text"]
+__all__ = ["SEEN", "Bound", "Branch", "Derivation", "Experience", "PropertyRules", "RuleList", "RuleRole", "bound_text", "scope_text", "seen_of", "steps_text"]
 
 WIDTH = 96
 """Longest line, in characters, if its parts allow it."""
+
+SEEN = "Situations seen; in others there is no prediction"
+"""First line of the block of fingerprints."""
 
 _NAME = re.compile(r"[^\W\d][\w-]*( [^\W\d][\w-]*)*")
 _RESERVED = frozenset({"if", "elif", "else", "then", "and", "or", "not", "some", "no", "the", "any", "where", "where"})
@@ -118,23 +122,31 @@ class Experience:
     relations
         For each context the binary and the unary relations that are looked at, in order.
     seen
-        Fingerprints of the situations (`relgym.logic.situations`): their upper 32 bits, ascending.
+        Fingerprints of the situations (`relgym.logic.situations`): their upper 24 bits, ascending.
     """
 
     relations: tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]
     seen: tuple[int, ...]
 
-    def __str__(self) -> str:
-        return f"no prediction in other situations than the {len(self.seen):,} seen, told by {self._told()}: " + " ".join(
-            f"{print_:08x}" for print_ in self.seen
-        )
-
-    def _told(self) -> str:
+    @property
+    def told(self) -> str:
+        """What is looked at."""
         parts = []
         for context, binary, unary in self.relations:
             word = CONTEXTS[context] or "all"
             parts.append(f"{word} ({', '.join(binary) or '-'}; {', '.join(unary) or '-'})")
         return ", ".join(parts)
+
+    @property
+    def prints(self) -> str:
+        """The fingerprints as text, four characters each."""
+        return base64.urlsafe_b64encode(b"".join(each.to_bytes(3, "big") for each in self.seen)).decode()
+
+
+def seen_of(prints: str) -> tuple[int, ...]:
+    """Inverse of `Experience.prints`."""
+    data = base64.urlsafe_b64decode(prints)
+    return tuple(int.from_bytes(data[k : k + 3], "big") for k in range(0, len(data), 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,16 +213,13 @@ class PropertyRules:
         if self.doubt:
             lines.append(f"  no prediction: {self.doubt}")
         lines += _branch_lines(self, digits)
-        lines += [f"  {_bound_text(bound, digits)}" for bound in self.bounds]
+        lines += [f"  {bound_text(bound, '', digits)}" for bound in self.bounds]
         if self.unexplained and self.branches:
             share = 100.0 * self.unexplained / max(self.steps, 1)
             lines.append(f"  {self.unexplained:,} of these steps ({share:.2g} %) follow none of these functions")
         told = [*_role_lines(self.roles), *_name_lines(self.branches)]
         if told:
             lines += ["", *told]
-        if self.experience is not None:
-            first, *rest = _wrapped(str(self.experience), WIDTH - 2, (" ",))
-            lines += ["", f"  {first}", *(f"    | {line}" for line in rest)]
         if self.advice:
             first, *rest = _wrapped(self.advice, WIDTH - 10, ("; ", " + ", " - ", ", ", " "))
             lines += ["", f"  advice: {first}", *(f"    | {line}" for line in rest)]
@@ -330,8 +339,11 @@ class RuleList:
         parts = ["\n".join(head)]
         parts += [] if self.motion is None else [self.motion.text(digits)]
         parts += [p.text(digits) for p in self.properties]
+        seen = [p for p in self.properties if p.experience is not None]
         if self.kinematics:
             parts.append("\n".join(["Declared kinematics", *(f"  {each}" for each in self.kinematics)]))
+        if seen:
+            parts.append("\n".join([SEEN, *(line for p in seen for line in _seen_lines(p))]))
         legend = self._legend()
         return "\n\n".join([*parts, legend] if legend else parts)
 
@@ -354,6 +366,15 @@ class RuleList:
         if any(len(p.branches) > 1 for p in self.properties):
             lines.append("Branches are tried in order; steps: training steps that go by a branch; ±: what it leaves there.")
         return "\n".join(f"# {line}" for line in lines)
+
+
+def _seen_lines(part: PropertyRules) -> list[str]:
+    assert part.experience is not None, "checked by the caller"
+    prints = part.experience.prints
+    pieces = [prints[k : k + 88] for k in range(0, len(prints), 88)]
+    told = f"{part.target}: {len(part.experience.seen):,}, told apart by {part.experience.told}"
+    first, *rest = _wrapped(told, WIDTH - 4, (" ",))
+    return [f"  {first}", *(f"    | {line}" for line in rest), *(f"    = {piece}" for piece in pieces)]
 
 
 def check_name(name: str) -> None:
@@ -420,13 +441,15 @@ def _branch_lines(rules: PropertyRules, digits: int) -> list[str]:
     return lines
 
 
-def _bound_text(bound: Bound, digits: int) -> str:
-    steps = f"  ({_steps(bound.steps)})" if bound.steps else ""
+def bound_text(bound: Bound, prop: str = "", digits: int = 7) -> str:
+    """A bound in words; with a property's name for an explanation, else as a line of its rules."""
+    steps = f"  ({_steps(bound.steps)})" if bound.steps and not prop else ""
+    head = "" if prop else "then "
     if bound.kind == "change within":
         return f"the change within {bound.value:.{digits}g} and {bound.most:.{digits}g}"
     if bound.kind == "if":
-        return f"then if {condition_text(bound.tests)}: {bound.value:.{digits}g}{steps}"
-    return f"then {bound.kind} {bound.value:.{digits}g}{steps}"
+        return f"{head}if {condition_text(bound.tests)}: {bound.value:.{digits}g}{steps}"
+    return f"{head}{bound.kind} {bound.value:.{digits}g}{steps}"
 
 
 def _role_lines(roles: Iterable[RuleRole]) -> list[str]:
