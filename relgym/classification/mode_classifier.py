@@ -108,7 +108,9 @@ class ModeClassifier:
         view, weights = self._current_view()
         return view, weights, self._voting.rank_view(view, self.counts, self._familiarity())
 
-    def experience(self) -> tuple[tuple[tuple[Context, tuple[str, ...], tuple[str, ...]], ...], frozenset[int]]:
+    def experience(
+        self,
+    ) -> tuple[tuple[tuple[Context, tuple[str, ...], tuple[str, ...]], ...], frozenset[int]]:
         """Binary and unary relations that clauses look at, by context, and the situations that were seen of them."""
         known, v = self._familiarity(), self.vocabulary
         names = tuple(

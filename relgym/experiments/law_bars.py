@@ -47,7 +47,9 @@ def _one_step(seeds: Sequence[int]) -> Rows:
         for name, values in (("wrong", [s.wrong for s in scores]), ("silent", [s.silent for s in scores])):
             measures.append(measured(f"experiment {experiment}: {name} of 24,000", 0, values))
         measures.append(measured(f"experiment {experiment}: sentences", 3, sorted(sentences)))
-        notes.append(model.describe(details=True, frame="world", incline=BALL_EXPERIMENTS[experiment].incline))
+        notes.append(
+            model.describe(details=True, frame="world", incline=BALL_EXPERIMENTS[experiment].incline)
+        )
     return "one step", measures, notes
 
 

@@ -274,7 +274,10 @@ def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, .
     atoms = _atoms(part, view, functions)
     allowed = _allowed(part, view, ranking.modes[:, 0])
     truth = np.array([atom.truth for atom in atoms]).T.reshape(len(view), len(atoms))
-    cost = [1 + len(atom.test.clause) + (atom.test.context == "all" and atom.test.clause.variables > 1) for atom in atoms]
+    cost = [
+        1 + len(atom.test.clause) + (atom.test.context == "all" and atom.test.clause.variables > 1)
+        for atom in atoms
+    ]
     nobody = part.classifier.exemplars.assigned == UNKNOWN
     rules = decision_list(truth, allowed, weights, cost, doubtful=nobody, budget=DOUBT)
     found: list[Branch] = []

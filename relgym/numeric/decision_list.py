@@ -100,7 +100,9 @@ def decision_list(
     usual = np.argsort(-(labels * heavy[:, None]).sum(axis=0), kind="stable")[:DEFAULTS]
     for default in usual[labels.any(axis=0)[usual]].tolist():
         for by_weight in (True, False):
-            rules = table.pruned(_covered(table, heavy if by_weight else np.ones(len(heavy)), default), default)
+            rules = table.pruned(
+                _covered(table, heavy if by_weight else np.ones(len(heavy)), default), default
+            )
             drafts.append((table.price(rules), -float(heavy[labels[:, default]].sum()), default, rules))
     drafts.sort(key=lambda each: each[:3])
     found = []
@@ -109,8 +111,6 @@ def decision_list(
         found.append((table.price(better), share, default, better))
     _, _, default, rules = min(found, key=lambda each: each[:3])
     return _weighed(table, rules, default)
-
-
 
 
 def _distinct(
@@ -286,7 +286,9 @@ def _variants(rules: list[_Draft]) -> Iterator[list[_Draft]]:
         moved = [*rest[:j], rules[i], *rest[j:]]
         yield moved
         if rules[i][1] == rules[j][1]:
-            yield [(rules[j][0], label) if k == i else (tests, label) for k, (tests, label) in enumerate(rules)]
+            yield [
+                (rules[j][0], label) if k == i else (tests, label) for k, (tests, label) in enumerate(rules)
+            ]
             yield [(rules[j][0], r[1]) if k == j else r for k, r in enumerate(moved)]
 
 

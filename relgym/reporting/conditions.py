@@ -17,7 +17,16 @@ from relgym.errors import ConfigError
 from relgym.logic.clause import ANY, Clause, Literal
 from relgym.reporting.functions import Sum, parse_sum, split_outside
 
-__all__ = ["CONTEXTS", "Condition", "Test", "condition_text", "equal_to", "parse_condition", "parts_of", "tests_of"]
+__all__ = [
+    "CONTEXTS",
+    "Condition",
+    "Test",
+    "condition_text",
+    "equal_to",
+    "parse_condition",
+    "parts_of",
+    "tests_of",
+]
 
 CONTEXTS: Final = {"approached": "struck", "touching": "close", "all": ""}
 """Words for the objects that a variable ranges over."""
@@ -204,7 +213,9 @@ def _parse_test(text: str, arity: int) -> Test:
         literals = _literals(match["body"], context, text)
         clause = Clause(tuple(literals), arity)
         if clause.variables != arity + len(names):
-            raise ConfigError(f"condition {text!r}: expected {', '.join(names)} and no others to be used in it")
+            raise ConfigError(
+                f"condition {text!r}: expected {', '.join(names)} and no others to be used in it"
+            )
         return Test(clause, context, match["sign"] == "no")
     negated = text.startswith("not ")
     bare = text.removeprefix("not ")

@@ -373,9 +373,7 @@ def _bounded(part: PropertyRules, bound: Bound, sight: Sight, index: int, values
     return np.where(reached, bound.value, values)
 
 
-def bounds_reached(
-    part: PropertyRules, sight: Sight, index: int, function: Sum
-) -> tuple[Bound, ...]:
+def bounds_reached(part: PropertyRules, sight: Sight, index: int, function: Sum) -> tuple[Bound, ...]:
     """Bounds that change what a function says of the only scene there is."""
     numbers, _ = _cast(part, sight, index, function)
     values = function.values(sight._reader(index, numbers), np.empty(len(sight)))

@@ -89,7 +89,9 @@ def parse_sum(text: str) -> Sum:
         else:
             terms.append((sign, piece))
         if terms and (terms[-1][1][0].isdigit() or terms[-1][1][0] in "+-"):
-            raise ConfigError(f"function {text!r}: expected a name in term {number + 1}, got {terms[-1][1]!r}")
+            raise ConfigError(
+                f"function {text!r}: expected a name in term {number + 1}, got {terms[-1][1]!r}"
+            )
     return Sum(tuple(terms), constant)
 
 

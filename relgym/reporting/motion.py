@@ -68,9 +68,13 @@ class MotionRules:
                 rows += self._axis(letter, law, digits, alone=len(laws) == 1)
         lines = [HEADING, *_aligned(rows)]
         for (a, b), share in self.shares:
-            lines.append(f"  of a change between {a} A and {b} B, A takes {share.formula(digits)}, B the rest")
+            lines.append(
+                f"  of a change between {a} A and {b} B, A takes {share.formula(digits)}, B the rest"
+            )
         for (a, b), grip in self.pair.grips if self.pair else ():
-            lines.append(f"  of a change along t between {a} and {b}, velocities take {grip:.{digits}g}, spins the rest")
+            lines.append(
+                f"  of a change along t between {a} and {b}, velocities take {grip:.{digits}g}, spins the rest"
+            )
         if self.pair is not None:
             lines.append(f"  frame: {self.pair.frame}")
         return "\n".join([*lines, *_LEGEND])
@@ -144,7 +148,9 @@ def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
         if not said and not stats:
             lines.append(f"  {head}")
         elif not said:
-            lines.append(f"  {head.ljust(heads + width)}{'' if len(head) < heads + width else '  '}{stats}".rstrip())
+            lines.append(
+                f"  {head.ljust(heads + width)}{'' if len(head) < heads + width else '  '}{stats}".rstrip()
+            )
         else:
             lines.append(f"  {head.ljust(heads)}{said.ljust(width)}{stats}".rstrip())
     return lines
@@ -156,8 +162,12 @@ _FREE = re.compile(rf"  (?:(?P<type>\S+) touching nothing:)? +(?P<name>[^\s']+)'
 _AXIS = re.compile(
     rf"  touching(?: \((?P<kinds>.*?)\))?, (?P<where>.*?)(?: \(of the points that touch\))?:{_STATS}"
 )
-_PIECE = re.compile(r"    (?P<head>if|elif|else|always)(?P<tests>.*?): +v'_(?P<axis>\w) = (?P<piece>.*?)(?:  +# .*)?")
-_RIVAL = re.compile(r"    or, as good: v'_\w = (?P<operator>max|min)\((?P<pieces>.*)\); where they differ, .*")
+_PIECE = re.compile(
+    r"    (?P<head>if|elif|else|always)(?P<tests>.*?): +v'_(?P<axis>\w) = (?P<piece>.*?)(?:  +# .*)?"
+)
+_RIVAL = re.compile(
+    r"    or, as good: v'_\w = (?P<operator>max|min)\((?P<pieces>.*)\); where they differ, .*"
+)
 _TURN = re.compile(r"    where that turns the motion to v'_\w (?P<side>[<>]) 0: no prediction")
 _SHARE = re.compile(r"  of a change between (\S+) A and (\S+) B, A takes (.*), B the rest")
 _GRIP = re.compile(r"  of a change along t between (\S+) and (\S+), velocities take (\S+), spins the rest")
@@ -199,7 +209,9 @@ def parse_motion(lines: list[str]) -> MotionRules:
             if match["n"]:
                 counts[kind], tolerance = (_int(match["n"]), _int(match["bad"])), float(match["tol"])
         else:
-            raise ConfigError(f"laws of motion: expected a law, a piece, a share or a frame, got {line.strip()!r}")
+            raise ConfigError(
+                f"laws of motion: expected a law, a piece, a share or a frame, got {line.strip()!r}"
+            )
     pair = None
     if axes:
         laws = tuple(tuple(_axis_law(each) for each in found) for found in axes.values())

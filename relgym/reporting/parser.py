@@ -129,8 +129,10 @@ def _blocks(text: str) -> Iterator[list[str]]:
 
 def _continues(block: list[str], line: str) -> bool:
     """Whether a line belongs to the head, the only block whose lines aren't indented."""
-    return block[0].startswith(("Learned", "No targets")) and line != HEADING and not (
-        line in ("Declared kinematics", SEEN) or _TARGET.fullmatch(line)
+    return (
+        block[0].startswith(("Learned", "No targets"))
+        and line != HEADING
+        and not (line in ("Declared kinematics", SEEN) or _TARGET.fullmatch(line))
     )
 
 
@@ -140,7 +142,9 @@ def _head(lines: list[str]) -> tuple[int, tuple[tuple[str, int, int], ...], str]
         return _int(nothing[1]), (), ""
     learned = _LEARNED.match(text)
     if learned is None:
-        raise ConfigError(f"rules: expected 'Learned from N transitions.' at the beginning, got {text[:60]!r}")
+        raise ConfigError(
+            f"rules: expected 'Learned from N transitions.' at the beginning, got {text[:60]!r}"
+        )
     scope = _SCOPE.search(text)
     counts = [] if scope is None else [_COUNT.fullmatch(part) for part in scope[1].split(", ")]
     return _int(learned[1]), tuple((c[1], int(c[2]), int(c[3] or c[2])) for c in counts if c), agreement
@@ -197,7 +201,9 @@ def _read(draft: _Draft, lines: list[str]) -> None:
             whole = _joined(last.function, text)
             draft.branches[-1] = replace(last, function=whole)
         elif not _bound(draft, text) and not _rest(draft, text):
-            raise ConfigError(f"rules of {draft.type}.{draft.property}: expected a branch or a name, got {text!r}")
+            raise ConfigError(
+                f"rules of {draft.type}.{draft.property}: expected a branch or a name, got {text!r}"
+            )
 
 
 def _joined(function: Sum | None, text: str) -> Sum:
@@ -214,7 +220,9 @@ def _branch(draft: _Draft, head: str, fields: list[str]) -> None:
     condition = re.sub(r"^(if|elif) |^(else|always)$", "", head[:-1])
     numbers = [match for stat in stats if (match := _STEPS.fullmatch(stat))]
     spreads = [float(stat[2:]) for stat in stats if stat.startswith("± ")]
-    branch = Branch((), None, steps=_int(numbers[0][1]) if numbers else 0, spread=spreads[0] if spreads else 0.0)
+    branch = Branch(
+        (), None, steps=_int(numbers[0][1]) if numbers else 0, spread=spreads[0] if spreads else 0.0
+    )
     if said.startswith("no prediction"):
         branch = replace(branch, reason=said.removeprefix("no prediction").strip(" ()"))
     else:

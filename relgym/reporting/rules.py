@@ -23,7 +23,20 @@ from relgym.reporting.motion import MotionRules
 if TYPE_CHECKING:
     from relgym.scene.objects import Scene, SceneLayout
 
-__all__ = ["SEEN", "Bound", "Branch", "Derivation", "Experience", "PropertyRules", "RuleList", "RuleRole", "bound_text", "scope_text", "seen_of", "steps_text"]
+__all__ = [
+    "SEEN",
+    "Bound",
+    "Branch",
+    "Derivation",
+    "Experience",
+    "PropertyRules",
+    "RuleList",
+    "RuleRole",
+    "bound_text",
+    "scope_text",
+    "seen_of",
+    "steps_text",
+]
 
 WIDTH = 96
 """Longest line, in characters, if its parts allow it."""
@@ -32,7 +45,9 @@ SEEN = "Situations seen; in others there is no prediction"
 """First line of the block of fingerprints."""
 
 _NAME = re.compile(r"[^\W\d][\w-]*( [^\W\d][\w-]*)*")
-_RESERVED = frozenset({"if", "elif", "else", "then", "and", "or", "not", "some", "no", "the", "any", "where", "where"})
+_RESERVED = frozenset(
+    {"if", "elif", "else", "then", "and", "or", "not", "some", "no", "the", "any", "where", "where"}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +231,9 @@ class PropertyRules:
         lines += [f"  {bound_text(bound, '', digits)}" for bound in self.bounds]
         if self.unexplained and self.branches:
             share = 100.0 * self.unexplained / max(self.steps, 1)
-            lines.append(f"  {self.unexplained:,} of these steps ({share:.2g} %) follow none of these functions")
+            lines.append(
+                f"  {self.unexplained:,} of these steps ({share:.2g} %) follow none of these functions"
+            )
         told = [*_role_lines(self.roles), *_name_lines(self.branches)]
         if told:
             lines += ["", *told]
@@ -364,7 +381,9 @@ class RuleList:
         if re.search(r"\b(some|no) [B-Z](, [B-Z])* \[", text):
             lines.append("some B, no B: among all objects of the scene.")
         if any(len(p.branches) > 1 for p in self.properties):
-            lines.append("Branches are tried in order; steps: training steps that go by a branch; ±: what it leaves there.")
+            lines.append(
+                "Branches are tried in order; steps: training steps that go by a branch; ±: what it leaves there."
+            )
         return "\n".join(f"# {line}" for line in lines)
 
 
@@ -472,7 +491,9 @@ def _name_lines(branches: Iterable[Branch]) -> list[str]:
     for name, text in named.items():
         for number, case in enumerate(split_outside(text, " or ")):
             first, *rest = _filled(split_outside(case, " and "), WIDTH - width - 10)
-            lines.append(f"  {name.ljust(width)} := {first}" if not number else f"  {' ' * width}  | or {first}")
+            lines.append(
+                f"  {name.ljust(width)} := {first}" if not number else f"  {' ' * width}  | or {first}"
+            )
             lines += [f"  {' ' * width}  |    {line}" for line in rest]
     return lines
 
