@@ -288,7 +288,7 @@ class _Seen:
         values = self.part.mode_values(percept, self.index, self.following.vector)
         by_mode = dict(zip(self.part.classifier.modes, values, strict=True))
         for verdict in self.part.classifier.explain(example, values):
-            other = verdict.rival if verdict.winner == one.mode else verdict.winner
+            other = verdict.runner_up if verdict.winner == one.mode else verdict.winner
             if other != one.mode and not np.isclose(by_mode[other], one.value, rtol=CLOSE, atol=0.0):
                 mode = self.part.mode(other)
                 function = mode.formula(self.digits)

@@ -23,10 +23,10 @@ from relgym.clustering.mode import Mode
 from relgym.laws.frames import axis_names
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause, Literal
-from relgym.numeric.decision_list import Rule, decision_list
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.property_model import PropertyModel
 from relgym.model.spread import ROUNDING
+from relgym.numeric.decision_list import Rule, decision_list
 from relgym.numeric.tree import DecisionTree
 from relgym.reporting.conditions import Condition, Test, equal_to, parts_of, tests_of
 from relgym.reporting.functions import Sum, parse_sum
@@ -104,15 +104,15 @@ def agreement(model: WorldModel, rules: RuleList, scenes: Iterable[Scene]) -> tu
             rule = said.get((name, prop), np.full(len(vectors), np.nan))
             pair = np.stack([value, rule, vectors[:, column]])
             pairs.setdefault((layout.types[index].name, prop), []).append(pair)
-    total = same = silent = 0
+    total = same = abstained = 0
     for parts in pairs.values():
         value, rule, now = np.concatenate(parts, axis=1)
         equal, none = _same(value, rule, now)
-        total, same, silent = total + len(now), same + int(equal.sum()), silent + int(none.sum())
+        total, same, abstained = total + len(now), same + int(equal.sum()), abstained + int(none.sum())
     steps = sum(len(rows) for _, rows in groups.values())
     share = same / total if total else 1.0
     text = f"on {steps:,} steps these rules say what the model says of {100.0 * _floor(share):.5g} % of {total:,} values"
-    text += f"; both make no prediction of {silent:,} of them" if silent else ""
+    text += f"; both make no prediction of {abstained:,} of them" if abstained else ""
     return replace(rules, agreement=f"{text}."), share
 
 

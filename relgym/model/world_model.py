@@ -25,11 +25,11 @@ from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.rules import doubted, rule_list
+from relgym.model.scenes import with_action
+from relgym.model.storage import read_model, write_model
 from relgym.reporting.naming import named_text
 from relgym.reporting.parser import parse_rules
 from relgym.reporting.rules import RuleList
-from relgym.model.scenes import with_action
-from relgym.model.storage import read_model, write_model
 from relgym.scene.objects import ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 
@@ -393,7 +393,7 @@ class WorldModel:
         return tuple(known[str(t)] for t in self.targets if str(t) in known)
 
     def explain(self, scene: Scene) -> str:
-        """Why this prediction: mode, function, roles, clause and rival of every target."""
+        """Why this prediction: mode, function, roles, clause and runner-up of every target."""
         from relgym.model.explain import explain
 
         return explain(self, scene)

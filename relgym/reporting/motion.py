@@ -21,7 +21,7 @@ from relgym.scene.schema import SceneSchema
 __all__ = ["HEADING", "MotionRules", "parse_motion", "piece_word"]
 
 HEADING: Final = "Laws of motion"
-"""First line of the block."""
+"""First line of the episode."""
 
 _SIGN: Final[dict[Operator, str]] = {"max": ">", "min": "<"}
 _WIDTH = 34
@@ -175,7 +175,7 @@ _POWER = re.compile(r"(?P<name>\w+)_B(?:\^(?P<power>\d))? / \(.*\)")
 
 
 def parse_motion(lines: list[str]) -> MotionRules:
-    """Read the lines of a block of laws; `ConfigError` where one says nothing."""
+    """Read the lines of an episode of laws; `ConfigError` where one says nothing."""
     free: dict[str, list[tuple[str, Piece]]] = {}
     counts: dict[str, tuple[int, int]] = {}
     axes: dict[str, list[dict[str, Any]]] = {}

@@ -89,48 +89,48 @@ def parse_rules(text: str) -> RuleList:
     ConfigError
         A line that says nothing in this language; the message quotes it.
     """
-    head, *blocks = list(_blocks(text))
+    head, *episodes = list(_episodes(text))
     transitions, scope, agreement = _head(head)
     found = RuleList(transitions, scope, agreement=agreement)
-    for block in blocks:
-        first = block[0]
+    for episode in episodes:
+        first = episode[0]
         if first == HEADING:
-            found = replace(found, motion=parse_motion(block))
+            found = replace(found, motion=parse_motion(episode))
         elif first == "Declared kinematics":
-            found = replace(found, kinematics=tuple(map(_derivation, block[1:])))
+            found = replace(found, kinematics=tuple(map(_derivation, episode[1:])))
         elif first == SEEN:
-            found = replace(found, properties=_experienced(found.properties, block[1:]))
+            found = replace(found, properties=_experienced(found.properties, episode[1:]))
         elif (match := _TARGET.fullmatch(first)) is not None:
             draft = _Draft(match["type"], match["property"], _int(match["steps"]))
-            _read(draft, block[1:])
+            _read(draft, episode[1:])
             found = replace(found, properties=(*found.properties, draft.rules()))
         else:
             raise ConfigError(f"rules: expected a property such as ball.vx'  (16 steps), got {first!r}")
     return found
 
 
-def _blocks(text: str) -> Iterator[list[str]]:
-    """Blocks of lines: each begins with one that isn't indented. Continued lines are joined, comments left out."""
-    block: list[str] = []
+def _episodes(text: str) -> Iterator[list[str]]:
+    """Episodes of lines: each begins with one that isn't indented. Continued lines are joined, comments left out."""
+    episode: list[str] = []
     for line in text.rstrip().split("\n"):
         stripped = line.strip()
         if not stripped or stripped.startswith("#"):
             continue
-        if stripped.startswith("| ") and block:
-            block[-1] += f" {stripped[2:].strip()}"
-        elif line[0] != " " and block and not _continues(block, line):
-            yield block
-            block = [line.rstrip()]
+        if stripped.startswith("| ") and episode:
+            episode[-1] += f" {stripped[2:].strip()}"
+        elif line[0] != " " and episode and not _continues(episode, line):
+            yield episode
+            episode = [line.rstrip()]
         else:
-            block.append(line.rstrip())
-    if block:
-        yield block
+            episode.append(line.rstrip())
+    if episode:
+        yield episode
 
 
-def _continues(block: list[str], line: str) -> bool:
-    """Whether a line belongs to the head, the only block whose lines aren't indented."""
+def _continues(episode: list[str], line: str) -> bool:
+    """Whether a line belongs to the head, the only episode whose lines aren't indented."""
     return (
-        block[0].startswith(("Learned", "No targets"))
+        episode[0].startswith(("Learned", "No targets"))
         and line != HEADING
         and not (line in ("Declared kinematics", SEEN) or _TARGET.fullmatch(line))
     )

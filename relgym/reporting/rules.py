@@ -42,7 +42,7 @@ WIDTH = 96
 """Longest line, in characters, if its parts allow it."""
 
 SEEN = "Situations seen; in others there is no prediction"
-"""First line of the block of fingerprints."""
+"""First line of the episode of fingerprints."""
 
 _NAME = re.compile(r"[^\W\d][\w-]*( [^\W\d][\w-]*)*")
 _RESERVED = frozenset(
