@@ -116,13 +116,31 @@ def learn(
 def rules(
     model: ModelFile,
     digits: Annotated[int, typer.Option(help="Significant digits of coefficients.", min=1, max=17)] = 7,
+    details: Annotated[bool, typer.Option(help="Tables of modes, clauses of each pair, and roles.")] = False,
+    check: Annotated[
+        str | None,
+        typer.Option(metavar="ENV", help="Measure on fresh steps of an env how well the text agrees."),
+    ] = None,
+    arg: Arguments = None,
+    steps: Annotated[int, typer.Option(help="So many steps for --check.", min=1)] = 2000,
+    seed: Seed = _FRESH,
     as_json: Json = False,
 ) -> None:
-    """Print a model: modes, functions, clauses, roles."""
+    """Print a model as rules: if, elif, else."""
     from relgym.model.world_model import WorldModel
+    from relgym.wrappers.follower import scenes_of
+    from relgym.wrappers.views import view_of
 
     loaded = WorldModel.load(model)
-    _echo_json(_report(loaded, digits)) if as_json else typer.echo(loaded.describe(digits=digits))
+    if as_json:
+        _echo_json(_report(loaded, digits))
+        return
+    scenes = None
+    if check is not None:
+        env: Any = _make(check, arg)
+        view = view_of(env, None if env.has_wrapper_attr("schema") else loaded.extra.get("view"))
+        scenes = scenes_of(env, view, steps, seed=seed)
+    typer.echo(loaded.describe(details=details, digits=digits, check=scenes))
 
 
 @app.command()

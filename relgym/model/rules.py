@@ -28,7 +28,7 @@ from relgym.model.property_model import PropertyModel
 from relgym.model.spread import ROUNDING
 from relgym.numeric.decision_list import Rule, decision_list
 from relgym.numeric.tree import DecisionTree
-from relgym.reporting.conditions import Condition, Test, equal_to, parts_of, tests_of
+from relgym.reporting.conditions import FLAG, Condition, Test, as_tests, equal_to, parts_of
 from relgym.reporting.functions import Sum, parse_sum
 from relgym.reporting.motion import MotionRules
 from relgym.reporting.naming import named
@@ -111,7 +111,8 @@ def agreement(model: WorldModel, rules: RuleList, scenes: Iterable[Scene]) -> tu
         total, same, abstained = total + len(now), same + int(equal.sum()), abstained + int(none.sum())
     steps = sum(len(rows) for _, rows in groups.values())
     share = same / total if total else 1.0
-    text = f"on {steps:,} steps these rules say what the model says of {100.0 * _floor(share):.5g} % of {total:,} values"
+    percent = f"{100.0 * _floor(share):.5g} %"
+    text = f"on {steps:,} steps these rules say what the model says of {percent} of {total:,} values"
     text += f"; both make no prediction of {abstained:,} of them" if abstained else ""
     return replace(rules, agreement=f"{text}."), share
 
@@ -160,7 +161,8 @@ def _motion(model: WorldModel) -> MotionRules | None:
 
 def _property(part: PropertyModel) -> PropertyRules:
     target = part.target
-    branches, roles = (), tuple[RuleRole, ...]()
+    branches: tuple[Branch, ...] = ()
+    roles: tuple[RuleRole, ...] = ()
     if part.classifier.modes:
         functions, roles = functions_of(part)
         branches = (*_beyond(part), *_branches(part, functions))
@@ -244,7 +246,7 @@ def _labels(
         definition = rules.get(kind)
         alternatives: tuple[Condition, ...] = ()
         if definition is not None:
-            alternatives = tuple(tests_of(clause, "all") for clause in definition.clauses)
+            alternatives = tuple(as_tests(clause, "all") for clause in definition.clauses)
         if not alternatives and len(places) == 1 and labels[places[0]] == kind.type:
             continue  # the only one there is
         key = (kind.type, len(places), alternatives)
@@ -273,7 +275,7 @@ def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, .
     view, weights, ranking = part.classifier.remembered()
     atoms = _atoms(part, view, functions)
     allowed = _allowed(part, view, ranking.modes[:, 0])
-    truth = np.array([atom.truth for atom in atoms]).T.reshape(len(view), len(atoms))
+    truth = np.array([atom.truth for atom in atoms], dtype=np.bool_).T.reshape(len(view), len(atoms))
     cost = [
         1 + len(atom.test.clause) + (atom.test.context == "all" and atom.test.clause.variables > 1)
         for atom in atoms
@@ -325,7 +327,7 @@ def _allowed(part: PropertyModel, view: View, winners: NDArray[np.int64]) -> NDA
     values = view.values
     said = values[np.arange(len(values)), place]
     slack = part.clusterer.scale.tolerance
-    agree = np.abs(values - said[:, None]) <= slack
+    agree: NDArray[np.bool_] = np.abs(values - said[:, None]) <= slack
     agree[np.arange(len(values)), place] = True
     counts = _counts(part)
     simple = np.array([(part.mode(m).parameters, -counts[m]) for m in modes], dtype=np.float64)
@@ -360,7 +362,7 @@ def tested(
         for piece in parts_of(clause):
             # What tests a function that can't be written out is left out.
             if not any(spelled.get(literal.relation) == "" for literal in piece):
-                yield piece, _as_test(piece, classifier.context, spelled)
+                yield piece, _as_test(piece, classifier.context, spelled, part.flags)
 
 
 def _clauses(classifier: BinaryClassifier) -> Iterator[Clause]:
@@ -385,13 +387,23 @@ def _clauses(classifier: BinaryClassifier) -> Iterator[Clause]:
                 yield Clause((*clause.literals, literal))
 
 
-def _as_test(clause: Clause, context: str, spelled: dict[str, str]) -> Test:
+def _as_test(clause: Clause, context: str, spelled: dict[str, str], flags: frozenset[str]) -> Test:
     """A clause as a test, modes' functions written out."""
     literals = tuple(
-        _simplified(spelled[each.relation], each) if each.relation in spelled else each
+        _simplified(spelled[each.relation], each) if each.relation in spelled else _flagged(each, flags)
         for each in clause.literals
     )
-    return tests_of(Clause(literals, clause.arity), context)[0]
+    return as_tests(Clause(literals, clause.arity), context)[0]
+
+
+def _flagged(literal: Literal, flags: frozenset[str]) -> Literal:
+    """A comparison with digits that people can read; that of a flag with a half is told as a relation."""
+    if literal.op is None:
+        return literal
+    if literal.relation not in flags or literal.args or literal.threshold != 0.5:
+        threshold = float(f"{literal.threshold:.{_EXACT}g}")
+        return Literal(literal.relation, literal.args, literal.negated, literal.op, threshold)
+    return Literal(f"{literal.relation}{FLAG}", (), literal.negated, literal.op, 0.5)
 
 
 def _simplified(text: str, literal: Literal) -> Literal:
@@ -464,10 +476,12 @@ def _beyond(part: PropertyModel) -> tuple[Branch, ...]:
     if tree is None:
         return ()
     leaves = [leaf for leaf in tree.leaves if not tree.says_yes(leaf)]
-    return tuple(Branch((_path(tree, leaf),), None, reason="unexplained there") for leaf in leaves)
+    return tuple(
+        Branch((_path(tree, leaf, part.flags),), None, reason="unexplained there") for leaf in leaves
+    )
 
 
-def _path(tree: DecisionTree, leaf: int) -> Condition:
+def _path(tree: DecisionTree, leaf: int, flags: frozenset[str]) -> Condition:
     """Tests on the way to a leaf."""
     parents = {}
     for node, column in enumerate(tree.column):
@@ -477,7 +491,7 @@ def _path(tree: DecisionTree, leaf: int) -> Condition:
     while leaf in parents:
         leaf, op = parents[leaf]
         literal = Literal(tree.columns[tree.column[leaf]], (), False, op, tree.threshold[leaf])
-        tests += tests_of(Clause((literal,)), "all")
+        tests += as_tests(Clause((_flagged(literal, flags),)), "all")
     return tuple(reversed(tests))
 
 
@@ -493,8 +507,8 @@ def _bounds(part: PropertyModel) -> Iterator[Bound]:
         led = Sum(((1.0, stop.property), (stop.step, rate)))
         sign = 1.0 if stop.side < 0.0 else -1.0
         text = Sum(tuple((sign * w, name) for w, name in led.terms)).text(_EXACT)
-        tests = tests_of(Clause((Literal(text, (), False, "<=", sign * stop.bound),)), "all")
+        tests = as_tests(Clause((Literal(text, (), False, "<=", sign * stop.bound),)), "all")
         yield Bound("if", stop.value, tests=tests, steps=counts[stop.mode])
     for landing in part.stops.landings:
-        tests = tests_of(Clause((equal_to(f"{landing.property}'", landing.at + 0.0, landing.slack),)), "all")
+        tests = as_tests(Clause((equal_to(f"{landing.property}'", landing.at + 0.0, landing.slack),)), "all")
         yield Bound("if", landing.value, tests=tests, steps=counts[landing.mode])

@@ -98,7 +98,7 @@ def decision_list(
     )
     drafts = []
     usual = np.argsort(-(labels * heavy[:, None]).sum(axis=0), kind="stable")[:DEFAULTS]
-    for default in usual[labels.any(axis=0)[usual]].tolist():
+    for default in [k for k in usual.tolist() if labels[:, k].any()]:
         for by_weight in (True, False):
             rules = table.pruned(
                 _covered(table, heavy if by_weight else np.ones(len(heavy)), default), default
@@ -121,8 +121,8 @@ def _distinct(
     which = which.reshape(-1)
     votes = np.zeros((len(rows), allowed.shape[1]))
     np.add.at(votes, which, allowed * weights[:, None])
-    heavy = np.bincount(which, weights, minlength=len(rows))
-    labels = votes >= heavy[:, None] * (1.0 - 1e-9)
+    heavy: _Floats = np.bincount(which, weights, minlength=len(rows)).astype(np.float64)
+    labels: _Bools = votes >= heavy[:, None] * (1.0 - 1e-9)
     none = ~labels.any(axis=1)
     labels[none] = votes[none] >= votes[none].max(axis=1, keepdims=True)
     unsure = np.ones(len(rows), dtype=np.bool_)
@@ -156,10 +156,9 @@ class _Table:
 
     def where(self, tests: tuple[int, ...]) -> _Bools:
         """Rows of which some tests hold."""
-        known = self._masks.get(tests)
-        if known is None:
-            known = self._masks[tests] = self.literals[:, tests].all(axis=1)
-        return known
+        if tests not in self._masks:
+            self._masks[tests] = np.logical_and.reduce(self.literals[:, tests], axis=1)
+        return self._masks[tests]
 
     def price(self, rules: Sequence[_Draft]) -> float:
         """What it costs to write down the rules; one more case of the rule before it is cheap."""
@@ -244,8 +243,8 @@ def _conjunction(
         pure = (wrong == 0.0) & (gain > 0.0)
         if pure.any():
             value = np.where(pure, gain / (2.0 + price), -np.inf)
-            row, k = np.unravel_index(int(np.argmax(value)), value.shape)
-            return float(value[row, k]), tuple(sorted((*beam[row], int(k))))
+            row, k = divmod(int(np.argmax(value)), count)
+            return float(value[row, k]), tuple(sorted((*beam[row], k)))
         # What holds of most rows that it gains, and of few others, is promising.
         promise = np.log2(1.0 + gain) - 2.0 * np.log2(1.0 + wrong) - 0.25 * price
         promise[gain <= 0.0] = -np.inf

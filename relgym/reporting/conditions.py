@@ -21,15 +21,18 @@ __all__ = [
     "CONTEXTS",
     "Condition",
     "Test",
+    "as_tests",
     "condition_text",
     "equal_to",
     "parse_condition",
     "parts_of",
-    "tests_of",
 ]
 
 CONTEXTS: Final = {"approached": "struck", "touching": "close", "all": ""}
 """Words for the objects that a variable ranges over."""
+
+FLAG: Final = "?"
+"""Marks the name of a number that is 1 or 0 as something holds or not; it is told as a relation is."""
 
 _BY_WORD: Final = {word: context for context, word in CONTEXTS.items()}
 _FLIPPED: Final = {"<=": ">", ">": "<="}
@@ -71,7 +74,7 @@ class Test:
     @property
     def opposite(self) -> Test:
         """The test that holds where this one doesn't, and nowhere else."""
-        return tests_of(self.clause, self.context, negated=not self.negated)[0]
+        return as_tests(self.clause, self.context, negated=not self.negated)[0]
 
     def __str__(self) -> str:
         return self.text
@@ -81,7 +84,7 @@ Condition = tuple[Test, ...]
 """A conjunction; an empty one holds always."""
 
 
-def tests_of(clause: Clause, context: str, *, negated: bool = False) -> Condition:
+def as_tests(clause: Clause, context: str, *, negated: bool = False) -> Condition:
     """A clause, or its negation, as tests in normal form.
 
     A clause whose parts share no variable becomes several tests. What says that nothing is so becomes ``no B [...]``.
@@ -162,6 +165,8 @@ def _plain(literal: Literal) -> str:
         name = f"{name}({', '.join(map(_name, literal.args))})"
     if literal.op is None:
         return name
+    if name.endswith(FLAG):
+        return name.removesuffix(FLAG) if literal.op == ">" else f"not {name.removesuffix(FLAG)}"
     equal = _EQUAL.fullmatch(name)
     if equal and literal.op == "<=" and literal.threshold == 0.0:
         sign = "-" if equal["sign"] == "+" else ""
@@ -226,7 +231,7 @@ def _parse_test(text: str, arity: int) -> Test:
     if " != " in bare:
         name, value = bare.rsplit(" != ", 1)
         return Test(Clause((equal_to(name, _number(value, text)),), arity), "all", True)
-    return Test(Clause((_parse_literal(bare, text),), arity), "all", negated)
+    return as_tests(Clause((_parse_literal(bare, text),), arity), "all", negated=negated)[0]
 
 
 def _literals(body: str, context: str, whole: str) -> list[Literal]:
@@ -234,8 +239,9 @@ def _literals(body: str, context: str, whole: str) -> list[Literal]:
     for part in split_outside(body, " and "):
         inner = _QUANTIFIER.fullmatch(part)
         if inner is None:
-            literal = _parse_literal(part.removeprefix("not "), whole)
-            negated = part.startswith("not ")
+            literal, negated = _parse_literal(part.removeprefix("not "), whole), part.startswith("not ")
+            if negated and literal.relation.endswith(FLAG):
+                literal, negated = Literal(literal.relation, (), False, "<=", literal.threshold), False
             found.append(Literal(literal.relation, literal.args, negated, literal.op, literal.threshold))
             continue
         if inner["sign"] != "no" or _BY_WORD[inner["word"] or ""] != context:
@@ -260,9 +266,11 @@ def _parse_literal(text: str, whole: str) -> Literal:
         name, value = text.rsplit(" = ", 1)
         return equal_to(name, _number(value, whole))
     relation, args = _called(text)
-    if not args:
+    if args:
+        return Literal(relation, args)
+    if not re.fullmatch(r"[^\s()\[\]]+", text):
         raise ConfigError(f"condition {whole!r}: expected a relation such as touching(A, B), got {text!r}")
-    return Literal(relation, args)
+    return Literal(f"{text}{FLAG}", (), False, ">", 0.5)
 
 
 def _called(text: str) -> tuple[str, tuple[int, ...]]:

@@ -15,18 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import SchemaError
+from relgym.laws.book import LawBook
 from relgym.laws.touching import Contacts
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause
 from relgym.logic.facts import Facts
 from relgym.logic.situations import mixed, situation
 from relgym.reporting.conditions import Condition, Test
-from relgym.reporting.functions import Sum, evaluated
+from relgym.reporting.functions import Column, Sum, evaluated
+from relgym.reporting.motion import MotionRules
 from relgym.reporting.rules import Bound, Experience, PropertyRules, RuleList, RuleRole
 from relgym.scene.objects import SceneLayout
 from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
-from relgym.scene.surroundings import surroundings
+from relgym.scene.surroundings import Surroundings, surroundings
 
 __all__ = ["Evaluated", "Sight", "bounds_reached", "branches_of", "evaluate", "holds"]
 
@@ -80,7 +82,7 @@ class Sight:
     vectors: _Floats
     following: _Floats
     _facts: dict[tuple[int, str], Facts] = field(default_factory=dict)
-    _numbers: dict[int, dict[str, _Floats]] = field(default_factory=dict)
+    _seen: dict[int, Surroundings] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.extractor = _extractor(self.schema)
@@ -105,7 +107,10 @@ class Sight:
     def holds(self, index: int, test: Test, numbers: Mapping[str, _Floats] | None = None) -> _Bools:
         """Whether a test holds for an object, shape ``(n,)``; `numbers` are next values not yet in `following`."""
         rows = np.arange(len(self))
-        return self._matches(index, test.clause, test.context, (rows,), numbers or {}) != test.negated
+        found: _Bools = (
+            self._matches(index, test.clause, test.context, (rows,), numbers or {}) != test.negated
+        )
+        return found
 
     def fulfils(self, index: int, condition: Condition, body: int) -> _Bools:
         """Whether a condition of A, an object, and B, a body by number, holds; shape ``(n,)``."""
@@ -160,10 +165,12 @@ class Sight:
                 numeric[name] = self._pair(index, name) if embodied else np.full((len(self), 1), np.nan)
                 relative.add(name)
             else:
-                numeric[name] = evaluated(name, self._reader(index, numbers), np.empty(len(self)))
+                numeric[name] = evaluated(name, self.reader(index, numbers), np.empty(len(self)))
         return Facts(relations, self._shown(index, context, count), numeric, frozenset(relative))
 
-    def _reader(self, index: int, numbers: Mapping[str, _Floats]):  # type: ignore[no-untyped-def]
+    def reader(self, index: int, numbers: Mapping[str, _Floats]) -> Column:
+        """How functions read properties as an object sees them; `numbers` go before."""
+
         def read(name: str) -> _Floats:
             return numbers[name] if name in numbers else self.column(index, name)
 
@@ -187,14 +194,12 @@ class Sight:
         seen = self._around(index)
         return seen.close if context == "touching" or seen.struck is None else seen.struck
 
-    def _around(self, index: int):  # type: ignore[no-untyped-def]
+    def _around(self, index: int) -> Surroundings:
         body = self.layout.bodies.index(index)
-        known = self._numbers.get(body)
-        if known is None:
-            known = self._numbers[body] = surroundings(  # type: ignore[assignment]
-                self.relations, body, tuple(self.extractor.features), offsets=self.schema.offsets
-            )
-        return known
+        if body not in self._seen:
+            features = tuple(self.extractor.features)
+            self._seen[body] = surroundings(self.relations, body, features, offsets=self.schema.offsets)
+        return self._seen[body]
 
     def _pair(self, index: int, name: str) -> _Floats:
         """A number of A and each other body, shape ``(n, K)``."""
@@ -270,7 +275,7 @@ def _move(rules: RuleList, sight: Sight, found: Evaluated, lost: dict[tuple[str,
 
 
 @lru_cache(maxsize=16)
-def _book(motion, schema):  # type: ignore[no-untyped-def]
+def _book(motion: MotionRules, schema: SceneSchema) -> LawBook:
     return motion.book(schema)
 
 
@@ -352,7 +357,7 @@ def _values(
         numbers, players = _cast(part, sight, index, function)
         for label, bodies in players.items():
             playing.setdefault(label, np.full(len(sight), -1, dtype=np.int64))[here] = bodies[here]
-        read = sight._reader(index, numbers)
+        read = sight.reader(index, numbers)
         values[here] = function.values(read, values)[here]
     if part.experience is not None:
         values[~sight.familiar(index, part.experience)] = np.nan
@@ -376,7 +381,7 @@ def _bounded(part: PropertyRules, bound: Bound, sight: Sight, index: int, values
 def bounds_reached(part: PropertyRules, sight: Sight, index: int, function: Sum) -> tuple[Bound, ...]:
     """Bounds that change what a function says of the only scene there is."""
     numbers, _ = _cast(part, sight, index, function)
-    values = function.values(sight._reader(index, numbers), np.empty(len(sight)))
+    values = function.values(sight.reader(index, numbers), np.empty(len(sight)))
     found = []
     for bound in part.bounds:
         after = _bounded(part, bound, sight, index, values)
@@ -451,13 +456,10 @@ def _levels(sight: Sight, index: int, role: RuleRole) -> NDArray[np.int64]:
 
 def _filled(roles: Sequence[RuleRole], levels: Sequence[NDArray[np.int64]]) -> tuple[int, ...] | None:
     """Body of every label, all of them together the best there are; None if there is none, or more than one way."""
-    best: tuple[int, tuple[int, ...]] | None = None
-    single = True
-    for cost, bodies in _fillings(roles, levels, frozenset()):
-        single = single and best is not None and cost != best[0] if best and cost == best[0] else single
-        if best is None or cost < best[0]:
-            best, single = (cost, bodies), True
-    return best[1] if best is not None and single else None
+    ways = sorted(_fillings(roles, levels, frozenset()))
+    if not ways or (len(ways) > 1 and ways[0][0] == ways[1][0]):
+        return None
+    return ways[0][1]
 
 
 def _fillings(

@@ -88,7 +88,7 @@ def parse_sum(text: str) -> Sum:
             terms.append((sign * float(head), rest))
         else:
             terms.append((sign, piece))
-        if terms and (terms[-1][1][0].isdigit() or terms[-1][1][0] in "+-"):
+        if terms and (terms[-1][1][0].isdigit() or set(terms[-1][1]) & set("+-")):
             raise ConfigError(
                 f"function {text!r}: expected a name in term {number + 1}, got {terms[-1][1]!r}"
             )
@@ -141,7 +141,9 @@ def registered(name: str) -> Callable[[NDArray[np.float64]], NDArray[np.float64]
 
 
 def evaluated(text: str, column: Column, like: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A number that conditions compare: a sum, its distance from a number ``|v - 0|``, or a product ``(v) * w``."""
+    """A number that conditions compare: a sum, a distance ``|v - 1|``, a product ``(v) * w``, or a flag."""
+    if text.endswith("?"):
+        return factor(text[:-1], column)
     if text.startswith("|") and text.endswith("|"):
         return np.abs(parse_sum(text[1:-1]).values(column, like))
     if text.startswith("(") and ") * " in text:

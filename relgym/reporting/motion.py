@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from relgym.errors import ConfigError
+from relgym.laws.account import happens
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
 from relgym.laws.frames import POINT
 from relgym.laws.records import ONE, AxisLaw, FreeLaw, Kind, Operator, PairLaw, Piece, Share
 from relgym.laws.text import DIRECTIONS
 from relgym.reporting.functions import parse_sum
-from relgym.scene.axes import Axes
 from relgym.scene.objects import Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["HEADING", "MotionRules", "parse_motion", "piece_word"]
+__all__ = ["HEADING", "MotionRules", "parse_motion"]
 
 HEADING: Final = "Laws of motion"
-"""First line of the episode."""
+"""First line of the section."""
 
 _SIGN: Final[dict[Operator, str]] = {"max": ">", "min": "<"}
 _WIDTH = 34
@@ -64,8 +65,8 @@ class MotionRules:
                 head = f"{law.type} touching nothing:" if not number else ""
                 rows.append((head, f"{name}' = {piece.formula(digits)}", count if not number else ""))
         for letter, laws in zip(self.letters, self.pair.axes if self.pair else (), strict=False):
-            for law in laws:
-                rows += self._axis(letter, law, digits, alone=len(laws) == 1)
+            for each in laws:
+                rows += self._axis(letter, each, digits, alone=len(laws) == 1)
         lines = [HEADING, *_aligned(rows)]
         for (a, b), share in self.shares:
             lines.append(
@@ -95,13 +96,17 @@ class MotionRules:
             word = "if  " if not number else "elif"
             tests = " and ".join(f"{text} {sign} {other}" for other in later)
             head = f"{word} {tests}:" if later else ("else:" if number else "always:")
-            yield f"  {head}", f"v'_{letter} = {text}", f"# {piece_word(piece, letter)}"
-        for operator, pieces in law.rivals:
+            yield f"  {head}", f"v'_{letter} = {text}", f"# {self._word(piece, letter)}"
+        for operator, pieces in law.alternatives:
             form = f"{operator}({', '.join(piece.formula(digits) for piece in pieces)})"
             yield f"  or, as good: v'_{letter} = {form}; where they differ, no prediction", "", ""
         for known, side in zip(law.signs, "<>", strict=True):
             if not known:
                 yield f"  where that turns the motion to v'_{letter} {side} 0: no prediction", "", ""
+
+    def _word(self, piece: Piece, letter: str) -> str:
+        moving, still = happens(piece, letter, math.inf, 0.0), happens(piece, letter, 0.0, 0.0)
+        return moving if moving == still else f"{moving}, or {still} where v_{letter} = 0"
 
     def book(self, schema: SceneSchema) -> LawBook:
         """The laws, ready to be asked of scenes of a schema."""
@@ -123,21 +128,6 @@ _LEGEND = (
     "  # v: velocity now; u: what the next one would be without this contact; v': what it is with it; all of them",
     "  # relative to the other body. J_n = v'_n - u_n is the impulse. Several contacts act until nothing changes.",
 )
-
-
-def piece_word(piece: Piece, letter: str) -> str:
-    """What happens where a piece holds."""
-    weights = dict(piece.terms)
-    own, free = f"v_{letter}", f"u_{letter}"
-    if piece.releases(free):
-        if len(weights) > 1:
-            return "friction slows the slip"
-        return "it lets go" if letter == "n" else "nothing acts"
-    if set(weights) == {own}:
-        return "it bounces; at rest, it stays so" if weights[own] < 0 else "it is slowed down"
-    if not weights:
-        return "it stops, or rests"
-    return "it is moved along" if set(weights) == {ONE} else "the contact acts"
 
 
 def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
@@ -165,7 +155,7 @@ _AXIS = re.compile(
 _PIECE = re.compile(
     r"    (?P<head>if|elif|else|always)(?P<tests>.*?): +v'_(?P<axis>\w) = (?P<piece>.*?)(?:  +# .*)?"
 )
-_RIVAL = re.compile(
+_OTHER = re.compile(
     r"    or, as good: v'_\w = (?P<operator>max|min)\((?P<pieces>.*)\); where they differ, .*"
 )
 _TURN = re.compile(r"    where that turns the motion to v'_\w (?P<side>[<>]) 0: no prediction")
@@ -174,55 +164,84 @@ _GRIP = re.compile(r"  of a change along t between (\S+) and (\S+), velocities t
 _POWER = re.compile(r"(?P<name>\w+)_B(?:\^(?P<power>\d))? / \(.*\)")
 
 
-def parse_motion(lines: list[str]) -> MotionRules:
-    """Read the lines of an episode of laws; `ConfigError` where one says nothing."""
-    free: dict[str, list[tuple[str, Piece]]] = {}
-    counts: dict[str, tuple[int, int]] = {}
-    axes: dict[str, list[dict[str, Any]]] = {}
-    shares: list[tuple[Kind, Share]] = []
-    grips: list[tuple[Kind, float]] = []
-    frame, tolerance, law, kind = "contact", 0.0, dict[str, Any](), ""
-    for line in lines[1:]:
+@dataclass
+class _Draft:
+    """Laws as far as they were read."""
+
+    free: dict[str, list[tuple[str, Piece]]] = field(default_factory=dict)
+    counts: dict[str, tuple[int, int]] = field(default_factory=dict)
+    axes: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    shares: list[tuple[Kind, Share]] = field(default_factory=list)
+    grips: list[tuple[Kind, float]] = field(default_factory=list)
+    frame: str = "contact"
+    tolerance: float = 0.0
+    law: dict[str, Any] = field(default_factory=dict)
+    kind: str = ""
+
+    def read(self, line: str) -> bool:
+        """Take up a line; whether it says something."""
+        if line.startswith("  frame: "):
+            self.frame = line.removeprefix("  frame: ")
+            return True
+        return self._of_axis(line) or self._between(line) or self._of_free(line)
+
+    def _of_axis(self, line: str) -> bool:
         if match := _AXIS.fullmatch(line):
             letter = next((c for c, text in DIRECTIONS.items() if text == match["where"]), match["where"][-1])
             kinds = tuple(_kind(k) for k in match["kinds"].split(", ")) if match["kinds"] else ()
-            law = {"pieces": [], "operator": "max", "kinds": kinds, "rivals": [], "signs": [True, True]}
-            law |= {"examples": _int(match["n"]), "unexplained": _int(match["bad"])}
-            axes.setdefault(letter, []).append(law)
-            tolerance = float(match["tol"] or tolerance)
-        elif law and (match := _PIECE.fullmatch(line)):
-            law["pieces"].append(_piece(match["piece"]))
-            law["operator"] = "min" if " < " in match["tests"] else law["operator"]
-        elif law and (match := _RIVAL.fullmatch(line)):
-            law["rivals"].append((match["operator"], tuple(map(_piece, match["pieces"].split(", ")))))
-        elif law and (match := _TURN.fullmatch(line)):
-            law["signs"]["<>".index(match["side"])] = False
-        elif match := _SHARE.fullmatch(line):
-            shares.append(((match[1], match[2]), _share(match[3])))
-        elif match := _GRIP.fullmatch(line):
-            grips.append(((match[1], match[2]), float(match[3])))
-        elif line.startswith("  frame: "):
-            frame = line.removeprefix("  frame: ")
-        elif match := _FREE.fullmatch(line):
-            kind = match["type"] or kind
-            free.setdefault(kind, []).append((match["name"], _piece(match["piece"])))
-            if match["n"]:
-                counts[kind], tolerance = (_int(match["n"]), _int(match["bad"])), float(match["tol"])
+            self.law = {"pieces": [], "operator": "max", "kinds": kinds, "others": [], "signs": [True, True]}
+            self.law |= {"examples": _int(match["n"]), "unexplained": _int(match["bad"])}
+            self.axes.setdefault(letter, []).append(self.law)
+            self.tolerance = float(match["tol"] or self.tolerance)
+        elif self.law and (match := _PIECE.fullmatch(line)):
+            self.law["pieces"].append(_piece(match["piece"]))
+            self.law["operator"] = "min" if " < " in match["tests"] else self.law["operator"]
+        elif self.law and (match := _OTHER.fullmatch(line)):
+            pieces = tuple(map(_piece, match["pieces"].split(", ")))
+            self.law["others"].append((match["operator"], pieces))
+        elif self.law and (match := _TURN.fullmatch(line)):
+            self.law["signs"]["<>".index(match["side"])] = False
         else:
+            return False
+        return True
+
+    def _between(self, line: str) -> bool:
+        if match := _SHARE.fullmatch(line):
+            self.shares.append(((match[1], match[2]), _share(match[3])))
+        elif match := _GRIP.fullmatch(line):
+            self.grips.append(((match[1], match[2]), float(match[3])))
+        return match is not None
+
+    def _of_free(self, line: str) -> bool:
+        if match := _FREE.fullmatch(line):
+            self.kind = match["type"] or self.kind
+            self.free.setdefault(self.kind, []).append((match["name"], _piece(match["piece"])))
+            if match["n"]:
+                self.counts[self.kind] = _int(match["n"]), _int(match["bad"])
+                self.tolerance = float(match["tol"])
+        return match is not None
+
+
+def parse_motion(lines: list[str]) -> MotionRules:
+    """Read the lines of a section of laws; `ConfigError` where one says nothing."""
+    draft = _Draft()
+    for line in lines[1:]:
+        if not draft.read(line):
             raise ConfigError(
                 f"laws of motion: expected a law, a piece, a share or a frame, got {line.strip()!r}"
             )
     pair = None
-    if axes:
-        laws = tuple(tuple(_axis_law(each) for each in found) for found in axes.values())
-        pair = PairLaw(frame, laws, 0.0, tuple(grips))
+    if draft.axes:
+        laws = tuple(tuple(_axis_law(each) for each in found) for found in draft.axes.values())
+        pair = PairLaw(draft.frame, laws, 0.0, tuple(draft.grips))
+    free = draft.free.items()
     return MotionRules(
-        tuple(FreeLaw(t, tuple(p for _, p in found), *counts.get(t, (0, 0))) for t, found in free.items()),
-        tuple((t, tuple(name for name, _ in found)) for t, found in free.items()),
+        tuple(FreeLaw(t, tuple(p for _, p in found), *draft.counts.get(t, (0, 0))) for t, found in free),
+        tuple((t, tuple(name for name, _ in found)) for t, found in free),
         pair,
-        "".join(axes),
-        tuple(shares),
-        tolerance,
+        "".join(draft.axes),
+        tuple(draft.shares),
+        draft.tolerance,
     )
 
 
@@ -231,7 +250,7 @@ def _axis_law(data: Mapping[str, Any]) -> AxisLaw:
         tuple(data["pieces"]),
         data["operator"],
         data["kinds"],
-        tuple(data["rivals"]),
+        tuple(data["others"]),
         tuple(data["signs"]),
         data["examples"],
         data["unexplained"],

@@ -89,48 +89,48 @@ def parse_rules(text: str) -> RuleList:
     ConfigError
         A line that says nothing in this language; the message quotes it.
     """
-    head, *episodes = list(_episodes(text))
+    head, *sections = list(_sections(text))
     transitions, scope, agreement = _head(head)
     found = RuleList(transitions, scope, agreement=agreement)
-    for episode in episodes:
-        first = episode[0]
+    for section in sections:
+        first = section[0]
         if first == HEADING:
-            found = replace(found, motion=parse_motion(episode))
+            found = replace(found, motion=parse_motion(section))
         elif first == "Declared kinematics":
-            found = replace(found, kinematics=tuple(map(_derivation, episode[1:])))
+            found = replace(found, kinematics=tuple(map(_derivation, section[1:])))
         elif first == SEEN:
-            found = replace(found, properties=_experienced(found.properties, episode[1:]))
+            found = replace(found, properties=_experienced(found.properties, section[1:]))
         elif (match := _TARGET.fullmatch(first)) is not None:
             draft = _Draft(match["type"], match["property"], _int(match["steps"]))
-            _read(draft, episode[1:])
+            _read(draft, section[1:])
             found = replace(found, properties=(*found.properties, draft.rules()))
         else:
             raise ConfigError(f"rules: expected a property such as ball.vx'  (16 steps), got {first!r}")
     return found
 
 
-def _episodes(text: str) -> Iterator[list[str]]:
-    """Episodes of lines: each begins with one that isn't indented. Continued lines are joined, comments left out."""
-    episode: list[str] = []
+def _sections(text: str) -> Iterator[list[str]]:
+    """Sections of lines: each begins with one that isn't indented. Continued lines are joined, comments left out."""
+    section: list[str] = []
     for line in text.rstrip().split("\n"):
         stripped = line.strip()
         if not stripped or stripped.startswith("#"):
             continue
-        if stripped.startswith("| ") and episode:
-            episode[-1] += f" {stripped[2:].strip()}"
-        elif line[0] != " " and episode and not _continues(episode, line):
-            yield episode
-            episode = [line.rstrip()]
+        if stripped.startswith("| ") and section:
+            section[-1] += f" {stripped[2:].strip()}"
+        elif line[0] != " " and section and not _continues(section, line):
+            yield section
+            section = [line.rstrip()]
         else:
-            episode.append(line.rstrip())
-    if episode:
-        yield episode
+            section.append(line.rstrip())
+    if section:
+        yield section
 
 
-def _continues(episode: list[str], line: str) -> bool:
-    """Whether a line belongs to the head, the only episode whose lines aren't indented."""
+def _continues(section: list[str], line: str) -> bool:
+    """Whether a line belongs to the head, the only section whose lines aren't indented."""
     return (
-        episode[0].startswith(("Learned", "No targets"))
+        section[0].startswith(("Learned", "No targets"))
         and line != HEADING
         and not (line in ("Declared kinematics", SEEN) or _TARGET.fullmatch(line))
     )

@@ -7,6 +7,7 @@ follows a scene (`relgym.reporting.evaluation`).
 from __future__ import annotations
 
 import base64
+import builtins
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -42,12 +43,10 @@ WIDTH = 96
 """Longest line, in characters, if its parts allow it."""
 
 SEEN = "Situations seen; in others there is no prediction"
-"""First line of the episode of fingerprints."""
+"""First line of the section of fingerprints."""
 
 _NAME = re.compile(r"[^\W\d][\w-]*( [^\W\d][\w-]*)*")
-_RESERVED = frozenset(
-    {"if", "elif", "else", "then", "and", "or", "not", "some", "no", "the", "any", "where", "where"}
-)
+_RESERVED = frozenset({"if", "elif", "else", "then", "and", "or", "not", "some", "no", "the", "any", "where"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,12 +200,12 @@ class PropertyRules:
     advice: str = ""
     experience: Experience | None = None
 
-    @property
+    @builtins.property  # `property` is a field here
     def target(self) -> str:
         """Such as ``ball.vx``."""
         return f"{self.type}.{self.property}"
 
-    @property
+    @builtins.property  # `property` is a field here
     def names(self) -> dict[str, str]:
         """Named conditions, in full."""
         return {b.name: b.text for b in self.branches if b.name}
@@ -382,7 +381,7 @@ class RuleList:
             lines.append("some B, no B: among all objects of the scene.")
         if any(len(p.branches) > 1 for p in self.properties):
             lines.append(
-                "Branches are tried in order; steps: training steps that go by a branch; ±: what it leaves there."
+                "Branches are tried in order; steps: training steps that go by it; ±: what it leaves there."
             )
         return "\n".join(f"# {line}" for line in lines)
 
@@ -405,7 +404,7 @@ def check_name(name: str) -> None:
 
 
 def scope_text(scope: Iterable[tuple[str, int, int]]) -> str:
-    """What was seen: ``Scenes held ball × 1, box × 2 to 3; other numbers of objects were never seen.``"""
+    """What was seen, such as ``Scenes held ball × 1, box × 2 to 3; ...``."""
     told = []
     for name, least, most in scope:
         count = f"{least}" if least == most else f"{least} to {most}"
@@ -466,6 +465,8 @@ def bound_text(bound: Bound, prop: str = "", digits: int = 7) -> str:
     head = "" if prop else "then "
     if bound.kind == "change within":
         return f"the change within {bound.value:.{digits}g} and {bound.most:.{digits}g}"
+    if bound.kind == "if" and prop:
+        return f"{bound.value:.{digits}g}, as the rule alone would lead to {condition_text(bound.tests)}"
     if bound.kind == "if":
         return f"{head}if {condition_text(bound.tests)}: {bound.value:.{digits}g}{steps}"
     return f"{head}{bound.kind} {bound.value:.{digits}g}{steps}"
