@@ -89,7 +89,7 @@ def parse_rules(text: str) -> RuleList:
     ConfigError
         A line that says nothing in this language; the message quotes it.
     """
-    head, *sections = list(_sections(text))
+    head, *sections = list(_sections(text)) or [[""]]
     transitions, scope, agreement = _head(head)
     found = RuleList(transitions, scope, agreement=agreement)
     for section in sections:
@@ -110,30 +110,28 @@ def parse_rules(text: str) -> RuleList:
 
 
 def _sections(text: str) -> Iterator[list[str]]:
-    """Sections of lines: each begins with one that isn't indented. Continued lines are joined, comments left out."""
+    """Sections of lines, the head first: each begins, after an empty line, with one that isn't indented.
+
+    Continued lines are joined, comments left out.
+    """
     section: list[str] = []
+    fresh = False
     for line in text.rstrip().split("\n"):
         stripped = line.strip()
+        if not stripped:
+            fresh = True
         if not stripped or stripped.startswith("#"):
             continue
         if stripped.startswith("| ") and section:
             section[-1] += f" {stripped[2:].strip()}"
-        elif line[0] != " " and section and not _continues(section, line):
+        elif line[0] != " " and section and fresh:
             yield section
             section = [line.rstrip()]
         else:
             section.append(line.rstrip())
+        fresh = False
     if section:
         yield section
-
-
-def _continues(section: list[str], line: str) -> bool:
-    """Whether a line belongs to the head, the only section whose lines aren't indented."""
-    return (
-        section[0].startswith(("Learned", "No targets"))
-        and line != HEADING
-        and not (line in ("Declared kinematics", SEEN) or _TARGET.fullmatch(line))
-    )
 
 
 def _head(lines: list[str]) -> tuple[int, tuple[tuple[str, int, int], ...], str]:

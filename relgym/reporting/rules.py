@@ -441,7 +441,7 @@ def _branch_lines(rules: PropertyRules, digits: int) -> list[str]:
     heads = [len(head) for head, _, _ in rows if len(head) <= 40]
     margin = max(heads, default=0) + 2
     room = max(24, WIDTH - margin - 26)
-    said_width = max((min(len(said), room) for _, said, _ in rows), default=0)
+    said_width = max((min(len(said), room) for _, said, stats in rows if stats), default=0)
     counts = max((len(stats.split("  ")[0]) for _, _, stats in rows if stats), default=0)
     lines = []
     for head, said, stats in rows:

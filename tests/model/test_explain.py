@@ -22,7 +22,7 @@ WORLD = ModelConfig(frames="world")
 
 @pytest.fixture(scope="module")
 def ball() -> WorldModel:
-    return learned(ball_episodes(1, seed=0, episodes=20), config=WORLD)
+    return learned(ball_episodes(1, seed=0, episodes=15), config=WORLD)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_what_rests_rests(ball: WorldModel) -> None:
 
 
 def test_a_law_says_which_piece_holds() -> None:
-    model = learned(ball_episodes(1, seed=0, episodes=30))
+    model = learned(ball_episodes(1, seed=0, episodes=15), config=ModelConfig(frames="auto"))
     assert model.governed
     scenes = scenes_of(list(ball_episodes(1, seed=2, episodes=8)), 300)
     for each in resting(model, scenes):
