@@ -456,7 +456,7 @@ def test_refusals_name_the_remedy() -> None:
         by_episode.learn(5, callback=Dyna(LineModel()))
     taskless = flat()
     taskless.unwrapped.task = None  # type: ignore[attr-defined]
-    with pytest.raises(ConfigError, match="nothing says what a dream is worth"):
+    with pytest.raises(ConfigError, match="imagined steps have no reward"):
         refused(taskless)
     with pytest.raises(ConfigError, match=r"object is no model to dream with: it lacks \['schema'"):
         refused(flat(), object())
