@@ -81,7 +81,7 @@ def world_like(like: gym.Env[Any, Any], schema: SceneSchema) -> gym.Env[Any, Any
     Raises
     ------
     ConfigError
-        The model can't speak of its scenes (`schema_like`), or it can't be copied.
+        The model can't predict its scenes (`schema_like`), or it can't be copied.
     """
     inner = like.unwrapped
     own = getattr(inner, "schema", None)
@@ -132,7 +132,7 @@ def schema_like(other: SceneSchema | None, schema: SceneSchema, what: str) -> Sc
 
 
 def _difference(other: SceneSchema, schema: SceneSchema) -> str:
-    """What keeps a model of one schema from speaking of the other's scenes; empty if nothing does."""
+    """Why a model of one schema can't predict scenes of the other; empty if it can."""
     if (other.up, other.planar) != (schema.up, schema.planar):
         return f"it has up={other.up!r}, planar={other.planar}"
     known = {t.name: (t.properties, t.shape, dict(t.pose)) for t in schema.types}

@@ -159,8 +159,8 @@ def _refuse_memory(layer: gym.Wrapper[Any, Any, Any, Any]) -> None:
     base = gym.ObservationWrapper if isinstance(layer, gym.ObservationWrapper) else gym.ActionWrapper
     if type(layer).reset is not base.reset:
         raise ConfigError(
-            f"{type(layer).__name__} keeps count of the real episode (it has a reset of its own), and nobody knows how "
-            "a dream could follow: put it inside the TransitionRecorder"
+            f"{type(layer).__name__} keeps count of the real episode (it has a reset of its own), and a dream "
+            "can't do the same: put it inside the TransitionRecorder"
         )
 
 

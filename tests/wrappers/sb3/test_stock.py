@@ -1,4 +1,4 @@
-"""Scenes to dream on from: drawn, permuted and resampled without leaving what the model licenses."""
+"""Scenes in which roll-outs begin: drawn, permuted and resampled without leaving what the model knows."""
 
 from __future__ import annotations
 
