@@ -105,6 +105,8 @@ def _tracked() -> list[str]:
             "--exclude-standard",
             "*.py",
             "*.md",
+            "*.toml",
+            "*.yml",
             "Makefile",
             ".ci/run",
         ],
