@@ -221,7 +221,7 @@ def _verdict(
     if not (np.isfinite(value) or (doubts and np.isnan(value))):
         what = _WORDS[prop]
         raise ConfigError(
-            f"the {what} of a dreamed step is {told!r}: expected a finite number; mend the {what} function for "
+            f"the {what} of a dreamed step is {told!r}: expected a finite number; fix the {what} function for "
             f"before={before.values()}, action={action}, after={after.values()}"
         )
     return value
@@ -300,7 +300,7 @@ class BatchStepEvaluator:
         if not fine.all():
             row = int(np.flatnonzero(~fine)[0])
             raise ConfigError(
-                f"the {what} of dreamed step {row} of {len(found)} is {found[row]}: expected a finite number; mend the "
+                f"the {what} of dreamed step {row} of {len(found)} is {found[row]}: expected a finite number; fix the "
                 f"{what} function for before={before[row].tolist()}, after={after[row].tolist()} (objects "
                 f"{list(self.layout.names)})"
             )

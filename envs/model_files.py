@@ -96,7 +96,7 @@ def copied(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
     except (TypeError, NotImplementedError, copy.Error) as error:
         raise ConfigError(
             f"like={env} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
-            "that a ModelLearner taught holds spaces and first scenes of its own: leave out like"
+            "that a ModelLearner saved holds spaces and first scenes of its own: leave out like"
         ) from error
     world.unwrapped.render_mode = None  # its resets are no one's to see
     return world

@@ -1,4 +1,4 @@
-"""One pair of modes over time: its classifier, and whether that has become stale (design §5)."""
+"""One pair of modes over time: its classifier, and whether that has become stale."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def check_rewards(rewards: NDArray[np.float64], reward_model: RewardModel) -> No
     if not np.isfinite(rewards).all():
         bad = rewards[~np.isfinite(rewards)][0]
         raise ConfigError(
-            f"{type(reward_model).__name__} gave a reward of {bad}: expected finite numbers; mend the reward function"
+            f"{type(reward_model).__name__} gave a reward of {bad}: expected finite numbers; fix the reward function"
         )
 
 

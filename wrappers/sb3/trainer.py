@@ -275,7 +275,7 @@ def check_model(model: Any, lens: Lens, *, at_once: bool = False) -> None:
     if frozen and not model.targets:
         raise ConfigError(
             "the model knows none of the targets and can't learn (it was loaded without its history): load one that "
-            "was taught, or save with history=True"
+            "has learned, or save with history=True"
         )
 
 

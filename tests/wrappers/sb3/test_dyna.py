@@ -491,7 +491,7 @@ def test_a_reward_that_is_no_number_is_said_to_be_none() -> None:
             never = np.zeros(len(after), dtype=bool)
             return TaskOutcome(np.full(len(after), np.nan), never, never)
 
-    with pytest.raises(ConfigError, match=r"Odd gave a reward of nan: .*mend the reward function"):
+    with pytest.raises(ConfigError, match=r"Odd gave a reward of nan: .*fix the reward function"):
         refused(flat(), reward_model=Odd())
 
 
