@@ -16,11 +16,13 @@ import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
 import relgym  # noqa: F401 - registers the envs
-from relgym.errors import ConfigError
+from relgym.envs.views import View
+from relgym.errors import RelgymError
 from relgym.model.text import Cell, indented, table
 from relgym.scene.objects import Scene
 from relgym.scene.schema import SceneSchema
 from relgym.scene.state import relational_state
+from relgym.wrappers.views import settled, view_of
 
 __all__ = ["Finding", "diagnosis", "inspected"]
 
@@ -56,37 +58,44 @@ class Finding:
     required: bool = True
 
 
-def inspected(env: gym.Env[Any, Any], *, seed: int = 0) -> str:
-    """An env's schema and the relations of its first scene, as text.
+def inspected(env: gym.Env[Any, Any], view: View | None = None, *, seed: int = 0) -> str:
+    """What relgym sees of an env, as text: spaces, view, objects, and the first scene with its relations.
 
     Parameters
     ----------
     env
-        An env with a schema; it is reset.
+        Any env; it is reset.
+    view
+        How it is seen; default: as `relgym.wrappers.ModelLearner` does by default.
     seed
         Of the reset.
 
     Raises
     ------
     ConfigError
-        The env has no schema.
+        Spaces that need a view of the user's.
     """
-    if not env.has_wrapper_attr("schema"):
-        raise ConfigError(f"{env} has no attribute `schema`: only envs of scenes can be inspected")
-    schema: SceneSchema = env.get_wrapper_attr("schema")
-    _, info = env.reset(seed=seed)
-    scene: Scene = info["scene"]
-    relations: list[list[Cell]] = [
-        [name, ", ".join(f"({', '.join(objects)})" for objects in sorted(found))]
-        for name, found in relational_state(scene).relations.items()
+    view = view_of(env) if view is None else view
+    observation, info = env.reset(seed=seed)
+    view = settled(view, [observation])
+    schema, scene = view.schema, view.scene(observation, info)
+    env.action_space.seed(seed)
+    scene = view.with_action(scene, env.action_space.sample())
+    related = relational_state(scene).relations if scene.layout.bodies else {}
+    relations = [
+        f"{name}: {', '.join(f'({', '.join(objects)})' for objects in sorted(found))}"
+        for name, found in related.items()
         if found
     ]
     parts = {
+        "spaces": table(["", ""], _space_rows(env)).lstrip("\n"),
+        "seen as": _manner(view),
         "types": table(["type", "parent", "shape", "properties"], _type_rows(schema)),
         "objects": table(["object", "type"], [list(pair) for pair in schema.objects]),
         "learned": "\n".join(map(str, schema.targets or ())) or "every property that changes",
         "derived": "\n".join(map(str, _laws(schema))) or "nothing",
-        "relations in the first scene": "\n".join(f"{name}: {found}" for name, found in relations),
+        "the first scene, with an action": "\n".join(_values(scene)),
+        "relations in it": "\n".join(relations) or "none: spatial relations hold between bodies",
     }
     return "\n\n".join(f"{title}\n{indented(text)}" for title, text in parts.items())
 
@@ -100,6 +109,36 @@ def diagnosis() -> tuple[Finding, ...]:
     findings += [_tried(env_id, partial(_step, env_id)) for env_id in _plain_envs()]
     findings.append(_tried("temporary files", _write))
     return tuple(findings)
+
+
+_MANNERS: dict[str, str] = {
+    "scene": "scenes: the env's own objects",
+    "flat": "numbers: properties of one object, or of one per key",
+    "table": "a table: its rows are objects, its columns their properties",
+    "task": "reward or termination beside the state",
+}
+
+
+def _manner(view: View) -> str:
+    """What kind of view it is, for people; one of the user's own goes by its class."""
+    own = type(view).__name__
+    try:
+        kind = view.to_json().get("kind", "")
+    except RelgymError:
+        kind = ""
+    return f"{_MANNERS.get(kind, 'what a function of your own finds')}  ({own})"
+
+
+def _space_rows(env: gym.Env[Any, Any]) -> list[list[Cell]]:
+    return [["observations", str(env.observation_space)], ["actions", str(env.action_space)]]
+
+
+def _values(scene: Scene) -> list[str]:
+    return [
+        f"{o.name}: {', '.join(f'{p} = {v:.4g}' for p, v in zip(o.type.properties, o.values.tolist(), strict=True))}"
+        for o in scene
+        if o.type.properties
+    ]
 
 
 def _type_rows(schema: SceneSchema) -> list[list[Cell]]:

@@ -1,0 +1,301 @@
+"""``relgym learn``: watch an env, learn, save, measure, and say what to do next."""
+
+from __future__ import annotations
+
+import os
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+
+from relgym.config import ModelConfig
+from relgym.console.envs import made
+from relgym.console.models import loaded, origin
+from relgym.console.views import view_named
+from relgym.errors import ConfigError, RelgymError
+from relgym.experiments.episodes import episodes, transitions
+from relgym.experiments.scores import Score, score
+from relgym.model.text import amount
+from relgym.model.world_model import WorldModel
+from relgym.wrappers import ModelLearner
+
+__all__ = ["Lesson", "Round", "checked_out", "lessons"]
+
+TEST = 1000
+"""Most fresh steps that a model is tested on when it has been learned."""
+
+ROUNDS = 4
+"""How often advice is followed at most."""
+
+Tick = Callable[[int, float], None]
+"""Called after each step with the number of steps and the share of the latest ones with a wrong prediction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson:
+    """What to learn, as the options say.
+
+    Attributes
+    ----------
+    env_id, arguments
+        Of the env; the id may be None where a model is resumed.
+    out
+        Where to write.
+    steps, seed
+        How many transitions, and of everything random; no seed: 0, or with `resume` what the model has seen, so that it
+        sees other episodes.
+    view, names, reward, terminated
+        See `relgym.console.views.view_named`.
+    config
+        Free parameters.
+    resume
+        Model file to go on from.
+    history
+        Whether to keep what further learning needs.
+    follow_advice
+        Whether to learn again with the features that the model advises, until it names no more.
+    """
+
+    env_id: str | None
+    arguments: Mapping[str, Any]
+    out: Path
+    steps: int
+    seed: int | None = None
+    view: str | None = None
+    names: str | None = None
+    reward: bool = False
+    terminated: bool = False
+    config: ModelConfig = ModelConfig()
+    resume: Path | None = None
+    history: bool = False
+    follow_advice: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """What came of learning once.
+
+    Attributes
+    ----------
+    env_id
+        The env.
+    file
+        Where the model was saved.
+    features
+        Features that were on.
+    steps, planned
+        Transitions that were learned from, and how many there should have been.
+    seconds
+        How long that took.
+    stopped
+        Why it ended early; empty if it didn't.
+    score
+        Errors on fresh steps; None where it ended early.
+    advice
+        What isn't explained, and what would explain it.
+    advised
+        Features to switch on beside those that are; empty if there are none.
+    """
+
+    env_id: str
+    file: str
+    features: tuple[str, ...]
+    steps: int
+    planned: int
+    seconds: float
+    stopped: str
+    score: Score | None
+    advice: tuple[str, ...]
+    advised: tuple[str, ...]
+
+    def __str__(self) -> str:
+        on = f" with {', '.join(self.features)}" if self.features else ""
+        head = f"Learned {self.env_id}{on} from {amount(self.steps, 'step')} in {self.seconds:.1f} s: {self.file}"
+        if self.stopped:
+            head = f"{self.stopped} after {self.steps:,} of {self.planned:,} steps; what was learned is in {self.file}"
+        parts = [head, "" if self.score is None else str(self.score), *(f"Advice: {a}" for a in self.advice)]
+        return "\n\n".join(part for part in parts if part)
+
+
+def checked_out(path: Path) -> Path:
+    """A path that a file can be written to, its folder made where there is none.
+
+    Raises
+    ------
+    ConfigError
+        It is a folder, or nothing can be written there.
+    """
+    if path.is_dir():
+        raise ConfigError(f"--out {path} is a folder: expected a file, such as {path / 'model.json'}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+        if path.exists() and not os.access(path, os.W_OK):
+            raise PermissionError(13, "Permission denied")
+    except OSError as error:
+        raise ConfigError(
+            f"--out {path} can't be written ({error.strerror}): expected a file in a folder that may be written to"
+        ) from None
+    return path
+
+
+def lessons(lesson: Lesson, tick: Tick) -> Iterator[Round]:
+    """Learn, save and measure; once, or as often as there is new advice to follow.
+
+    All that can be wrong is looked for before the first step. An interrupt (Ctrl-C) ends learning after the step that is
+    going on, and what was learned is saved; so it is when the env fails. A round that follows advice and is ended so is
+    thrown away: the file then holds the round before.
+
+    Raises
+    ------
+    ConfigError, ModelFileError
+        Something that was asked for can't be had.
+    """
+    out = checked_out(lesson.out)
+    last: Round | None = None
+    for _ in range(ROUNDS if lesson.follow_advice else 1):
+        learner, env_id = _learner(lesson)
+        try:
+            found = _learned(learner, lesson, env_id, out, tick, last)
+        finally:
+            learner.close()
+        yield found
+        if found.stopped or not found.advised:
+            return
+        last = found
+        lesson = replace(lesson, config=replace(lesson.config, features=(*found.features, *found.advised)))
+
+
+def _learner(lesson: Lesson) -> tuple[ModelLearner, str]:
+    """The env with a learner around it, and the env's id."""
+    env_id, arguments = lesson.env_id, dict(lesson.arguments)
+    if lesson.resume is not None:
+        model = _resumable(lesson, lesson.resume)
+        how = origin(model)
+        if env_id in (None, how.get("env")):
+            arguments = {**how.get("arguments", {}), **arguments}
+        env_id = env_id or how.get("env")
+    if env_id is None:
+        raise ConfigError("name the env to learn: relgym learn ENV --out FILE; `relgym envs` lists some")
+    env = made(env_id, arguments)
+    return _wrapped(env, lesson), env_id
+
+
+def _wrapped(env: gym.Env[Any, Any], lesson: Lesson) -> ModelLearner:
+    if lesson.resume is None:
+        view = view_named(env, lesson.view, lesson.names)
+        return ModelLearner(
+            env, view=view, config=lesson.config, learn_reward=lesson.reward, learn_termination=lesson.terminated
+        )
+    held = loaded(lesson.resume).extra.get("view") or {}
+    outcome = {"reward": bool(held.get("reward")), "terminated": bool(held.get("terminated"))}
+    state = held.get("view", held)
+    view = state if lesson.view is None and state.get("kind") in ("flat", "table") else None
+    return ModelLearner(
+        env,
+        view=view_named(env, lesson.view) if view is None else view,
+        model=lesson.resume,
+        learn_reward=outcome["reward"],
+        learn_termination=outcome["terminated"],
+    )
+
+
+def _resumable(lesson: Lesson, path: Path) -> WorldModel:
+    """The model to go on from; errors where it can't, or where something is asked that is settled."""
+    model = loaded(path)
+    if model.frozen:
+        raise ConfigError(
+            f"{path} was saved without its history, and can't learn on: learn it with --history, which keeps that"
+        )
+    settled = {
+        "--config or --features": lesson.config != ModelConfig(),
+        "--follow-advice": lesson.follow_advice,
+        "--names": lesson.names is not None,
+        "--reward or --termination": lesson.reward or lesson.terminated,
+    }
+    for option, given in settled.items():
+        if given:
+            raise ConfigError(f"{option} can't go with --resume: {path} keeps what it was begun with; begin anew")
+    return model
+
+
+def _learned(
+    env: ModelLearner, lesson: Lesson, env_id: str, out: Path, tick: Tick, last: Round | None
+) -> Round:
+    start = time.perf_counter()
+    before = 0 if lesson.resume is None else loaded(lesson.resume).seen
+    seed = before if lesson.seed is None else lesson.seed
+    steps, stopped = _run(env, lesson.steps, seed, tick)
+    seconds = round(time.perf_counter() - start, 2)
+    if stopped and last is not None:
+        return replace(last, steps=steps, planned=lesson.steps, stopped=f"{stopped}; kept the round before,", advised=())
+    if not env.has_wrapper_attr("model") or not steps:
+        raise ConfigError(f"{env_id}: {stopped or 'nothing was learned'} before the first step; nothing was saved")
+    features = env.model.config.features
+    env.save(out, history=lesson.history or lesson.resume is not None)
+    if stopped:
+        return Round(env_id, str(out), features, steps, lesson.steps, seconds, stopped, None, (), ())
+    found = transitions(episodes(env.env, env.view, seed=seed), min(TEST, lesson.steps))
+    advice = env.model.advice()
+    advised = dict.fromkeys(f for each in advice for f in each.features if f not in features)
+    return Round(
+        env_id,
+        str(out),
+        features,
+        steps,
+        lesson.steps,
+        seconds,
+        "",
+        score(env.model, found, env.view.precision),
+        tuple(f"{each.target}: {each}" for each in advice),
+        tuple(advised),
+    )
+
+
+def _run(env: ModelLearner, steps: int, seed: int, tick: Tick) -> tuple[int, str]:
+    """Take random actions; how many steps were taken, and why not all."""
+    done = 0
+    with _interrupts() as interrupted:
+        try:
+            env.action_space.seed(seed)
+            env.reset(seed=seed)
+            while done < steps and not interrupted():
+                *_, terminated, truncated, _ = env.step(env.action_space.sample())
+                done += 1
+                if terminated or truncated:
+                    env.reset()
+                if done % 50 == 0 or done == steps:
+                    tick(done, env.prequential.recent)
+        except RelgymError as error:
+            return done, f"Stopped, for {type(error).__name__}: {error};"
+        except Exception as error:  # an env of anybody's may fail in any way; what was learned must not be lost
+            return done, f"Stopped, for the env failed with {type(error).__name__}: {error};"
+    return done, "" if done == steps else "Stopped by Ctrl-C"
+
+
+@contextmanager
+def _interrupts() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C was pressed; it doesn't break off what is going on, unless it is pressed twice."""
+    pressed: list[int] = []
+
+    def note(number: int, frame: Any) -> None:
+        if pressed:
+            raise KeyboardInterrupt
+        pressed.append(number)
+
+    try:
+        usual = signal.signal(signal.SIGINT, note)
+    except ValueError:  # not the main thread: whoever runs this there looks after signals
+        yield lambda: False
+        return
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, usual)

@@ -1,0 +1,102 @@
+"""The home worlds' own account of what happened, for a model that was learned in one of them.
+
+Their test sets (`relgym.experiments.data`) know of every transition which law truly held, from the engine's contact log
+or the layout that was drawn. An env that was made with other arguments than those sets have is tested without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from relgym.envs.model_files import schema_like
+from relgym.errors import ConfigError
+from relgym.experiments.analytic import AnalyticModes
+from relgym.experiments.blocks import Block
+from relgym.experiments.data import BallExperiment, ball_blocks, truck_blocks
+from relgym.scene.schema import SceneSchema
+
+__all__ = ["TrueBlocks", "true_blocks"]
+
+
+@dataclass(frozen=True, slots=True)
+class TrueBlocks:
+    """Fresh episodes of a home world, with the truth about each step.
+
+    Attributes
+    ----------
+    blocks
+        From how many to the episodes.
+    laws
+        The ball world's linear laws; None for the truck's.
+    steps
+        Length of an episode.
+    """
+
+    blocks: Callable[[int], Iterator[Block]]
+    laws: AnalyticModes | None
+    steps: int
+
+
+def true_blocks(
+    env_id: str, arguments: Mapping[str, Any], schema: SceneSchema, *, seed: int
+) -> TrueBlocks | None:
+    """The test set of an env; None for envs of others, and arguments that it doesn't cover.
+
+    Parameters
+    ----------
+    env_id, arguments
+        What the env was made of.
+    schema
+        The model's, which must be able to speak of the set's scenes.
+    seed
+        Of the scenes.
+    """
+    make = _MAKERS.get(env_id)
+    try:
+        found = None if make is None else make(dict(arguments), seed)
+        if found is not None:
+            schema_like(next(found.blocks(1)).schema, schema, env_id)
+    except (ConfigError, TypeError, ValueError):
+        return None
+    return found
+
+
+def _ball(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
+    number = {name: arguments.pop(name, usual) for name, usual in _BALL.items()}
+    kinds = tuple(arguments.pop("objects", ("box", "ramp")))
+    type_names = arguments.pop("type_names", "shape")
+    if arguments or not all(isinstance(value, (int, float)) for value in number.values()):
+        return None
+    setting = BallExperiment(
+        float(number["incline"]),
+        float(number["elasticity"]),
+        (float(number["friction"]),),
+        blocks=1,
+        type_names=type_names,
+        objects=kinds,
+    )
+    return TrueBlocks(
+        lambda blocks: ball_blocks(setting, seed=seed, blocks=blocks, test=True), setting.modes(), 200
+    )
+
+
+def _truck(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
+    redraw, boxes = arguments.pop("redraw", "block"), arguments.pop("n_boxes", 3)
+    task = arguments.pop("task", "auto")
+    if arguments or (task is not None and (task, redraw) != ("auto", "step")):
+        return None
+
+    def blocks(count: int) -> Iterator[Block]:
+        found = truck_blocks(redraw, seed=seed, n_boxes=boxes, repeats=count, test=True)
+        return (block for block, _ in zip(found, range(count), strict=False))
+
+    return TrueBlocks(blocks, None, 40)
+
+
+_BALL = {"incline": 30.0, "elasticity": 0.9, "friction": 0.0}
+_MAKERS: dict[str, Callable[[dict[str, Any], int], TrueBlocks | None]] = {
+    "relgym/BallBoxRamp-v0": _ball,
+    "relgym/TruckPush-v0": _truck,
+}
