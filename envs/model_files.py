@@ -94,7 +94,9 @@ def made_how(spec: EnvSpec | None) -> dict[str, Any]:
         return {}
     registered = gym.registry.get(spec.id)
     usual = {} if registered is None else registered.kwargs
-    given = {k: v for k, v in spec.kwargs.items() if k != "render_mode"}  # how it is shown is no one's to learn
+    given = {
+        k: v for k, v in spec.kwargs.items() if k != "render_mode"
+    }  # how it is shown is no one's to learn
     if registered is not None and spec.max_episode_steps not in (None, registered.max_episode_steps):
         given["max_episode_steps"] = spec.max_episode_steps
     arguments, omitted = {}, []

@@ -44,7 +44,9 @@ app = typer.Typer(cls=Commands, no_args_is_help=True, add_completion=False, help
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
 Seed = Annotated[int, typer.Option(help="Seed of everything random.", min=0)]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, as `relgym learn` writes it.")]
-EnvId = Annotated[str, typer.Argument(metavar="ENV", help="Env id, such as CartPole-v1 or relgym/BallBoxRamp-v0.")]
+EnvId = Annotated[
+    str, typer.Argument(metavar="ENV", help="Env id, such as CartPole-v1 or relgym/BallBoxRamp-v0.")
+]
 OtherEnv = Annotated[
     str | None, typer.Option("--env", metavar="ID", help="Another env than the one that the file names.")
 ]
@@ -54,7 +56,9 @@ Arguments = Annotated[
 ]
 ViewOption = Annotated[
     str | None,
-    typer.Option("--view", metavar="VIEW", help="auto, numbers, a FILE.json, or MODULE:NAME of a view of yours."),
+    typer.Option(
+        "--view", metavar="VIEW", help="auto, numbers, a FILE.json, or MODULE:NAME of a view of yours."
+    ),
 ]
 Names = Annotated[
     str | None, typer.Option("--names", metavar="A,B,...", help="Names of the env's numbers, in order.")
@@ -149,10 +153,10 @@ def rules(
     as_json: Json = False,
 ) -> None:
     """Print a model: modes, functions, clauses, roles."""
-    from relgym.model.world_model import WorldModel
+    from relgym.console.models import loaded
 
-    loaded = WorldModel.load(model)
-    _echo_json(_report(loaded, digits)) if as_json else typer.echo(loaded.describe(digits=digits))
+    known = loaded(model)
+    _echo_json(_report(known, digits)) if as_json else typer.echo(known.describe(digits=digits))
 
 
 @app.command()
@@ -247,7 +251,9 @@ def reproduce(
 
 @app.command()
 def envs(
-    every: Annotated[bool, typer.Option("--all", help="All that are installed, not only relgym's own.")] = False,
+    every: Annotated[
+        bool, typer.Option("--all", help="All that are installed, not only relgym's own.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """List relgym's envs, or all that are installed."""
@@ -340,7 +346,7 @@ def _show_lessons(learned: Callable[..., Iterator[Round]], lesson: Lesson, as_js
     if as_json:
         _echo_json(rounds)
     else:
-        typer.echo(f"\n{_columns(next_steps(rounds[-1]))}")
+        typer.echo(f"\n{next_steps(rounds[-1])}")
     if rounds[-1].stopped:
         raise typer.Exit(130 if "Ctrl-C" in rounds[-1].stopped else 1)
 
@@ -370,7 +376,7 @@ def _report(model: Any, digits: int = 7) -> Any:
 def _progress(*more: ProgressColumn) -> Progress:
     basic = (TextColumn("{task.description:>6}"), BarColumn(40), MofNCompleteColumn(), TimeElapsedColumn())
     columns = (*basic, *more)
-    return Progress(*columns, console=Console(stderr=True), transient=not sys.stderr.isatty())
+    return Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty())
 
 
 @contextmanager

@@ -65,7 +65,9 @@ def arguments_of(spec: EnvSpec) -> dict[str, inspect.Parameter] | None:
     try:
         maker = spec.entry_point if callable(spec.entry_point) else load_env_creator(str(spec.entry_point))
         found = dict(inspect.signature(maker).parameters)
-    except (ImportError, AttributeError, TypeError, ValueError):
+    except (
+        Exception
+    ):  # what it is made of can't be imported, or says nothing of its arguments: making it will tell
         return None
     if any(p.kind in (p.VAR_KEYWORD, p.VAR_POSITIONAL) for p in found.values()):
         return None
@@ -140,7 +142,9 @@ def _unknown(name: str) -> str:
 
 def _check_names(spec: EnvSpec, given: Mapping[str, Any]) -> None:
     known = arguments_of(spec)
-    for name in given if known is not None else ():
+    if known is None:
+        return
+    for name in given:
         if name not in known and name not in _FOR_MAKE and name != "render_mode":
             raise ConfigError(
                 f"{spec.id} has no argument {name!r}{did_you_mean(name, (*known, *_FOR_MAKE))}{_listed(spec)}"

@@ -42,6 +42,8 @@ def _complain(message: str) -> None:
 
 
 def _of_system(error: OSError) -> str:
+    if isinstance(error, FileExistsError):  # a folder was to be made there
+        return f"{error.filename} is a file, and a folder is needed: name another one"
     if error.filename is None or error.strerror is None:
         return str(error)
     return f"{error.filename}: {error.strerror}; check the path, and that it may be written to"

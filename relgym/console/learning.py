@@ -5,24 +5,23 @@ from __future__ import annotations
 import os
 import signal
 import tempfile
+import textwrap
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
-
 from relgym.config import ModelConfig
 from relgym.console.envs import made
-from relgym.console.models import loaded, origin
+from relgym.console.models import loaded, opened
 from relgym.console.views import view_named
+from relgym.envs.views import TaskView
 from relgym.errors import ConfigError, RelgymError
 from relgym.experiments.episodes import episodes, transitions
 from relgym.experiments.scores import Score, score
 from relgym.model.text import amount
-from relgym.model.world_model import WorldModel
 from relgym.wrappers import ModelLearner
 
 __all__ = ["Lesson", "Round", "checked_out", "lessons"]
@@ -71,7 +70,7 @@ class Lesson:
     names: str | None = None
     reward: bool = False
     terminated: bool = False
-    config: ModelConfig = ModelConfig()
+    config: ModelConfig = field(default_factory=ModelConfig)
     resume: Path | None = None
     history: bool = False
     follow_advice: bool = False
@@ -119,8 +118,12 @@ class Round:
         head = f"Learned {self.env_id}{on} from {amount(self.steps, 'step')} in {self.seconds:.1f} s: {self.file}"
         if self.stopped:
             head = f"{self.stopped} after {self.steps:,} of {self.planned:,} steps; what was learned is in {self.file}"
-        parts = [head, "" if self.score is None else str(self.score), *(f"Advice: {a}" for a in self.advice)]
+        parts = [head, "" if self.score is None else str(self.score), *map(_advice, self.advice)]
         return "\n\n".join(part for part in parts if part)
+
+
+def _advice(text: str) -> str:
+    return textwrap.fill(f"Advice for {text}", 100, subsequent_indent="  ")
 
 
 def checked_out(path: Path) -> Path:
@@ -149,9 +152,9 @@ def checked_out(path: Path) -> Path:
 def lessons(lesson: Lesson, tick: Tick) -> Iterator[Round]:
     """Learn, save and measure; once, or as often as there is new advice to follow.
 
-    All that can be wrong is looked for before the first step. An interrupt (Ctrl-C) ends learning after the step that is
-    going on, and what was learned is saved; so it is when the env fails. A round that follows advice and is ended so is
-    thrown away: the file then holds the round before.
+    All that can be wrong is looked for before the first step. An interrupt (Ctrl-C) ends learning after the step that
+    is going on, and what was learned is saved; so it is when the env fails. A round that follows advice and is ended so
+    is thrown away: the file then holds the round before.
 
     Raises
     ------
@@ -175,44 +178,42 @@ def lessons(lesson: Lesson, tick: Tick) -> Iterator[Round]:
 
 def _learner(lesson: Lesson) -> tuple[ModelLearner, str]:
     """The env with a learner around it, and the env's id."""
-    env_id, arguments = lesson.env_id, dict(lesson.arguments)
     if lesson.resume is not None:
-        model = _resumable(lesson, lesson.resume)
-        how = origin(model)
-        if env_id in (None, how.get("env")):
-            arguments = {**how.get("arguments", {}), **arguments}
-        env_id = env_id or how.get("env")
-    if env_id is None:
+        return _resumed(lesson, lesson.resume)
+    if lesson.env_id is None:
         raise ConfigError("name the env to learn: relgym learn ENV --out FILE; `relgym envs` lists some")
-    env = made(env_id, arguments)
-    return _wrapped(env, lesson), env_id
-
-
-def _wrapped(env: gym.Env[Any, Any], lesson: Lesson) -> ModelLearner:
-    if lesson.resume is None:
-        view = view_named(env, lesson.view, lesson.names)
-        return ModelLearner(
-            env, view=view, config=lesson.config, learn_reward=lesson.reward, learn_termination=lesson.terminated
-        )
-    held = loaded(lesson.resume).extra.get("view") or {}
-    outcome = {"reward": bool(held.get("reward")), "terminated": bool(held.get("terminated"))}
-    state = held.get("view", held)
-    view = state if lesson.view is None and state.get("kind") in ("flat", "table") else None
-    return ModelLearner(
+    env = made(lesson.env_id, lesson.arguments)
+    learner = ModelLearner(
         env,
-        view=view_named(env, lesson.view) if view is None else view,
-        model=lesson.resume,
-        learn_reward=outcome["reward"],
-        learn_termination=outcome["terminated"],
+        view=view_named(env, lesson.view, lesson.names),
+        config=lesson.config,
+        learn_reward=lesson.reward,
+        learn_termination=lesson.terminated,
     )
+    return learner, lesson.env_id
 
 
-def _resumable(lesson: Lesson, path: Path) -> WorldModel:
-    """The model to go on from; errors where it can't, or where something is asked that is settled."""
-    model = loaded(path)
-    if model.frozen:
+def _resumed(lesson: Lesson, path: Path) -> tuple[ModelLearner, str]:
+    """The env that a model's file names, or another one like it, with a learner that goes on from the model."""
+    _check_resumable(lesson, path)
+    found = opened(path, lesson.env_id, lesson.arguments, lesson.view)
+    view = found.view.view if isinstance(found.view, TaskView) else found.view
+    held = found.model.extra.get("view") or {}
+    learner = ModelLearner(
+        found.env,
+        view=view,
+        model=path,
+        learn_reward=bool(held.get("reward")),
+        learn_termination=bool(held.get("terminated")),
+    )
+    return learner, found.env_id
+
+
+def _check_resumable(lesson: Lesson, path: Path) -> None:
+    """Whether a model can go on; `ConfigError` where it can't, or where something is asked that is settled."""
+    if loaded(path).frozen:
         raise ConfigError(
-            f"{path} was saved without its history, and can't learn on: learn it with --history, which keeps that"
+            f"{path} was saved without its history, and can't learn on: learn it anew with --history, which keeps that"
         )
     settled = {
         "--config or --features": lesson.config != ModelConfig(),
@@ -222,22 +223,27 @@ def _resumable(lesson: Lesson, path: Path) -> WorldModel:
     }
     for option, given in settled.items():
         if given:
-            raise ConfigError(f"{option} can't go with --resume: {path} keeps what it was begun with; begin anew")
-    return model
+            raise ConfigError(
+                f"{option} can't go with --resume: {path} keeps what it was begun with; begin anew"
+            )
 
 
 def _learned(
     env: ModelLearner, lesson: Lesson, env_id: str, out: Path, tick: Tick, last: Round | None
 ) -> Round:
     start = time.perf_counter()
-    before = 0 if lesson.resume is None else loaded(lesson.resume).seen
-    seed = before if lesson.seed is None else lesson.seed
+    known = 0 if lesson.resume is None else env.model.seen
+    seed = known if lesson.seed is None else lesson.seed
     steps, stopped = _run(env, lesson.steps, seed, tick)
     seconds = round(time.perf_counter() - start, 2)
     if stopped and last is not None:
-        return replace(last, steps=steps, planned=lesson.steps, stopped=f"{stopped}; kept the round before,", advised=())
+        return replace(
+            last, steps=steps, planned=lesson.steps, stopped=f"{stopped}; kept the round before,", advised=()
+        )
     if not env.has_wrapper_attr("model") or not steps:
-        raise ConfigError(f"{env_id}: {stopped or 'nothing was learned'} before the first step; nothing was saved")
+        raise ConfigError(
+            f"{env_id}: {stopped or 'nothing was learned'} before the first step; nothing was saved"
+        )
     features = env.model.config.features
     env.save(out, history=lesson.history or lesson.resume is not None)
     if stopped:
@@ -275,7 +281,9 @@ def _run(env: ModelLearner, steps: int, seed: int, tick: Tick) -> tuple[int, str
                     tick(done, env.prequential.recent)
         except RelgymError as error:
             return done, f"Stopped, for {type(error).__name__}: {error};"
-        except Exception as error:  # an env of anybody's may fail in any way; what was learned must not be lost
+        except (
+            Exception
+        ) as error:  # an env of anybody's may fail in any way; what was learned must not be lost
             return done, f"Stopped, for the env failed with {type(error).__name__}: {error};"
     return done, "" if done == steps else "Stopped by Ctrl-C"
 

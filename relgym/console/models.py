@@ -12,9 +12,10 @@ import gymnasium as gym
 from relgym.console.envs import made
 from relgym.console.suggestions import did_you_mean
 from relgym.console.views import view_named
-from relgym.envs.model_files import schema_like
+from relgym.envs.model_files import EnvRecord, schema_like
 from relgym.envs.views import View, view_from_json
 from relgym.errors import ConfigError, ModelFileError, ObservationError
+from relgym.experiments.inspection import space_text
 from relgym.model.world_model import WorldModel
 
 __all__ = ["ModelInEnv", "checked_file", "loaded", "opened", "origin"]
@@ -103,8 +104,8 @@ def opened(
     given = (dict(how.get("arguments", {})) if own else {}) | dict(arguments or {})
     if lost := [each for each in how.get("omitted", ()) if own and each not in given]:
         raise ConfigError(
-            f"{path}: its env was made with {', '.join(lost)}, which a file can't hold; give each with --arg NAME=VALUE, "
-            "or evaluate it from Python"
+            f"{path}: its env was made with {', '.join(lost)}, which a file can't hold; give each with "
+            "--arg NAME=VALUE, or evaluate it from Python"
         )
     env = made(name, given)
     found = ModelInEnv(path, model, name, given, env, _view(model, env, view))
@@ -114,15 +115,14 @@ def opened(
 
 def _view(model: WorldModel, env: gym.Env[Any, Any], text: str | None) -> View:
     held = dict(model.extra.get("view") or {})
-    outcomes = {
-        "reward": bool(held.get("reward", False)),
-        "terminated": bool(held.get("terminated", False)),
-    }
+    reward, terminated = bool(held.get("reward")), bool(held.get("terminated"))
     state = held.get("view", held) if held.get("kind") == "task" else held
     if text is not None or not held or state.get("kind") == "scene":
-        return view_named(env, text, **outcomes)
+        return view_named(env, text, reward=reward, terminated=terminated)
     if state.get("kind") == "function":
-        raise ConfigError("the model's view is a function, and a file can't hold one: name it, --view MODULE:NAME")
+        raise ConfigError(
+            "the model's view is a function, and a file can't hold one: name it, --view MODULE:NAME"
+        )
     return view_from_json(held)
 
 
@@ -134,6 +134,16 @@ def _check(found: ModelInEnv, how: Mapping[str, Any]) -> None:
     except (ConfigError, ObservationError) as error:
         wrapped = f", in the wrappers {', '.join(how['wrappers'])}" if how.get("wrappers") else ""
         raise ConfigError(
-            f"{found.file} is a model of {how.get('env', 'another env')}{wrapped}, and can't speak of {found.env_id} as it "
-            f"was made here: {error}"
+            f"{found.file} is a model of {how.get('env', 'another env')}{wrapped}, and can't speak of {found.env_id}: "
+            f"{_difference(found) or error}\n`relgym learn {found.env_id} --out FILE` learns one that can"
         ) from None
+
+
+def _difference(found: ModelInEnv) -> str:
+    """How the spaces differ; empty where they don't, or where the file doesn't say."""
+    try:
+        record = EnvRecord.from_json(found.model.extra, found.model.schema)
+    except ModelFileError:
+        return ""
+    then, now = (space_text(space) for space in (record.observation_space, found.env.observation_space))
+    return "" if then == now else f"it was learned from {then}, and here is {now}"

@@ -9,17 +9,18 @@ from relgym.console.learning import Round
 __all__ = ["next_steps"]
 
 
-def next_steps(learned: Round) -> dict[str, str]:
-    """Commands that make sense next, and what each does."""
+def next_steps(learned: Round) -> str:
+    """Commands that make sense next, and what each does, as text."""
     file = shlex.quote(learned.file)
-    found = {}
-    if learned.advised:
-        features = ",".join((*learned.features, *learned.advised))
-        again = f"relgym learn {shlex.quote(learned.env_id)} --features {shlex.quote(features)} --out {file}"
-        found[again] = "learns again with the features that are advised (or: --follow-advice)"
-    return found | {
-        f"relgym rules {file}": "prints the model",
-        f"relgym explain {file}": "says why it predicts what it predicts",
-        f"relgym eval {file}": "tests it on other fresh steps",
-        f"relgym rollout {file}": "shows how far ahead it holds",
+    found = {
+        f"relgym rules {file}": "print the model",
+        f"relgym explain {file}": "why it predicts what it predicts, in a scene",
+        f"relgym eval {file}": "test it on other fresh steps",
+        f"relgym rollout {file}": "how far ahead it holds",
     }
+    width = max(map(len, found))
+    lines = ["Next", *(f"  {command:<{width}}  {text}" for command, text in found.items())]
+    if learned.advised:
+        features = shlex.quote(",".join((*learned.features, *learned.advised)))
+        lines.append(f"or learn again with what is advised: --features {features}, or --follow-advice")
+    return "\n".join(lines)

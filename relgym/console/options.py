@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
+from relgym.clustering.features import known_kinds
 from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
 from relgym.console.suggestions import did_you_mean
 from relgym.errors import ConfigError
@@ -16,6 +17,7 @@ from relgym.errors import ConfigError
 __all__ = ["config_keys", "config_of_options", "features_of", "pairs", "value_of"]
 
 _PARTS: Mapping[str, type[Any]] = {"clustering": ClusteringConfig, "classification": ClassificationConfig}
+_KIND = re.compile(r"(?:[^:]+:)?(?P<kind>\w+)(?:\([^()]*\))?")
 _COMMA = re.compile(r",(?![^()]*\))")
 
 
@@ -47,7 +49,7 @@ def pairs(option: str, texts: Iterable[str] | None) -> dict[str, Any]:
     for text in texts or ():
         name, equals, value = text.partition("=")
         if not equals or not name:
-            raise ConfigError(f"{option} {text}: expected NAME=VALUE, such as {option} {text or 'seed'}=1")
+            raise ConfigError(f"{option} {text}: expected NAME=VALUE, the value in JSON or a plain word")
         if name in found:
             raise ConfigError(f"{option} {name} was given twice; give it once")
         found[name] = value_of(value)
@@ -66,6 +68,19 @@ def features_of(texts: Iterable[str] | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for name in found if name))
 
 
+def _known(entries: tuple[str, ...]) -> tuple[str, ...]:
+    """The entries; `ConfigError` where one is of no known kind."""
+    for entry in entries:
+        match = _KIND.fullmatch(entry)
+        if match is None or match["kind"] not in known_kinds():
+            kind = match["kind"] if match else entry
+            raise ConfigError(
+                f"--features {entry}: unknown{did_you_mean(kind, known_kinds())}\nFeatures: "
+                f"{', '.join(known_kinds())}; also trig(PROPERTY), and TYPE:FEATURE for one type only"
+            )
+    return entries
+
+
 def config_keys() -> tuple[str, ...]:
     """All parameters that ``--config`` knows, such as ``seed`` and ``clustering.draws``."""
     whole = [f.name for f in fields(ModelConfig) if f.name not in (*_PARTS, "features")]
@@ -80,7 +95,7 @@ def config_of_options(texts: Iterable[str] | None, features: Iterable[str] | Non
     ConfigError
         An unknown key, or a value outside its range.
     """
-    whole: dict[str, Any] = {"features": features_of(features)}
+    whole: dict[str, Any] = {"features": _known(features_of(features))}
     parts: dict[str, dict[str, Any]] = {part: {} for part in _PARTS}
     known = config_keys()
     for key, value in pairs("--config", texts).items():

@@ -39,7 +39,9 @@ class Evaluated:
     def __str__(self) -> str:
         parts = [f"{self.env}, random actions.  {self.score}"]
         if self.truth is not None:
-            parts.append(f"{_RULE}\nBy what really happened, on episodes whose truth the world tells\n\n{self.truth}")
+            parts.append(
+                f"{_RULE}\nBy what really happened, on episodes whose truth the world tells\n\n{self.truth}"
+            )
         return "\n\n".join(parts)
 
 

@@ -22,7 +22,14 @@ KINDS = ("auto", "numbers")
 """Views that have a name."""
 
 _EMPTY: dict[str, dict[str, Any]] = {
-    "flat": {"names": None, "parts": [], "angles": "auto", "actions": None, "static": [], "axes": ["y", True]},
+    "flat": {
+        "names": None,
+        "parts": [],
+        "angles": "auto",
+        "actions": None,
+        "static": [],
+        "axes": ["y", True],
+    },
     "table": {
         "columns": [],
         "rows": None,

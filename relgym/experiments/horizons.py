@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from relgym.experiments.episodes import Episode
 from relgym.experiments.rollouts import STRAY, outside
+from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome
 from relgym.model.text import Cell, amount, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, SceneLayout
@@ -24,7 +25,7 @@ HORIZONS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 TOLERANCE = 0.01
 """Share of a property's spread by which a roll-out may be off; positions of bodies may be off by `STRAY`."""
 
-_Place = tuple[str, str]
+_PREDICTED = OUTCOMES.index(Outcome.PREDICTED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,8 @@ class Horizons:
         or, where bodies have positions, by more than `STRAY` in one of them.
     stopped
         How many ended early, for want of a prediction.
+    lacking
+        Targets for want of which they ended.
     bodies
         Whether positions decide.
     after
@@ -74,27 +77,32 @@ class Horizons:
     longest: int
     kept: int
     stopped: int
+    lacking: tuple[str, ...]
     bodies: bool
     after: tuple[int, ...]
     reached: tuple[int, ...]
     properties: tuple[PropertyErrors, ...]
 
     def __str__(self) -> str:
-        limit = f"a position off by more than {STRAY:g}" if self.bodies else "more than 1 % of a spread off"
-        if not self.after:
-            return f"{amount(self.trials, 'roll-out')}, and no prediction at all: nothing has been learned yet"
-        rows: list[list[Cell]] = [
-            [p.name, _short(p.spread), *map(_short, p.rmse)] for p in self.properties
-        ]
+        limit = (
+            f"a position is off by more than {STRAY:g}"
+            if self.bodies
+            else "a property is off by more than 1 % of its spread"
+        )
+        lacking = f", for want of a prediction of {', '.join(self.lacking)}" if self.lacking else ""
+        head = (
+            f"{self.kept} of {amount(self.trials, 'roll-out')} of up to {amount(self.longest, 'step')} stay with the "
+            f"real episode to its end."
+        )
+        rows: list[list[Cell]] = [[p.name, _short(p.spread), *map(_short, p.rmse)] for p in self.properties]
         rows.append(["roll-outs", "", *self.reached])
         heading = ["RMSE after", "spread", *(amount(n, "step") for n in self.after)]
-        return (
-            f"{self.kept} of {amount(self.trials, 'roll-out')} of up to {amount(self.longest, 'step')} stay with the real "
-            f"episode to its end.\n\n{table(heading, rows)}\n\n"
-            f"Predicted from the first scene and the actions alone. A roll-out strays with {limit} at\n"
-            f"some step, or when no mode predicts what comes ({self.stopped} of {self.trials}). "
-            "Spread: how much the real values vary."
-        )
+        notes = [
+            "A roll-out predicts an episode from its first scene and the actions alone. It strays when",
+            f"{limit} (spread: how much the real values vary),",
+            f"or when no mode predicts what comes: {self.stopped} of {self.trials}{lacking}.",
+        ]
+        return "\n".join([head, "", *([table(heading, rows), ""] if self.after else []), *notes])
 
 
 def horizons(model: WorldModel, found: Sequence[Episode]) -> Horizons:
@@ -123,6 +131,7 @@ def horizons(model: WorldModel, found: Sequence[Episode]) -> Horizons:
         longest=longest,
         kept=sum(_stays(roll, spread, bodies=bodies) for roll in rolls),
         stopped=sum(len(roll.errors) < roll.length for roll in rolls),
+        lacking=tuple(dict.fromkeys(name for roll in rolls for name in roll.lacking)),
         bodies=bodies,
         after=after,
         reached=tuple(sum(len(roll.errors) >= n for roll in rolls) for n in after),
@@ -134,13 +143,14 @@ def horizons(model: WorldModel, found: Sequence[Episode]) -> Horizons:
 
 @dataclass(frozen=True, slots=True)
 class _Roll:
-    """One roll-out: what was compared, shape ``(steps, columns)``, and by how much each was off."""
+    """One roll-out: what was compared, shape ``(steps, columns)``, by how much each was off, and what ended it."""
 
     names: tuple[str, ...]
     positions: tuple[int, ...]
     real: NDArray[np.float64]
     errors: NDArray[np.float64]
     length: int
+    lacking: tuple[str, ...]
 
 
 def _roll(model: WorldModel, found: Sequence[Episode]) -> list[_Roll]:
@@ -152,14 +162,19 @@ def _roll(model: WorldModel, found: Sequence[Episode]) -> list[_Roll]:
     own = _compared(model, layout)
     task = [c for i, t in enumerate(layout.types) if t.name == TASK for c in _all(layout, i)]
     errors: list[list[NDArray[np.float64]]] = [[] for _ in found]
+    lacking: dict[int, tuple[str, ...]] = {}
     going = np.array([k for k, n in enumerate(lengths) if n], dtype=np.intp)
     angles = np.array([prop in layout.types[i].angles for i, prop, _ in own], dtype=np.bool_)
-    real = [np.stack([_values(e, k, layout, own) for k in range(n)]) if n else np.zeros((0, len(own)))
-            for e, n in zip(found, lengths, strict=True)]
+    real = [
+        np.stack([_values(e, k, layout, own) for k in range(n)]) if n else np.zeros((0, len(own)))
+        for e, n in zip(found, lengths, strict=True)
+    ]
     columns = [c for _, _, c in own]
     step = 0
     while len(going):
         told = model.predict_batch(layout, now[going])
+        for row in np.flatnonzero(~told.ok).tolist():
+            lacking[int(going[row])] = _lacking(told, row)
         going, vectors = going[told.ok], told.vectors[told.ok]
         for k, vector in zip(going.tolist(), vectors, strict=True):
             off = vector[columns] - real[k][step]
@@ -170,13 +185,22 @@ def _roll(model: WorldModel, found: Sequence[Episode]) -> list[_Roll]:
         now[going] = vectors
         for k in going.tolist():
             now[k, given] = found[k].before[step].vector[given]
-        now[np.ix_(going, task)] = 0.0
+            now[k, task] = 0.0
     names = tuple(f"{layout.types[i].name}.{prop}" for i, prop, _ in own)
     places = tuple(k for k, (i, prop, _) in enumerate(own) if prop in _position_names(layout, i))
     return [
-        _Roll(names, places, r, np.reshape(e, (len(e), len(own))), n)
-        for r, e, n in zip(real, errors, lengths, strict=True)
+        _Roll(names, places, r, np.reshape(e, (len(e), len(own))), n, lacking.get(k, ()))
+        for k, (r, e, n) in enumerate(zip(real, errors, lengths, strict=True))
     ]
+
+
+def _lacking(told: BatchPrediction, row: int) -> tuple[str, ...]:
+    """Targets that no mode predicted in one scene of a batch."""
+    layout = told.layout
+    parts = zip(told.parts, told.outcomes[row].tolist(), strict=True)
+    return tuple(
+        f"{layout.types[layout.index(name)].name}.{prop}" for (name, prop), o in parts if o != _PREDICTED
+    )
 
 
 def _steady(episode: Episode) -> int:

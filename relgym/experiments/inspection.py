@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 
 import relgym  # noqa: F401 - registers the envs
@@ -24,7 +26,7 @@ from relgym.scene.schema import SceneSchema
 from relgym.scene.state import relational_state
 from relgym.wrappers.views import settled, view_of
 
-__all__ = ["Finding", "diagnosis", "inspected"]
+__all__ = ["Finding", "diagnosis", "inspected", "space_text"]
 
 _REQUIRED = ("numpy", "scipy", "gymnasium", "pymunk", "python-fcl", "typer", "rich")
 _OPTIONAL = {
@@ -83,12 +85,13 @@ def inspected(env: gym.Env[Any, Any], view: View | None = None, *, seed: int = 0
     scene = view.with_action(scene, env.action_space.sample())
     related = relational_state(scene).relations if scene.layout.bodies else {}
     relations = [
-        f"{name}: {', '.join(f'({', '.join(objects)})' for objects in sorted(found))}"
+        f"{name}: {', '.join('(' + ', '.join(objects) + ')' for objects in sorted(found))}"
         for name, found in related.items()
         if found
     ]
     parts = {
-        "spaces": table(["", ""], _space_rows(env)).lstrip("\n"),
+        "observations": space_text(env.observation_space),
+        "actions": space_text(env.action_space),
         "seen as": _manner(view),
         "types": table(["type", "parent", "shape", "properties"], _type_rows(schema)),
         "objects": table(["object", "type"], [list(pair) for pair in schema.objects]),
@@ -129,16 +132,33 @@ def _manner(view: View) -> str:
     return f"{_MANNERS.get(kind, 'what a function of your own finds')}  ({own})"
 
 
-def _space_rows(env: gym.Env[Any, Any]) -> list[list[Cell]]:
-    return [["observations", str(env.observation_space)], ["actions", str(env.action_space)]]
+def space_text(space: spaces.Space[Any]) -> str:
+    """What a space holds, in a line: Gymnasium writes down every bound.
+
+    Examples
+    --------
+    >>> space_text(spaces.Box(-2.0, 2.0, (1,)))
+    '1 number from -2 to 2 (float32)'
+    >>> space_text(spaces.Dict(car=spaces.Box(-np.inf, np.inf, (3,), np.float64), gear=spaces.Discrete(5)))
+    'Dict of car: 3 numbers (float64); gear: Discrete(5)'
+    """
+    if isinstance(space, spaces.Dict):
+        return "Dict of " + "; ".join(f"{key}: {space_text(part)}" for key, part in space.items())
+    if not isinstance(space, spaces.Box):
+        return str(space)
+    low, high = float(space.low.min()), float(space.high.max())
+    same = (space.low == low).all() and (space.high == high).all() and np.isfinite([low, high]).all()
+    count = " x ".join(map(str, space.shape)) or "1"
+    limits = f" from {low:g} to {high:g}" if same else ""
+    return f"{count} number{'' if count == '1' else 's'}{limits} ({space.dtype})"
 
 
 def _values(scene: Scene) -> list[str]:
-    return [
-        f"{o.name}: {', '.join(f'{p} = {v:.4g}' for p, v in zip(o.type.properties, o.values.tolist(), strict=True))}"
-        for o in scene
-        if o.type.properties
-    ]
+    shown = []
+    for o in scene:
+        values = zip(o.type.properties, o.values.tolist(), strict=True)
+        shown.append(f"{o.name}: " + ", ".join(f"{prop} = {value:.4g}" for prop, value in values))
+    return shown
 
 
 def _type_rows(schema: SceneSchema) -> list[list[Cell]]:
