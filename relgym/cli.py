@@ -336,13 +336,14 @@ def _show_lessons(learned: Callable[..., Iterator[Round]], lesson: Lesson, as_js
         task = bar.add_task("learning", total=lesson.steps, wrong="")
 
         def tick(done: int, wrong: float) -> None:
+            if done < bar.tasks[0].completed:  # another round
+                bar.reset(task, total=lesson.steps, wrong="")
             bar.update(task, completed=done, wrong=f"wrong lately: {wrong:.1%}")
 
         for number, found in enumerate(learned(lesson, tick), start=1):
             rounds.append(found)
             if not as_json:
                 typer.echo(f"{'' if number == 1 else chr(10)}{found}")
-            bar.reset(task, total=lesson.steps, wrong="")
     if as_json:
         _echo_json(rounds)
     else:

@@ -19,7 +19,7 @@ from relgym.console.models import loaded, opened
 from relgym.console.views import view_named
 from relgym.envs.views import TaskView
 from relgym.errors import ConfigError, RelgymError
-from relgym.experiments.episodes import episodes, transitions
+from relgym.experiments.fresh import fresh_episodes, transitions
 from relgym.experiments.scores import Score, score
 from relgym.model.text import amount
 from relgym.wrappers import ModelLearner
@@ -89,7 +89,9 @@ class Round:
     features
         Features that were on.
     steps, planned
-        Transitions that were learned from, and how many there should have been.
+        Steps that were taken, and how many there should have been.
+    seen
+        Transitions that the model has learned from in all.
     seconds
         How long that took.
     stopped
@@ -107,6 +109,7 @@ class Round:
     features: tuple[str, ...]
     steps: int
     planned: int
+    seen: int
     seconds: float
     stopped: str
     score: Score | None
@@ -115,7 +118,8 @@ class Round:
 
     def __str__(self) -> str:
         on = f" with {', '.join(self.features)}" if self.features else ""
-        head = f"Learned {self.env_id}{on} from {amount(self.steps, 'step')} in {self.seconds:.1f} s: {self.file}"
+        more = f" ({self.seen:,} in all)" if self.seen > self.steps else ""
+        head = f"Learned {self.env_id}{on} from {amount(self.steps, 'step')}{more} in {self.seconds:.1f} s: {self.file}"
         if self.stopped:
             head = f"{self.stopped} after {self.steps:,} of {self.planned:,} steps; what was learned is in {self.file}"
         parts = [head, "" if self.score is None else str(self.score), *map(_advice, self.advice)]
@@ -247,8 +251,10 @@ def _learned(
     features = env.model.config.features
     env.save(out, history=lesson.history or lesson.resume is not None)
     if stopped:
-        return Round(env_id, str(out), features, steps, lesson.steps, seconds, stopped, None, (), ())
-    found = transitions(episodes(env.env, env.view, seed=seed), min(TEST, lesson.steps))
+        return Round(
+            env_id, str(out), features, steps, lesson.steps, env.model.seen, seconds, stopped, None, (), ()
+        )
+    found = transitions(fresh_episodes(env.env, env.view, seed=seed), min(TEST, lesson.steps))
     advice = env.model.advice()
     advised = dict.fromkeys(f for each in advice for f in each.features if f not in features)
     return Round(
@@ -257,6 +263,7 @@ def _learned(
         features,
         steps,
         lesson.steps,
+        env.model.seen,
         seconds,
         "",
         score(env.model, found, env.view.precision),

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import islice
 
 from relgym.console.models import ModelInEnv
-from relgym.experiments.episodes import episodes, transitions
 from relgym.experiments.evaluate import Evaluation, evaluate
+from relgym.experiments.fresh import fresh_episodes, transitions
 from relgym.experiments.horizons import Horizons, horizons
 from relgym.experiments.rollouts import RolloutErrors, rollouts
 from relgym.experiments.scores import Score, score
@@ -37,7 +37,7 @@ class Evaluated:
     truth: Evaluation | None
 
     def __str__(self) -> str:
-        parts = [f"{self.env}, random actions.  {self.score}"]
+        parts = [f"{self.env}, random actions\n\n{self.score}"]
         if self.truth is not None:
             parts.append(
                 f"{_RULE}\nBy what really happened, on episodes whose truth the world tells\n\n{self.truth}"
@@ -64,7 +64,7 @@ class RolledOut:
     truth: RolloutErrors | None
 
     def __str__(self) -> str:
-        parts = [f"{self.env}, random actions.  {self.horizons}"]
+        parts = [f"{self.env}, random actions\n\n{self.horizons}"]
         if self.truth is not None:
             parts.append(f"{_RULE}\nEpisodes whose truth the world tells\n\n{self.truth}")
         return "\n\n".join(parts)
@@ -72,7 +72,7 @@ class RolledOut:
 
 def evaluated(found: ModelInEnv, *, steps: int, seed: int) -> Evaluated:
     """Test a model one step ahead on so many fresh steps."""
-    fresh = transitions(episodes(found.env, found.view, seed=seed, most=steps), steps)
+    fresh = transitions(fresh_episodes(found.env, found.view, seed=seed, most=steps), steps)
     scored = score(found.model, fresh, found.view.precision)
     known = true_blocks(found.env_id, found.arguments, found.model.schema, seed=seed)
     if known is None:
@@ -83,7 +83,7 @@ def evaluated(found: ModelInEnv, *, steps: int, seed: int) -> Evaluated:
 
 def rolled_out(found: ModelInEnv, *, trials: int, steps: int, seed: int) -> RolledOut:
     """Let a model imagine so many fresh episodes, of so many steps at most."""
-    fresh = list(islice(episodes(found.env, found.view, seed=seed, most=steps), trials))
+    fresh = list(islice(fresh_episodes(found.env, found.view, seed=seed, most=steps), trials))
     errors = horizons(found.model, fresh)
     known = true_blocks(found.env_id, found.arguments, found.model.schema, seed=seed)
     if known is None or steps < known.steps:

@@ -10,7 +10,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.experiments.episodes import Episode
+from relgym.experiments.fresh import FreshEpisode
 from relgym.experiments.rollouts import STRAY, outside
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome
 from relgym.model.text import Cell, amount, table
@@ -99,13 +99,13 @@ class Horizons:
         heading = ["RMSE after", "spread", *(amount(n, "step") for n in self.after)]
         notes = [
             "A roll-out predicts an episode from its first scene and the actions alone. It strays when",
-            f"{limit} (spread: how much the real values vary),",
-            f"or when no mode predicts what comes: {self.stopped} of {self.trials}{lacking}.",
+            f"{limit}, or when no mode predicts what comes:",
+            f"{self.stopped} of {self.trials}{lacking}. Spread: the standard deviation of the real values.",
         ]
         return "\n".join([head, "", *([table(heading, rows), ""] if self.after else []), *notes])
 
 
-def horizons(model: WorldModel, found: Sequence[Episode]) -> Horizons:
+def horizons(model: WorldModel, found: Sequence[FreshEpisode]) -> Horizons:
     """Predict episodes from their first scenes alone, and compare with what happened.
 
     Actions and exogenous properties come from the episode; everything else from the model's own predictions. Where
@@ -125,7 +125,8 @@ def horizons(model: WorldModel, found: Sequence[Episode]) -> Horizons:
     spread = _spreads(rolls)
     bodies = any(roll.positions for roll in rolls)
     longest = max(roll.length for roll in rolls)
-    after = tuple(n for n in HORIZONS if n <= max(len(roll.errors) for roll in rolls))
+    farthest = max(len(roll.errors) for roll in rolls)
+    after = tuple(sorted({n for n in (*HORIZONS, farthest) if 0 < n <= farthest}))
     return Horizons(
         trials=len(rolls),
         longest=longest,
@@ -153,7 +154,7 @@ class _Roll:
     lacking: tuple[str, ...]
 
 
-def _roll(model: WorldModel, found: Sequence[Episode]) -> list[_Roll]:
+def _roll(model: WorldModel, found: Sequence[FreshEpisode]) -> list[_Roll]:
     """Roll-outs of episodes that begin with the same objects, stepped together."""
     layout = found[0].before[0].layout
     lengths = [_steady(e) for e in found]
@@ -203,7 +204,7 @@ def _lacking(told: BatchPrediction, row: int) -> tuple[str, ...]:
     )
 
 
-def _steady(episode: Episode) -> int:
+def _steady(episode: FreshEpisode) -> int:
     """After how many steps objects come or go, or the episode ends."""
     names = episode.before[0].layout.names
     changed = (k for k, scene in enumerate(episode.before) if scene.layout.names != names)
@@ -226,7 +227,7 @@ def _compared(model: WorldModel, layout: SceneLayout) -> list[tuple[int, str, in
 
 
 def _values(
-    episode: Episode, step: int, layout: SceneLayout, own: Sequence[tuple[int, str, int]]
+    episode: FreshEpisode, step: int, layout: SceneLayout, own: Sequence[tuple[int, str, int]]
 ) -> NDArray[np.float64]:
     after = episode.after[step]
     there = after.layout

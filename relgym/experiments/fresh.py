@@ -13,14 +13,14 @@ import numpy as np
 from relgym.envs.views import View
 from relgym.scene.objects import Scene, Transition
 
-__all__ = ["Episode", "episodes", "transitions"]
+__all__ = ["FreshEpisode", "fresh_episodes", "transitions"]
 
 _FRESH = 0x7E57
 """Sets the seeds of tests apart from those of learning."""
 
 
 @dataclass(frozen=True, slots=True)
-class Episode:
+class FreshEpisode:
     """Some consecutive steps of one episode.
 
     Attributes
@@ -38,7 +38,9 @@ class Episode:
         return len(self.before)
 
 
-def episodes(env: gym.Env[Any, Any], view: View, *, seed: int, most: int = 1000) -> Iterator[Episode]:
+def fresh_episodes(
+    env: gym.Env[Any, Any], view: View, *, seed: int, most: int = 1000
+) -> Iterator[FreshEpisode]:
     """Act at random in an env, episode after episode, without end.
 
     Parameters
@@ -69,10 +71,10 @@ def episodes(env: gym.Env[Any, Any], view: View, *, seed: int, most: int = 1000)
             over = bool(terminated or truncated)
             scene = view.scene(observation, info, last=scene)
             after.append(view.with_outcome(scene, reward, bool(terminated)))
-        yield Episode(tuple(before), tuple(after))
+        yield FreshEpisode(tuple(before), tuple(after))
 
 
-def transitions(found: Iterator[Episode], steps: int) -> list[Transition]:
+def transitions(found: Iterator[FreshEpisode], steps: int) -> list[Transition]:
     """The first so many steps of some episodes."""
     pairs = ((b, a) for episode in found for b, a in zip(episode.before, episode.after, strict=True))
     return [Transition(before, after) for before, after in islice(pairs, steps)]
