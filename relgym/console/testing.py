@@ -30,17 +30,20 @@ class Evaluated:
         Errors by target.
     truth
         Errors by what really happened, in the home worlds; else None.
+    scenes
+        What is special about the scenes that `truth` is of.
     """
 
     env: str
     score: Score
     truth: Evaluation | None
+    scenes: str = ""
 
     def __str__(self) -> str:
         parts = [f"{self.env}, random actions\n\n{self.score}"]
         if self.truth is not None:
             parts.append(
-                f"{_RULE}\nBy what really happened, on episodes whose truth the world tells\n\n{self.truth}"
+                f"{_RULE}\nOn the thesis' test scenes ({self.scenes}), by what really happened\n\n{self.truth}"
             )
         return "\n\n".join(parts)
 
@@ -57,16 +60,19 @@ class RolledOut:
         How the errors grow.
     truth
         Roll-outs with and without a corner that was hit, in the home worlds; else None.
+    scenes
+        What is special about the scenes that `truth` is of.
     """
 
     env: str
     horizons: Horizons
     truth: RolloutErrors | None
+    scenes: str = ""
 
     def __str__(self) -> str:
         parts = [f"{self.env}, random actions\n\n{self.horizons}"]
         if self.truth is not None:
-            parts.append(f"{_RULE}\nEpisodes whose truth the world tells\n\n{self.truth}")
+            parts.append(f"{_RULE}\nOn the thesis' test scenes ({self.scenes})\n\n{self.truth}")
         return "\n\n".join(parts)
 
 
@@ -78,7 +84,7 @@ def evaluated(found: ModelInEnv, *, steps: int, seed: int) -> Evaluated:
     if known is None:
         return Evaluated(found.env_id, scored, None)
     blocks = list(known.blocks(-(-steps // known.steps)))
-    return Evaluated(found.env_id, scored, evaluate(found.model, blocks, known.laws))
+    return Evaluated(found.env_id, scored, evaluate(found.model, blocks, known.laws), known.scenes)
 
 
 def rolled_out(found: ModelInEnv, *, trials: int, steps: int, seed: int) -> RolledOut:
@@ -88,4 +94,4 @@ def rolled_out(found: ModelInEnv, *, trials: int, steps: int, seed: int) -> Roll
     known = true_blocks(found.env_id, found.arguments, found.model.schema, seed=seed)
     if known is None or steps < known.steps:
         return RolledOut(found.env_id, errors, None)
-    return RolledOut(found.env_id, errors, rollouts(found.model, list(known.blocks(trials))))
+    return RolledOut(found.env_id, errors, rollouts(found.model, list(known.blocks(trials))), known.scenes)

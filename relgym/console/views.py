@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
 from pathlib import Path
 from typing import Any
@@ -11,36 +12,21 @@ import gymnasium as gym
 
 from relgym.console.envs import here
 from relgym.console.suggestions import did_you_mean
-from relgym.envs.spaces_json import space_to_json
-from relgym.envs.views import NumbersView, View, view_from_json
+from relgym.envs.views import NumbersView, Part, Rows, Static, TableView, View
 from relgym.errors import ConfigError, RelgymError
-from relgym.wrappers.views import chosen_view, settled
+from relgym.scene.shapes import Box, Sphere
+from relgym.wrappers.views import chosen_view
 
-__all__ = ["KINDS", "settled_by_a_reset", "view_named"]
+__all__ = ["KINDS", "view_named"]
 
 KINDS = ("auto", "numbers")
 """Views that have a name."""
 
-_EMPTY: dict[str, dict[str, Any]] = {
-    "flat": {
-        "names": None,
-        "parts": [],
-        "angles": "auto",
-        "actions": None,
-        "static": [],
-        "axes": ["y", True],
-    },
-    "table": {
-        "columns": [],
-        "rows": None,
-        "presence": None,
-        "match": None,
-        "actions": None,
-        "static": [],
-        "axes": ["y", True],
-    },
-}
-"""What a view's file may leave out, by its kind."""
+_MAKERS: dict[str, type[Any]] = {"numbers": NumbersView, "table": TableView}
+"""Views that a file can describe, by its entry ``kind``."""
+
+_RECORDS: dict[str, type[Any]] = {"parts": Part, "rows": Rows, "static": Static}
+_SHAPES: dict[str, type[Any]] = {"box": Box, "sphere": Sphere}
 
 
 def view_named(
@@ -58,8 +44,8 @@ def view_named(
     env
         The env.
     text
-        ``auto`` or None: the env's own objects, or else its numbers; ``numbers``; ``FILE.json``, what a view's
-        `to_json` gives, without the spaces; or ``MODULE:NAME``, a view or a function of (observation space, action
+        ``auto`` or None: the env's own objects, or else its numbers; ``numbers``; ``FILE.json``, its ``kind``
+        (``numbers`` or ``table``) and the arguments of `NumbersView` or `TableView` beside the spaces; or ``MODULE:NAME``, a view or a function of (observation space, action
         space) that makes one.
     names
         Names of the numbers, separated by commas.
@@ -83,7 +69,7 @@ def view_named(
     elif text is not None and text.endswith(".json"):
         given = _from_file(text, env)
     elif text is not None and ":" in text:
-        given = _imported(text)
+        given = _imported(text, env)
     elif text not in (None, "auto"):
         raise ConfigError(
             f"--view {text}: expected {', '.join(KINDS)}, a FILE.json or MODULE:NAME{did_you_mean(str(text), KINDS)}"
@@ -91,34 +77,45 @@ def view_named(
     return chosen_view(given, *spaces, schema=schema, reward=reward, terminated=terminated)
 
 
-def settled_by_a_reset(view: View, env: gym.Env[Any, Any], seed: int) -> View:
-    """The view with the angles that a first observation shows."""
-    return settled(view, [env.reset(seed=seed)[0]])
-
-
 def _from_file(text: str, env: gym.Env[Any, Any]) -> View:
+    """The view that a file describes: a kind, and what its maker takes beside the spaces."""
     try:
-        data = json.loads(Path(text).read_text(encoding="utf-8"))
-        kind = {"numbers": "flat"}.get(data.get("kind"), data.get("kind"))
-        spaces = {
-            "observation": space_to_json(env.observation_space),
-            "action": space_to_json(env.action_space),
-        }
-        if kind not in _EMPTY:
-            raise ConfigError(f"kind {kind!r}; expected 'numbers' or 'table'")
-        if unknown := sorted(set(data) - {"kind", "changes", "offsets", *spaces, *_EMPTY[kind]}):
-            known = sorted(_EMPTY[kind])
-            raise ConfigError(f"no entry {unknown[0]!r}{did_you_mean(unknown[0], known)}; expected {known}")
-        return view_from_json({**_EMPTY[kind], **data, **spaces, "kind": kind})
+        data = dict(json.loads(Path(text).read_text(encoding="utf-8")))
     except OSError as error:
         raise ConfigError(f"--view {text} can't be read ({error.strerror}); expected a file") from None
+    except (ValueError, TypeError) as error:
+        raise ConfigError(f"--view {text}: expected a JSON object, but {error}") from None
+    kind = data.pop("kind", None)
+    if kind not in _MAKERS:
+        raise ConfigError(f"--view {text}: kind {kind!r}; expected one of {sorted(_MAKERS)}")
+    known = list(inspect.signature(_MAKERS[kind]).parameters)[2:]
+    if unknown := sorted(set(data) - set(known)):
+        wrong = unknown[0]
+        raise ConfigError(
+            f"--view {text}: no entry {wrong!r}{did_you_mean(wrong, known)}; expected {', '.join(known)}"
+        )
+    try:
+        given = {name: [_record(name, each) for each in data.pop(name)] for name in _RECORDS if name in data}
+        view: View = _MAKERS[kind](env.observation_space, env.action_space, **data, **given)
+        return view
     except RelgymError as error:
         raise ConfigError(f"--view {text}: {error}") from None
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ConfigError(f"--view {text} holds no view: {error!r}; see the guide to the console") from None
+    except (TypeError, KeyError, AttributeError) as error:
+        raise ConfigError(
+            f"--view {text} can't be read: {error}; see relgym.wrappers.{_MAKERS[kind].__name__}"
+        ) from None
 
 
-def _imported(text: str) -> Any:
+def _record(name: str, entry: Any) -> Any:
+    """A part, a row or a static object, whose shape is named."""
+    given = dict(entry)
+    if isinstance(shape := given.get("shape"), str):
+        given["shape"] = _SHAPES[shape]()
+    return _RECORDS[name](**given)
+
+
+def _imported(text: str, env: gym.Env[Any, Any]) -> Any:
+    """What the user's module holds; called with the spaces where it is no view already."""
     module, _, name = text.partition(":")
     try:
         with here():
@@ -130,4 +127,15 @@ def _imported(text: str) -> Any:
         ) from None
     if not hasattr(found, name):
         raise ConfigError(f"--view {text}: {module} has no {name!r}{did_you_mean(name, dir(found))}")
-    return getattr(found, name)
+    given = getattr(found, name)
+    if isinstance(given, View) or not callable(given):
+        return given
+    try:
+        return given(env.observation_space, env.action_space)
+    except RelgymError:
+        raise
+    except Exception as error:
+        raise ConfigError(
+            f"--view {text} fails with {type(error).__name__}: {error}; expected a view, or a function of (observation "
+            "space, action space) that makes one"
+        ) from None

@@ -32,11 +32,14 @@ class TrueBlocks:
         The ball world's linear laws; None for the truck's.
     steps
         Length of an episode.
+    scenes
+        What is special about them, for people.
     """
 
     blocks: Callable[[int], Iterator[Block]]
     laws: AnalyticModes | None
     steps: int
+    scenes: str
 
 
 def true_blocks(
@@ -78,7 +81,10 @@ def _ball(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
         objects=kinds,
     )
     return TrueBlocks(
-        lambda blocks: ball_blocks(setting, seed=seed, blocks=blocks, test=True), setting.modes(), 200
+        lambda blocks: ball_blocks(setting, seed=seed, blocks=blocks, test=True),
+        setting.modes(),
+        200,
+        "every room in turn",
     )
 
 
@@ -92,7 +98,7 @@ def _truck(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
         found = truck_blocks(redraw, seed=seed, n_boxes=boxes, repeats=count, test=True)
         return (block for block, _ in zip(found, range(count), strict=False))
 
-    return TrueBlocks(blocks, None, 40)
+    return TrueBlocks(blocks, None, 40, "every order of the boxes; pushed so hard that nothing stops")
 
 
 _BALL = {"incline": 30.0, "elasticity": 0.9, "friction": 0.0}
