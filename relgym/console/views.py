@@ -45,8 +45,8 @@ def view_named(
         The env.
     text
         ``auto`` or None: the env's own objects, or else its numbers; ``numbers``; ``FILE.json``, its ``kind``
-        (``numbers`` or ``table``) and the arguments of `NumbersView` or `TableView` beside the spaces; or ``MODULE:NAME``, a view or a function of (observation space, action
-        space) that makes one.
+        (``numbers`` or ``table``) and the arguments of `NumbersView` or `TableView` beside the spaces; or
+        ``MODULE:NAME``, a view or a function of (observation space, action space) that makes one.
     names
         Names of the numbers, separated by commas.
     reward, terminated

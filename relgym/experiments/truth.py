@@ -80,12 +80,11 @@ def _ball(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
         type_names=type_names,
         objects=kinds,
     )
-    return TrueBlocks(
-        lambda blocks: ball_blocks(setting, seed=seed, blocks=blocks, test=True),
-        setting.modes(),
-        200,
-        "every room in turn",
-    )
+
+    def blocks(count: int) -> Iterator[Block]:
+        return ball_blocks(setting, seed=seed, blocks=count, test=True)
+
+    return TrueBlocks(blocks, setting.modes(), 200, "every room in turn")
 
 
 def _truck(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
