@@ -11,7 +11,7 @@ from relgym.experiments.fresh import fresh_episodes, transitions
 from relgym.experiments.horizons import Horizons, horizons
 from relgym.experiments.rollouts import RolloutErrors, rollouts
 from relgym.experiments.scores import Score, score
-from relgym.experiments.truth import true_blocks
+from relgym.experiments.truth import true_episodes
 
 __all__ = ["Evaluated", "RolledOut", "evaluated", "rolled_out"]
 
@@ -80,18 +80,18 @@ def evaluated(found: ModelInEnv, *, steps: int, seed: int) -> Evaluated:
     """Test a model one step ahead on so many fresh steps."""
     fresh = transitions(fresh_episodes(found.env, found.view, seed=seed, most=steps), steps)
     scored = score(found.model, fresh, found.view.precision)
-    known = true_blocks(found.env_id, found.arguments, found.model.schema, seed=seed)
+    known = true_episodes(found.env_id, found.arguments, found.model.schema, seed=seed)
     if known is None:
         return Evaluated(found.env_id, scored, None)
-    blocks = list(known.blocks(-(-steps // known.steps)))
-    return Evaluated(found.env_id, scored, evaluate(found.model, blocks, known.laws), known.scenes)
+    episodes = list(known.episodes(-(-steps // known.steps)))
+    return Evaluated(found.env_id, scored, evaluate(found.model, episodes, known.laws), known.scenes)
 
 
 def rolled_out(found: ModelInEnv, *, trials: int, steps: int, seed: int) -> RolledOut:
     """Let a model imagine so many fresh episodes, of so many steps at most."""
     fresh = list(islice(fresh_episodes(found.env, found.view, seed=seed, most=steps), trials))
     errors = horizons(found.model, fresh)
-    known = true_blocks(found.env_id, found.arguments, found.model.schema, seed=seed)
+    known = true_episodes(found.env_id, found.arguments, found.model.schema, seed=seed)
     if known is None or steps < known.steps:
         return RolledOut(found.env_id, errors, None)
-    return RolledOut(found.env_id, errors, rollouts(found.model, list(known.blocks(trials))), known.scenes)
+    return RolledOut(found.env_id, errors, rollouts(found.model, list(known.episodes(trials))), known.scenes)

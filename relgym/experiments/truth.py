@@ -13,11 +13,11 @@ from typing import Any
 from relgym.envs.model_files import schema_like
 from relgym.errors import ConfigError
 from relgym.experiments.analytic import AnalyticModes
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import BallExperiment, ball_blocks, truck_blocks
+from relgym.experiments.data import BallExperiment, ball_episodes, truck_episodes
+from relgym.experiments.episodes import Episode
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["TrueBlocks", "true_blocks"]
+__all__ = ["TrueBlocks", "true_episodes"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class TrueBlocks:
 
     Attributes
     ----------
-    blocks
+    episodes
         From how many to the episodes.
     laws
         The ball world's linear laws; None for the truck's.
@@ -36,13 +36,13 @@ class TrueBlocks:
         What is special about them, for people.
     """
 
-    blocks: Callable[[int], Iterator[Block]]
+    episodes: Callable[[int], Iterator[Episode]]
     laws: AnalyticModes | None
     steps: int
     scenes: str
 
 
-def true_blocks(
+def true_episodes(
     env_id: str, arguments: Mapping[str, Any], schema: SceneSchema, *, seed: int
 ) -> TrueBlocks | None:
     """The test set of an env; None for envs of others, and arguments that it doesn't cover.
@@ -60,7 +60,7 @@ def true_blocks(
     try:
         found = None if make is None else make(dict(arguments), seed)
         if found is not None:
-            schema_like(next(found.blocks(1)).schema, schema, env_id)
+            schema_like(next(found.episodes(1)).schema, schema, env_id)
     except (ConfigError, TypeError, ValueError):
         return None
     return found
@@ -76,28 +76,28 @@ def _ball(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
         float(number["incline"]),
         float(number["elasticity"]),
         (float(number["friction"]),),
-        blocks=1,
+        episodes=1,
         type_names=type_names,
         objects=kinds,
     )
 
-    def blocks(count: int) -> Iterator[Block]:
-        return ball_blocks(setting, seed=seed, blocks=count, test=True)
+    def episodes(count: int) -> Iterator[Episode]:
+        return ball_episodes(setting, seed=seed, episodes=count, test=True)
 
-    return TrueBlocks(blocks, setting.modes(), 200, "every room in turn")
+    return TrueBlocks(episodes, setting.modes(), 200, "every room in turn")
 
 
 def _truck(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
-    redraw, boxes = arguments.pop("redraw", "block"), arguments.pop("n_boxes", 3)
+    resample, boxes = arguments.pop("resample", "episode"), arguments.pop("n_boxes", 3)
     task = arguments.pop("task", "auto")
-    if arguments or (task is not None and (task, redraw) != ("auto", "step")):
+    if arguments or (task is not None and (task, resample) != ("auto", "step")):
         return None
 
-    def blocks(count: int) -> Iterator[Block]:
-        found = truck_blocks(redraw, seed=seed, n_boxes=boxes, repeats=count, test=True)
-        return (block for block, _ in zip(found, range(count), strict=False))
+    def episodes(count: int) -> Iterator[Episode]:
+        found = truck_episodes(resample, seed=seed, n_boxes=boxes, repeats=count, test=True)
+        return (episode for episode, _ in zip(found, range(count), strict=False))
 
-    return TrueBlocks(blocks, None, 40, "every order of the boxes; pushed so hard that nothing stops")
+    return TrueBlocks(episodes, None, 40, "every order of the boxes; pushed so hard that nothing stops")
 
 
 _BALL = {"incline": 30.0, "elasticity": 0.9, "friction": 0.0}
