@@ -17,11 +17,11 @@ from relgym.experiments.data import BallExperiment, ball_episodes, truck_episode
 from relgym.experiments.episodes import Episode
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["TrueBlocks", "true_episodes"]
+__all__ = ["TrueEpisodes", "true_episodes"]
 
 
 @dataclass(frozen=True, slots=True)
-class TrueBlocks:
+class TrueEpisodes:
     """Fresh episodes of a home world, with the truth about each step.
 
     Attributes
@@ -44,7 +44,7 @@ class TrueBlocks:
 
 def true_episodes(
     env_id: str, arguments: Mapping[str, Any], schema: SceneSchema, *, seed: int
-) -> TrueBlocks | None:
+) -> TrueEpisodes | None:
     """The test set of an env; None for envs of others, and arguments that it doesn't cover.
 
     Parameters
@@ -66,7 +66,7 @@ def true_episodes(
     return found
 
 
-def _ball(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
+def _ball(arguments: dict[str, Any], seed: int) -> TrueEpisodes | None:
     number = {name: arguments.pop(name, usual) for name, usual in _BALL.items()}
     kinds = tuple(arguments.pop("objects", ("box", "ramp")))
     type_names = arguments.pop("type_names", "shape")
@@ -84,10 +84,10 @@ def _ball(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
     def episodes(count: int) -> Iterator[Episode]:
         return ball_episodes(setting, seed=seed, episodes=count, test=True)
 
-    return TrueBlocks(episodes, setting.modes(), 200, "every room in turn")
+    return TrueEpisodes(episodes, setting.modes(), 200, "every room in turn")
 
 
-def _truck(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
+def _truck(arguments: dict[str, Any], seed: int) -> TrueEpisodes | None:
     resample, boxes = arguments.pop("resample", "episode"), arguments.pop("n_boxes", 3)
     task = arguments.pop("task", "auto")
     if arguments or (task is not None and (task, resample) != ("auto", "step")):
@@ -97,11 +97,11 @@ def _truck(arguments: dict[str, Any], seed: int) -> TrueBlocks | None:
         found = truck_episodes(resample, seed=seed, n_boxes=boxes, repeats=count, test=True)
         return (episode for episode, _ in zip(found, range(count), strict=False))
 
-    return TrueBlocks(episodes, None, 40, "every order of the boxes; pushed so hard that nothing stops")
+    return TrueEpisodes(episodes, None, 40, "every order of the boxes; pushed so hard that nothing stops")
 
 
 _BALL = {"incline": 30.0, "elasticity": 0.9, "friction": 0.0}
-_MAKERS: dict[str, Callable[[dict[str, Any], int], TrueBlocks | None]] = {
+_MAKERS: dict[str, Callable[[dict[str, Any], int], TrueEpisodes | None]] = {
     "relgym/BallBoxRamp-v0": _ball,
     "relgym/TruckPush-v0": _truck,
 }
