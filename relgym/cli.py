@@ -65,6 +65,25 @@ Names = Annotated[
 ]
 
 
+@app.callback()
+def main(
+    modules: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--import",
+            metavar="MODULE",
+            help="Import a module first, which registers envs or features; repeatable.",
+        ),
+    ] = None,
+) -> None:
+    """Learn readable models of what actions do, and ask, test and print them."""
+    if modules:
+        from relgym.console.envs import imported
+
+        for name in modules:
+            imported(name, "--import")
+
+
 @app.command()
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for models and pictures.")] = Path("out/demo"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from plain_envs import Birds, Slider, Wheel
 from typer.testing import CliRunner
 
 from relgym.cli import app
+from relgym.clustering import features
 from relgym.console.learning import Round
 from relgym.console.next_steps import next_steps
 from relgym.model.world_model import WorldModel
@@ -243,6 +245,33 @@ def test_an_env_of_the_folders_own_module() -> None:
     finally:
         gym.registry.pop("test/Homemade-v0", None)
     assert "there is no env 'test/Homemade-v0'" in run("eval", "h.json", code=2)
+
+
+def test_features_of_the_folders_own_module() -> None:
+    Path("drags.py").write_text(
+        "import numpy\nfrom relgym.clustering.features import register_function\n"
+        "def drag(v):\n    return v * numpy.abs(v)\nregister_function('drag', drag)\n",
+        encoding="utf-8",
+    )
+    try:
+        told = run("learn", "test/Slider-v1", "--features", "drag", "--steps", 20, "--out", "d.json", code=2)
+        assert "--features drag: unknown" in told
+        run(
+            "--import",
+            "drags",
+            "learn",
+            "test/Slider-v1",
+            "--features",
+            "drag",
+            "--steps",
+            20,
+            "--out",
+            "d.json",
+        )
+        assert WorldModel.load("d.json").config.features == ("drag",)
+    finally:
+        features._functions.pop("drag", None)
+        sys.modules.pop("drags", None)
 
 
 def test_reward_and_end_are_learned_and_tested_too() -> None:

@@ -79,6 +79,7 @@ MISTAKES = {
     "learn cartpole --out new.json": ["there is CartPole-v0 and CartPole-v1"],
     "learn nobody/Thing-v0 --out new.json": ["nothing that is installed here registers 'nobody'", "MODULE:"],
     "learn no_such_module:Thing-v0 --out new.json": ["module 'no_such_module' can't be imported"],
+    "--import no_such_module envs": ["--import: the module 'no_such_module' can't be imported"],
     "learn --out new.json": ["name the env to learn"],
     "learn test/Slider-v1": ["Missing option '--out'", "relgym learn --help"],
     f"{LEARN} --step 5": ["no option --step", "did you mean '--steps'?", "--features"],

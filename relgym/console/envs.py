@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import gymnasium as gym
@@ -18,7 +19,7 @@ import relgym  # noqa: F401 - registers the envs
 from relgym.console.suggestions import did_you_mean, nearest
 from relgym.errors import ConfigError, RelgymError
 
-__all__ = ["arguments_of", "here", "listing", "made", "signature_text"]
+__all__ = ["arguments_of", "here", "imported", "listing", "made", "signature_text"]
 
 _VERSION = re.compile(r"-v\d+$")
 
@@ -89,6 +90,26 @@ def here() -> Iterator[None]:
             sys.path.remove(folder)
 
 
+def imported(module: str, why: str) -> ModuleType:
+    """A module that is installed or lies in the current folder; `ConfigError` where it can't be imported.
+
+    Parameters
+    ----------
+    module
+        Its name.
+    why
+        What asked for it, for the error.
+    """
+    try:
+        with here():
+            return importlib.import_module(module)
+    except ImportError as error:
+        raise ConfigError(
+            f"{why}: the module {module!r} can't be imported ({error}); expected one that is installed or lies in "
+            "this folder"
+        ) from None
+
+
 def listing(*, every: bool = False) -> dict[str, str]:
     """Ids of relgym's own envs and what each is in a line; with `every` those of all envs, and where they are from."""
     found = {}
@@ -111,14 +132,7 @@ def signature_text(env: gym.Env[Any, Any]) -> str:
 def _spec(env_id: str) -> EnvSpec:
     module, colon, name = env_id.rpartition(":")
     if colon:
-        try:
-            with here():
-                importlib.import_module(module)
-        except ImportError as error:
-            raise ConfigError(
-                f"{env_id}: the module {module!r} can't be imported ({error}); expected one that is installed or lies "
-                "in this folder, and registers the env"
-            ) from None
+        imported(module, env_id)
     if name not in gym.registry:
         raise ConfigError(_unknown(name))
     return gym.registry[name]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import tempfile
 import textwrap
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,7 +25,7 @@ from relgym.experiments.scores import Score, score
 from relgym.model.text import amount
 from relgym.wrappers import ModelLearner
 
-__all__ = ["Lesson", "Round", "checked_out", "lessons"]
+__all__ = ["Lesson", "Round", "checked_out", "lessons", "switch"]
 
 TEST = 1000
 """Most fresh steps that a model is tested on when it has been learned."""
@@ -124,6 +125,11 @@ class Round:
             head = f"{self.stopped} after {self.steps:,} of {self.planned:,} steps; what was learned is in {self.file}"
         parts = [head, "" if self.score is None else str(self.score), *map(_advice, self.advice)]
         return "\n\n".join(part for part in parts if part)
+
+
+def switch(features: Iterable[str]) -> str:
+    """The option that switches features on, as a shell reads it."""
+    return f"--features {shlex.quote(','.join(features))}"
 
 
 def _advice(text: str) -> str:
@@ -267,7 +273,7 @@ def _learned(
         seconds,
         "",
         score(env.model, found, env.view.precision),
-        tuple(f"{each.target}: {each}" for each in advice),
+        tuple(f"{each.target}: {each.told(switch(each.features))}" for each in advice),
         tuple(advised),
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 
-from relgym.console.learning import Round
+from relgym.console.learning import Round, switch
 
 __all__ = ["next_steps"]
 
@@ -21,6 +21,6 @@ def next_steps(learned: Round) -> str:
     width = max(map(len, found))
     lines = ["Next", *(f"  {command:<{width}}  {text}" for command, text in found.items())]
     if learned.advised:
-        features = shlex.quote(",".join((*learned.features, *learned.advised)))
-        lines.append(f"or learn again with what is advised: --features {features}, or --follow-advice")
+        more = switch((*learned.features, *learned.advised))
+        lines.append(f"or learn again with what is advised: {more}, or --follow-advice")
     return "\n".join(lines)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import json
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from relgym.console.envs import here
+from relgym.console.envs import imported
 from relgym.console.suggestions import did_you_mean
 from relgym.envs.views import NumbersView, Part, Rows, Static, TableView, View
 from relgym.errors import ConfigError, RelgymError
@@ -117,14 +116,7 @@ def _record(name: str, entry: Any) -> Any:
 def _imported(text: str, env: gym.Env[Any, Any]) -> Any:
     """What the user's module holds; called with the spaces where it is no view already."""
     module, _, name = text.partition(":")
-    try:
-        with here():
-            found = importlib.import_module(module)
-    except ImportError as error:
-        raise ConfigError(
-            f"--view {text}: the module {module!r} can't be imported ({error}); expected one that is installed or lies "
-            "in this folder"
-        ) from None
+    found = imported(module, f"--view {text}")
     if not hasattr(found, name):
         raise ConfigError(f"--view {text}: {module} has no {name!r}{did_you_mean(name, dir(found))}")
     given = getattr(found, name)
