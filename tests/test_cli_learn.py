@@ -164,6 +164,34 @@ def test_an_env_that_fails_costs_nothing_that_was_learned(how: str) -> None:
     assert WorldModel.load("part.json").seen == 40
 
 
+def test_ctrl_c_while_following_advice_keeps_the_round_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual, made = Pendulous.step, []
+
+    def step(self: Pendulous, action: Any) -> Any:
+        made.append(1)
+        if (
+            len(made) == 820
+        ):  # 300 to learn, as many to test on (cut at episodes' ends), and some of the next 300
+            os.kill(os.getpid(), signal.SIGINT)
+        return usual(self, action)
+
+    monkeypatch.setattr(Pendulous, "step", step)
+    arguments = ("learn", "test/Pendulous-v0", "--steps", 300, "--follow-advice", "--out", "p.json")
+    text = run(*arguments, code=130)
+    assert "Stopped by Ctrl-C; kept the round before, after" in text
+    assert WorldModel.load("p.json").config.features == ()
+
+
+def test_an_env_that_fails_at_once_leaves_no_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    def reset(self: Slider, **options: Any) -> Any:
+        raise RuntimeError("no display")
+
+    monkeypatch.setattr(Slider, "reset", reset)
+    told = run("learn", "test/Slider-v1", "--steps", 9, "--out", "new/s.json", code=2)
+    assert "RuntimeError: no display" in told and "nothing was saved" in told
+    assert not Path("new").exists()
+
+
 def test_a_model_with_history_goes_on_learning() -> None:
     run("learn", "test/Slider-v1", "-a", "length=25", "--steps", 60, "--history", "--out", "a.json")
     text = run("learn", "--resume", "a.json", "--steps", 40, "--out", "b.json")

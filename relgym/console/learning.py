@@ -137,7 +137,7 @@ def _advice(text: str) -> str:
 
 
 def checked_out(path: Path) -> Path:
-    """A path that a file can be written to, its folder made where there is none.
+    """A path that a file can be written to, in a folder that is there or can be made.
 
     Raises
     ------
@@ -146,9 +146,9 @@ def checked_out(path: Path) -> Path:
     """
     if path.is_dir():
         raise ConfigError(f"--out {path} is a folder: expected a file, such as {path / 'model.json'}")
+    there = next((p for p in path.absolute().parents if p.exists()), path.parent)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
+        with tempfile.TemporaryFile(dir=there):
             pass
         if path.exists() and not os.access(path, os.W_OK):
             raise PermissionError(13, "Permission denied")
@@ -173,17 +173,19 @@ def lessons(lesson: Lesson, tick: Tick) -> Iterator[Round]:
     """
     out = checked_out(lesson.out)
     last: Round | None = None
-    for _ in range(ROUNDS if lesson.follow_advice else 1):
-        learner, env_id = _learner(lesson)
-        try:
-            found = _learned(learner, lesson, env_id, out, tick, last)
-        finally:
-            learner.close()
-        yield found
-        if found.stopped or not found.advised:
-            return
-        last = found
-        lesson = replace(lesson, config=replace(lesson.config, features=(*found.features, *found.advised)))
+    with _interrupts() as interrupted:
+        for _ in range(ROUNDS if lesson.follow_advice else 1):
+            learner, env_id = _learner(lesson)
+            try:
+                found = _learned(learner, lesson, env_id, out, tick, interrupted, last)
+            finally:
+                learner.close()
+            yield found
+            if found.stopped or not found.advised:
+                return
+            last = found
+            features = (*found.features, *found.advised)
+            lesson = replace(lesson, config=replace(lesson.config, features=features))
 
 
 def _learner(lesson: Lesson) -> tuple[ModelLearner, str]:
@@ -239,65 +241,67 @@ def _check_resumable(lesson: Lesson, path: Path) -> None:
 
 
 def _learned(
-    env: ModelLearner, lesson: Lesson, env_id: str, out: Path, tick: Tick, last: Round | None
+    env: ModelLearner,
+    lesson: Lesson,
+    env_id: str,
+    out: Path,
+    tick: Tick,
+    interrupted: Callable[[], bool],
+    last: Round | None,
 ) -> Round:
+    """Learn once, save, and test what was learned; `last` is the round before."""
     start = time.perf_counter()
     known = 0 if lesson.resume is None else env.model.seen
     seed = known if lesson.seed is None else lesson.seed
-    steps, stopped = _run(env, lesson.steps, seed, tick)
+    steps, stopped = _run(env, lesson.steps, seed, tick, interrupted)
     seconds = round(time.perf_counter() - start, 2)
     if stopped and last is not None:
-        return replace(
-            last, steps=steps, planned=lesson.steps, stopped=f"{stopped}; kept the round before,", advised=()
-        )
-    if not env.has_wrapper_attr("model") or not steps:
-        raise ConfigError(
-            f"{env_id}: {stopped or 'nothing was learned'} before the first step; nothing was saved"
-        )
-    features = env.model.config.features
+        stopped = f"{stopped}; kept the round before,"
+        return replace(last, steps=steps, planned=lesson.steps, stopped=stopped, advised=())
+    if not steps:
+        raise ConfigError(f"{env_id}: {stopped} before the first step; nothing was saved")
+    out.parent.mkdir(parents=True, exist_ok=True)
     env.save(out, history=lesson.history or lesson.resume is not None)
-    if stopped:
-        return Round(
-            env_id, str(out), features, steps, lesson.steps, env.model.seen, seconds, stopped, None, (), ()
-        )
-    found = transitions(fresh_episodes(env.env, env.view, seed=seed), min(TEST, lesson.steps))
+    features = env.model.config.features
+    done = Round(
+        env_id, str(out), features, steps, lesson.steps, env.model.seen, seconds, stopped, None, (), ()
+    )
+    return done if stopped else _tested(done, env, seed)
+
+
+def _tested(done: Round, env: ModelLearner, seed: int) -> Round:
+    """The round with errors on fresh steps, and advice."""
+    found = transitions(fresh_episodes(env.env, env.view, seed=seed), min(TEST, done.planned))
     advice = env.model.advice()
-    advised = dict.fromkeys(f for each in advice for f in each.features if f not in features)
-    return Round(
-        env_id,
-        str(out),
-        features,
-        steps,
-        lesson.steps,
-        env.model.seen,
-        seconds,
-        "",
-        score(env.model, found, env.view.precision),
-        tuple(f"{each.target}: {each.told(switch(each.features))}" for each in advice),
-        tuple(advised),
+    advised = dict.fromkeys(f for each in advice for f in each.features if f not in done.features)
+    return replace(
+        done,
+        score=score(env.model, found, env.view.precision),
+        advice=tuple(f"{each.target}: {each.told(switch(each.features))}" for each in advice),
+        advised=tuple(advised),
     )
 
 
-def _run(env: ModelLearner, steps: int, seed: int, tick: Tick) -> tuple[int, str]:
+def _run(
+    env: ModelLearner, steps: int, seed: int, tick: Tick, interrupted: Callable[[], bool]
+) -> tuple[int, str]:
     """Take random actions; how many steps were taken, and why not all."""
     done = 0
-    with _interrupts() as interrupted:
-        try:
-            env.action_space.seed(seed)
-            env.reset(seed=seed)
-            while done < steps and not interrupted():
-                *_, terminated, truncated, _ = env.step(env.action_space.sample())
-                done += 1
-                if terminated or truncated:
-                    env.reset()
-                if done % 50 == 0 or done == steps:
-                    tick(done, env.prequential.recent)
-        except RelgymError as error:
-            return done, f"Stopped, for {type(error).__name__}: {error};"
-        except (
-            Exception
-        ) as error:  # an env of anybody's may fail in any way; what was learned must not be lost
-            return done, f"Stopped, for the env failed with {type(error).__name__}: {error};"
+    try:
+        env.action_space.seed(seed)
+        env.reset(seed=seed)
+        while done < steps and not interrupted():
+            *_, terminated, truncated, _ = env.step(env.action_space.sample())
+            done += 1
+            if terminated or truncated:
+                env.reset()
+            if done % 50 == 0 or done == steps:
+                tick(done, env.prequential.recent)
+    except RelgymError as error:
+        return done, f"Stopped, for {type(error).__name__}: {error};"
+    except Exception as error:
+        # An env of anybody's may fail in any way, and what was learned must not be lost.
+        return done, f"Stopped, for the env failed with {type(error).__name__}: {error};"
     return done, "" if done == steps else "Stopped by Ctrl-C"
 
 

@@ -180,5 +180,4 @@ def _short(value: float) -> Cell:
 
 
 def _share(value: float) -> Cell:
-    """Six digits; what is less than 1 isn't rounded to 1."""
-    return "" if math.isnan(value) else round(value, 6) if value <= 0.999999 or value == 1.0 else 0.999999
+    return "" if math.isnan(value) else round(value, 6)
