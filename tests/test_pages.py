@@ -12,8 +12,8 @@ NEEDS = {"docs/guides/dyna.md": pytest.mark.sb3}
 
 SMALLER = {
     "docs/guides/dyna.md": {
-        "agent.learn(1_000, callback=Dyna(model, DynaConfig(updates=40, burst=10_000))": (
-            "agent.learn(120, callback=Dyna(model, DynaConfig(updates=2, burst=100))"
+        "agent.learn(1_000, callback=Dyna(model, DynaConfig(updates=40, catch_up=10_000))": (
+            "agent.learn(120, callback=Dyna(model, DynaConfig(updates=2, catch_up=100))"
         ),
         "agent.learn(1_000": "agent.learn(30",
         "agent.learn(200_000": "agent.learn(6_000",
@@ -39,7 +39,9 @@ def test_the_code_of_a_page(path: Path, tmp_path: Path, monkeypatch: pytest.Monk
     for snippet in pages.snippets(page):
         printed = pages.run(snippet, names, tmp_path)
         if snippet.shown is not None:
-            assert pages.agrees(snippet.shown, printed), f"line {snippet.line}: `make pages` renews it\n{printed}"
+            assert pages.agrees(snippet.shown, printed), (
+                f"line {snippet.line}: `make pages` renews it\n{printed}"
+            )
         elif snippet.kind == "python":
             assert not printed, f"line {snippet.line} prints what the page doesn't show:\n{printed}"
 
@@ -55,7 +57,9 @@ def test_a_renewed_text_leaves_out_what_the_old_one_did() -> None:
     printed = "head 2\nrows 3\nball.vx: 4 modes\nvx' = 2 vx\nrest\nend\n"
     assert pages.renewed("head 1\nrows 1\n", printed) == printed
     assert pages.renewed("head 1\n…\nvx' = vx\n…\n", printed) == "head 2\n…\nvx' = 2 vx\n…\n"
-    assert pages.renewed("…\nball.vx: 3 modes\nvx' = vx\n…\n", printed) == "…\nball.vx: 4 modes\nvx' = 2 vx\n…\n"
+    assert (
+        pages.renewed("…\nball.vx: 3 modes\nvx' = vx\n…\n", printed) == "…\nball.vx: 4 modes\nvx' = 2 vx\n…\n"
+    )
     assert pages.renewed("…\nend\n", printed) == "…\nend\n"
 
 

@@ -60,7 +60,9 @@ def learned_model() -> Frames:
         if truncated:
             watched.reset()
     real = gym.make("relgym/BallBoxRamp-v0", render_mode="rgb_array")
-    real.reset(seed=1_003, options={"ball": "between", "ramp": "left", "touching": False, "ball_floor": False})
+    real.reset(
+        seed=1_003, options={"ball": "between", "ramp": "left", "touching": False, "ball_floor": False}
+    )
     start = real.get_wrapper_attr("scene")
     model = TimeLimit(LearnedModelEnv(watched.model, like=real, render_mode="rgb_array"), 200)
     model.reset(options={"scene": start})
@@ -84,9 +86,7 @@ def write(name: str, folder: Path = FOLDER) -> Path:
     draw, milliseconds = ANIMATIONS[name]
     first, *others = draw()
     path = folder / f"{name}.webp"
-    first.save(
-        path, save_all=True, append_images=others, duration=milliseconds, loop=0, quality=55, method=6
-    )
+    first.save(path, save_all=True, append_images=others, duration=milliseconds, loop=0, quality=55, method=6)
     return path
 
 

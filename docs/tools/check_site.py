@@ -56,9 +56,14 @@ class Page(HTMLParser):
 def faults(site: Path) -> list[str]:
     """Everything that is wrong, a line each."""
     pages = {path: Page(path) for path in sorted(site.rglob("*.html"))}
-    found = [f"{page.path.relative_to(site)}: {fault}" for page in pages.values() for fault in _broken(page, pages)]
+    found = [
+        f"{page.path.relative_to(site)}: {fault}" for page in pages.values() for fault in _broken(page, pages)
+    ]
     everywhere = {name for page in pages.values() for name in page.ids}
-    public = {f"{facade}.{name}" for facade in FACADES for name in names_of(facade)} - {"relgym.envs", "relgym.wrappers"}
+    public = {f"{facade}.{name}" for facade in FACADES for name in names_of(facade)} - {
+        "relgym.envs",
+        "relgym.wrappers",
+    }
     found += [f"the reference lacks {name}" for name in sorted(public - everywhere)]
     for page in pages.values():
         if re.search(r"={4,} +={4,}|:class:|:func:", "".join(page.text)):
@@ -93,7 +98,9 @@ def main() -> None:
     site = Path(sys.argv[1]).resolve()
     if wrong := faults(site):
         sys.exit("\n".join(wrong))
-    print(f"{len(list(site.rglob('*.html')))} pages: every link leads somewhere, nothing comes from elsewhere")
+    print(
+        f"{len(list(site.rglob('*.html')))} pages: every link leads somewhere, nothing comes from elsewhere"
+    )
 
 
 if __name__ == "__main__":

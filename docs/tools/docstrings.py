@@ -52,7 +52,11 @@ def public_names() -> dict[str, str]:
     for facade in order:
         for name in names_of(facade):
             found.setdefault(name, f"{facade}.{name}")
-    return {name: path for name, path in found.items() if path.rsplit(".", 1)[0] not in ("relgym",) or name[0].isupper()}
+    return {
+        name: path
+        for name, path in found.items()
+        if path.rsplit(".", 1)[0] not in ("relgym",) or name[0].isupper()
+    }
 
 
 def names_of(facade: str) -> list[str]:
@@ -84,10 +88,16 @@ def with_markdown_tables(text: str) -> str:
         rule = lines.pop(0)
         # Its last rule is the one that a blank line follows; one before that ends the heading.
         end = next(
-            i for i, line in enumerate(lines) if _RULE.match(line) and not "".join(lines[i + 1 : i + 2]).strip()
+            i
+            for i, line in enumerate(lines)
+            if _RULE.match(line) and not "".join(lines[i + 1 : i + 2]).strip()
         )
         heading = next((i for i, line in enumerate(lines[:end]) if _RULE.match(line)), None)
-        out += _table(rule, [] if heading is None else lines[:heading], lines[0 if heading is None else heading + 1 : end])
+        out += _table(
+            rule,
+            [] if heading is None else lines[:heading],
+            lines[0 if heading is None else heading + 1 : end],
+        )
         del lines[: end + 1]
     return "\n".join(out)
 

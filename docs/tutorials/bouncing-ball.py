@@ -16,8 +16,7 @@ env = gym.make("relgym/BallBoxRamp-v0", incline=30, elasticity=0.9, friction=0.2
 observation, _ = env.reset(seed=1)
 plt.figure(figsize=(6, 3.75))
 plt.imshow(env.render())
-plt.axis("off");
-
+plt.axis("off")
 # %% [markdown]
 # An observation is a dictionary from object name to its properties: position, rotation, extents and, of a ball, its
 # velocity, which is its last displacement. Nothing says which of the numbers matter, or that there is such a thing as
@@ -92,8 +91,7 @@ for ax, (seen, thought) in zip(axes, paths, strict=False):
     ax.plot(*seen[0], "o", color="black", markersize=6)
     ax.set_aspect("equal", "datalim")
     ax.axis("off")
-axes[0].legend(loc="lower center");
-
+axes[0].legend(loc="lower center")
 # %% [markdown]
 # ## Another room
 #

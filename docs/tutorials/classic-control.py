@@ -55,7 +55,7 @@ def errors(learner, env, steps=500):
     found = []
     for _ in range(steps):
         action = env.action_space.sample()
-        predicted = learner.foretell(observation, action).scene["self"].values[1]
+        predicted = learner.predict(observation, action).scene["self"].values[1]
         observation, _, terminated, truncated, _ = env.step(action)
         found.append(abs(predicted - observation[1]))
         if terminated or truncated:
@@ -70,8 +70,7 @@ plt.gcf().set_size_inches(7, 2.5)
 plt.xscale("log")
 plt.xlabel("error of the next velocity (observations are float32)")
 plt.ylabel("steps")
-plt.legend();
-
+plt.legend()
 # %% [markdown]
 # ## CartPole
 #

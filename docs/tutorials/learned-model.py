@@ -20,8 +20,7 @@ real = gym.make("relgym/TruckPush-v0", render_mode="rgb_array")
 real.reset(seed=3, options={"layout": 2})
 plt.figure(figsize=(6, 3.75))
 plt.imshow(real.render())
-plt.axis("off");
-
+plt.axis("off")
 # %% [markdown]
 # ## Learn the world
 #
@@ -117,7 +116,7 @@ for _, _, success, path in rows:
     plt.plot(path, color="tab:green" if success else "tab:red", alpha=0.6)
 plt.axhspan(-1, 1, color="gold", alpha=0.4)
 plt.xlabel("steps")
-plt.ylabel("to the goal (units)");
+plt.ylabel("to the goal (units)")
 
 # %% [markdown]
 # ## Learn a policy in it

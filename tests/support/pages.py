@@ -27,7 +27,9 @@ ROOT = Path(__file__).resolve().parents[2]
 GENERATED = ("docs/results.md", "docs/results/")
 """Pages that programs write, from measurements of hours."""
 
-_FENCED = re.compile(r"^(?P<why><!-- not run: .+ -->\n)?```(?P<kind>\w*)\n(?P<body>.*?)^```$", re.DOTALL | re.MULTILINE)
+_FENCED = re.compile(
+    r"^(?P<why><!-- not run: .+ -->\n)?```(?P<kind>\w*)\n(?P<body>.*?)^```$", re.DOTALL | re.MULTILINE
+)
 _SHELL = ("bash", "console", "sh")
 _ELLIPSIS = re.compile(r"^…\n", re.MULTILINE)
 
@@ -136,7 +138,11 @@ def renewed(shown: str, printed: str) -> str:
             kept.append("")
             continue
         first = at if number == 0 else _most_like(part[0], lines, at, at)
-        last = len(lines) - 1 if number == len(parts) - 1 else _most_like(part[-1], lines, first, first + len(part) - 1)
+        last = (
+            len(lines) - 1
+            if number == len(parts) - 1
+            else _most_like(part[-1], lines, first, first + len(part) - 1)
+        )
         kept.append("".join(f"{line}\n" for line in lines[first : last + 1]))
         at = last + 1
     return "…\n".join(kept)
