@@ -16,7 +16,7 @@ DOCS := $(VENV)/.installed-docs
 
 .DEFAULT_GOAL := help
 .PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow slow-sb3 bench coverage lint format types check
-.PHONY: wheel docs pages animations clean example-highway example-ocatari
+.PHONY: wheel docs docs-serve pages animations clean example-highway example-ocatari
 
 help:            ## show this list
 	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 17
@@ -83,8 +83,11 @@ wheel: $(VIZ)    ## build dist/relgym-*.whl
 	rm -rf build
 
 docs: $(DOCS)    ## build the docs site into site/: start with site/index.html
-	$(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	$(BIN)/python docs/tools/check_site.py site
+
+docs-serve: docs ## show it at localhost:8000 (a browser needs that for the site's search)
+	$(BIN)/python -m http.server --bind 127.0.0.1 --directory site 8000
 
 pages: $(DEV)    ## run the code on all pages, and write what it prints into them
 	$(BIN)/python tests/support/pages.py

@@ -64,7 +64,8 @@ def test_a_renewed_text_leaves_out_what_the_old_one_did() -> None:
 
 
 def test_blocks_that_are_run(tmp_path: Path) -> None:
-    page = "```python\nprint(1)\n```\nso\n```text\n1\n```\n<!-- not run: hours -->\n```sh\nrelgym dyna\n```\n```toml\n```\n"
+    page = "```python\nprint(1)\n```\nso\n```text\n1\n```\n<!-- not run: hours -->\n```sh\nrelgym dyna\n```\n"
+    page += "```toml\n```\n"
     (only,) = pages.snippets(page)
     assert (only.kind, only.code, only.shown, only.line) == ("python", "print(1)\n", "1\n", 2)
     assert page[slice(*only.span)] == "1\n"

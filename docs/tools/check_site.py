@@ -1,7 +1,7 @@
 """Is the built site whole? Run after mkdocs, with the folder: python docs/tools/check_site.py site.
 
-Every link and every picture leads to a file and a place that there is, nothing is loaded from elsewhere, each public name
-has its place, and no docstring's table is left as it was typed.
+Every link and every picture leads to a file and a place that there is, nothing is loaded from elsewhere, each public
+name has its place, and no docstring's table is left as it was typed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 sys.path.insert(0, str(Path(__file__).parent))
-from docstrings import FACADES, names_of
+from docstrings import public_names
 
 LOADED = {("img", "src"), ("link", "href"), ("script", "src"), ("source", "src"), ("iframe", "src")}
 """What a browser fetches without being asked to."""
@@ -60,10 +60,7 @@ def faults(site: Path) -> list[str]:
         f"{page.path.relative_to(site)}: {fault}" for page in pages.values() for fault in _broken(page, pages)
     ]
     everywhere = {name for page in pages.values() for name in page.ids}
-    public = {f"{facade}.{name}" for facade in FACADES for name in names_of(facade)} - {
-        "relgym.envs",
-        "relgym.wrappers",
-    }
+    public = set(public_names().values()) - {"relgym.envs", "relgym.wrappers"}  # those have pages
     found += [f"the reference lacks {name}" for name in sorted(public - everywhere)]
     for page in pages.values():
         if re.search(r"={4,} +={4,}|:class:|:func:", "".join(page.text)):

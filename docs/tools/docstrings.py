@@ -1,4 +1,4 @@
-"""Docstrings as Markdown: simple tables become Markdown's, and `Name` a link to where that public name is described."""
+"""Docstrings as Markdown: headings, tables, and `Name` as a link to where that public name is described."""
 
 from __future__ import annotations
 
@@ -12,18 +12,32 @@ import griffe
 
 ROOT = Path(__file__).resolve().parents[2]
 FACADES = {
-    "relgym": "relgym/__init__.py",
     "relgym.config": "relgym/config/__init__.py",
     "relgym.envs": "envs/__init__.py",
     "relgym.envs.views": "envs/views/__init__.py",
     "relgym.errors": "relgym/errors.py",
+    "relgym.logic": "relgym/logic/__init__.py",
     "relgym.scene": "relgym/scene/__init__.py",
     "relgym.wrappers": "wrappers/__init__.py",
     "relgym.wrappers.sb3": "wrappers/sb3/__init__.py",
+    "relgym": "relgym/__init__.py",
 }
-"""The modules that users import from; their ``__all__`` is the public interface."""
+"""The modules that users import from; their ``__all__`` is the public interface. A name that two offer is described
+with the first."""
 
 _RULE = re.compile(r"^ *=+(?: +=+)+ *$")
+_HEADING = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
+_KNOWN = (
+    "Attributes",
+    "Examples",
+    "Notes",
+    "Parameters",
+    "Raises",
+    "References",
+    "Returns",
+    "Warns",
+    "Yields",
+)
 _NAME = re.compile(r"(?<![`\[\w])`([A-Za-z_][\w.]*)`(?![`\]])")
 
 
@@ -39,24 +53,20 @@ class PlainDocstrings(griffe.Extension):
                         mod.set_member(name, griffe.Alias(name, f"{home}.{name}", parent=mod))
 
     def on_object(self, *, obj: griffe.Object, **kwargs: Any) -> None:
-        """Convert tables and link names."""
+        """Convert headings and tables, and link names."""
         if obj.docstring:
-            obj.docstring.value = linked(with_markdown_tables(obj.docstring.value), obj.name)
+            text = with_markdown_tables(with_markdown_headings(obj.docstring.value))
+            obj.docstring.value = linked(text, obj.name)
 
 
 @cache
 def public_names() -> dict[str, str]:
-    """Name → where it is described: the first façade that offers it, views and envs before wrappers."""
-    order = sorted(FACADES, key=lambda facade: (not facade.startswith("relgym.envs.views"), facade))
+    """Name → where it is described."""
     found: dict[str, str] = {}
-    for facade in order:
+    for facade in FACADES:
         for name in names_of(facade):
             found.setdefault(name, f"{facade}.{name}")
-    return {
-        name: path
-        for name, path in found.items()
-        if path.rsplit(".", 1)[0] not in ("relgym",) or name[0].isupper()
-    }
+    return found
 
 
 def names_of(facade: str) -> list[str]:
@@ -71,11 +81,29 @@ def linked(text: str, own: str) -> str:
     """`Name` as a reference, where Name is public and not the object's own."""
 
     def link(match: re.Match[str]) -> str:
-        name = match[1]
+        name = match[1].rpartition(".")[2] if match[1].startswith("relgym.") else match[1]
         path = public_names().get(name)
-        return match[0] if path is None or name == own else f"[`{name}`][{path}]"
+        # Classes only, and none of the logic library: `learn` and `World` mean many things.
+        return (
+            match[0]
+            if path is None or name == own or not name[0].isupper() or ".logic." in path
+            else f"[`{match[1]}`][{path}]"
+        )
 
     return _NAME.sub(link, text)
+
+
+def with_markdown_headings(text: str) -> str:
+    """Sections that numpydoc doesn't know, those of an env's data sheet, as headings; then those that it knows."""
+    start, *parts = _HEADING.split(text)
+    prose, known = [start], []
+    for title, body in zip(parts[::2], parts[1::2], strict=True):
+        name = "Parameters" if title == "Arguments" else title
+        if name in _KNOWN:
+            known.append(f"{name}\n{'-' * len(name)}{body}")
+        else:
+            prose.append(f"# {name}\n{body}")
+    return "".join(part.rstrip() + "\n\n" for part in prose + known).rstrip()
 
 
 def with_markdown_tables(text: str) -> str:

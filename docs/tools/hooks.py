@@ -31,5 +31,7 @@ def on_files(files: Files, config: Any) -> Files:
         text = (ROOT / source).read_text(encoding="utf-8").replace("](docs/", "](")
         for other, file in FROM_ROOT.items():
             text = text.replace(f"]({file}", f"]({other}")
+        if page == "index.md":
+            text = f"---\nhide: [navigation]\n---\n{text}"
         files.append(File.generated(config, page, content=text))
     return files

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Wrap CartPole and MountainCar
 #
-# `ModelLearner` takes any Gymnasium env with flat spaces. This notebook starts with one line, reads what the model says
-# it lacks, and ends with the equations in the envs' sources.
+# `ModelLearner` takes any Gymnasium env with flat spaces. This notebook starts with one line, reads what the
+# model says it lacks, and ends with the equations in the envs' sources.
 
 # %%
 import gymnasium as gym
@@ -33,9 +33,9 @@ plain = watch(ModelLearner(gym.make("MountainCar-v0")), 1_000)
 print(plain.model.describe(digits=4))
 
 # %% [markdown]
-# The position is explained: it goes on by the *next* velocity. The velocity isn't. The model has found a line that leaves
-# 0.67 % of its change, says so, and names the features with which a law explains all of it. So we switch those on, and
-# give the numbers names.
+# The position is explained: it goes on by the *next* velocity. The velocity isn't. The model has found a line
+# that leaves 0.67 % of its change, says so, and names the features with which a law explains all of it. So we
+# switch those on, and give the numbers names.
 
 # %%
 car = gym.make("MountainCar-v0")
@@ -70,12 +70,12 @@ plt.gcf().set_size_inches(7, 2.5)
 plt.xscale("log")
 plt.xlabel("error of the next velocity (observations are float32)")
 plt.ylabel("steps")
-plt.legend()
+_ = plt.legend()
 # %% [markdown]
 # ## CartPole
 #
-# Four numbers that belong to two things. `Part` says which; each part is an object with a name of its own, and what is
-# learned may speak of the other one's properties. `actions` names the choices.
+# Four numbers that belong to two things. `Part` says which; each part is an object with a name of its own,
+# and what is learned may speak of the other one's properties. `actions` names the choices.
 
 # %%
 pole = gym.make("CartPole-v1")
@@ -89,12 +89,12 @@ view = NumbersView(
 model = watch(ModelLearner(pole, view=view), 1_500).model
 for target in model.targets:
     for mode in model.modes(target.type, target.property):
-        print(f"{str(target):15} {mode.examples:5} transitions:  {mode.formula(4)}")
+        print(f"{target!s:15} {mode.examples:5} transitions:  {mode.formula(4)}")
 
 # %% [markdown]
-# The positions follow exactly from the velocities. The velocities of CartPole are no linear functions of these numbers:
-# what the model found there is an approximation, which `describe` would say, with the spread (±) of what it leaves and
-# the features that would explain more.
+# The positions follow exactly from the velocities. The velocities of CartPole are no linear functions of
+# these numbers: what the model found there is an approximation, which `describe` would say, with the spread
+# (±) of what it leaves and the features that would explain more.
 #
 # ## Reward and termination
 #
@@ -108,5 +108,5 @@ for mode in task.model.modes("task", "terminated"):
     print(mode.examples, "transitions:", mode.formula(3))
 
 # %% [markdown]
-# [Your own env](../guides/your-own-env.html) goes on from here: angles, walls, tables of objects, views of your own, vector
-# envs. [The next tutorial](learned-model.html) acts inside a learned model.
+# [Your own env](../guides/your-own-env.html) goes on from here: angles, walls, tables of objects, views of
+# your own, vector envs. [The next tutorial](learned-model.html) acts inside a learned model.

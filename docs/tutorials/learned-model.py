@@ -1,9 +1,10 @@
 # %% [markdown]
 # # Plan and train in a learned model
 #
-# A learned model is a Gymnasium env again. So whatever works in an env works in what was learned of it: stepping
-# thousands of copies as arrays, planning, and training agents. Here a truck is to push three boxes to a goal and stop
-# there. We learn its world from random pushes, and plan in the model without a single step in the real env.
+# A learned model is a Gymnasium env again. So whatever works in an env works in what was learned of it:
+# stepping thousands of copies as arrays, planning, and training agents. Here a truck is to push three boxes
+# to a goal and stop there. We learn its world from random pushes, and plan in the model without a single step
+# in the real env.
 
 # %%
 import time
@@ -12,7 +13,6 @@ import gymnasium as gym
 import matplotlib.pyplot as plt
 import numpy as np
 
-import relgym
 from relgym.envs import LearnedModelVectorEnv
 from relgym.wrappers import ModelLearner
 
@@ -20,11 +20,12 @@ real = gym.make("relgym/TruckPush-v0", render_mode="rgb_array")
 real.reset(seed=3, options={"layout": 2})
 plt.figure(figsize=(6, 3.75))
 plt.imshow(real.render())
-plt.axis("off")
+_ = plt.axis("off")
 # %% [markdown]
 # ## Learn the world
 #
-# A thousand random pushes. What counts here is the curve: after some 400 steps no prediction is wrong any more.
+# A thousand random pushes. What counts here is the curve: after some 400 steps no prediction is wrong any
+# more.
 
 # %%
 learner = ModelLearner(gym.make("relgym/TruckPush-v0"))
@@ -48,8 +49,8 @@ for mode in model.modes("truck", "vx"):
 # %% [markdown]
 # ## Many futures at once
 #
-# `LearnedModelVectorEnv` steps many copies of a learned env by arrays. `like=real` gives it the real env's spaces and task,
-# which pays imagined steps as it pays real ones.
+# `LearnedModelVectorEnv` steps many copies of a learned env by arrays. `like=real` gives it the real env's
+# spaces and task, which pays imagined steps as it pays real ones.
 
 # %%
 PLANS = 2_048
@@ -79,8 +80,8 @@ print(f"{PLANS * 10 / (time.perf_counter() - began):,.0f} imagined steps a secon
 # %% [markdown]
 # ## Plan
 #
-# Plans of two numbers: push so hard, for so many steps, then let the boxes' friction stop the truck. We draw 2,048 of them,
-# imagine each, and carry out the best one in the real env, with closed eyes.
+# Plans of two numbers: push so hard, for so many steps, then let the boxes' friction stop the truck. We draw
+# 2,048 of them, imagine each, and carry out the best one in the real env, with closed eyes.
 
 
 # %%
@@ -116,11 +117,12 @@ for _, _, success, path in rows:
     plt.plot(path, color="tab:green" if success else "tab:red", alpha=0.6)
 plt.axhspan(-1, 1, color="gold", alpha=0.4)
 plt.xlabel("steps")
-plt.ylabel("to the goal (units)")
+_ = plt.ylabel("to the goal (units)")
 
 # %% [markdown]
 # ## Learn a policy in it
 #
-# A planner thinks at each decision; a policy does so once. [Dyna](../guides/dyna.html) trains agents of Stable-Baselines3 in
-# a model while it is being learned, checks each real step whether the model may be believed, and measures what that is
-# worth: SAC needs [about a tenth of the real steps](../results/dream.html).
+# A planner thinks at each decision; a policy does so once. [Dyna](../guides/dyna.html) trains agents of
+# Stable-Baselines3 in a model while it is being learned, checks each real step whether the model may be
+# believed, and measures what that is worth: [about a tenth of the real steps](../results/dream.html) that SAC
+# needs by itself.

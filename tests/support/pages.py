@@ -1,4 +1,4 @@
-"""Runs the code on the pages (README.md and docs/), from top to bottom, and compares what it prints with what they show.
+"""Runs the code on the pages (README.md and docs/) from top to bottom, and compares what it prints with what they show.
 
 A page's fenced ``python`` code shares one namespace, its commands one folder, which is empty at first. The
 ``text`` after one of them is what it prints; a line ``…`` in it stands for what is left out. ``<!-- not run: why -->``
