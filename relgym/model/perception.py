@@ -1,4 +1,4 @@
-"""From scenes to what the learners see: relations, rows and situations, once for all targets (design §5)."""
+"""From scenes to what the learners see: relations, rows and situations, once for all targets."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def surroundings(
     gaps = _gaps(features) if offsets else []
     kept = contacts[..., gaps].copy()
     at = features.index("approach")
-    # Contact facts are facts of touching pairs (design §4): a normal towards something far says nothing.
+    # Contact facts are facts of touching pairs: a normal towards something far says nothing.
     contacts[~relations.touched(body)] = np.nan
     leaving = contacts[..., at] > relations.parting(body)
     # Where bodies part, the contact does nothing any more, whichever way it faces: only that they part is said.
