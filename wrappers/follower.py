@@ -258,6 +258,7 @@ def scenes_of(env: gym.Env[Any, Any], view: View, steps: int, *, seed: int) -> I
     for _ in range(steps):
         action = env.action_space.sample()
         scene = follower.act(action)
+        assert scene is not None, "bad observations and actions raise"
         yield scene
         observation, reward, terminated, truncated, info = env.step(action)
         follower.follow(scene, None, observation, info, reward=reward, terminated=terminated)

@@ -95,11 +95,13 @@ def describe(
     Raises
     ------
     ConfigError
-        Another frame; or ``"world"`` where the laws in force aren't stated along the normals of a planar world; or a
-        name that can't be one.
+        Another frame; or ``"world"`` where the laws in force aren't stated along the normals of a planar world; a name
+        that can't be one; or `names` or `check` with `details`.
     """
     if frame not in (None, "world"):
         raise ConfigError(f"frame={frame!r}: expected None (as learned) or 'world'")
+    if details and (names or check is not None):
+        raise ConfigError("details=True prints tables, which have no names and no agreement: leave them out")
     text = str(report(model, digits=digits)) if details else _rules_text(model, digits, names, check)
     if frame is None or model.laws is None or not model.governed:
         return text
