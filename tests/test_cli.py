@@ -165,7 +165,7 @@ def test_doctor_finds_everything_that_the_tests_run_with() -> None:
         (("inspect", "relgym/Nowhere-v0"), "relgym envs"),
         (("inspect", "relgym/TruckPush-v0", "-a", "n_boxes"), "NAME=VALUE"),
         (("inspect", "relgym/TruckPush-v0", "-a", "nosuch=3"), "nosuch"),
-        (("inspect", "relgym/LearnedModel-v0"), "can't be made"),
+        (("inspect", "relgym/LearnedModel-v0"), "needs --arg model=VALUE"),
         (("inspect", "nomod:Foo-v0"), "No module named 'nomod'"),
         (("inspect", "a:b:c"), "module 'a:b' can't be imported"),
         (("inspect", "relgym/TruckPush-v0", "-a", "n_boxes=99"), "n_boxes"),
