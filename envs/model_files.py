@@ -136,7 +136,7 @@ def world_like(like: gym.Env[Any, Any], schema: SceneSchema) -> gym.Env[Any, Any
     Raises
     ------
     ConfigError
-        The model can't speak of its scenes (`schema_like`), or it can't be copied.
+        The model can't predict its scenes (`schema_like`), or it can't be copied.
     """
     inner = like.unwrapped
     own = getattr(inner, "schema", None)
@@ -151,7 +151,7 @@ def copied(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
     except (TypeError, NotImplementedError, copy.Error) as error:
         raise ConfigError(
             f"like={env} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
-            "that a ModelLearner taught holds spaces and first scenes of its own: leave out like"
+            "that a ModelLearner saved holds spaces and first scenes of its own: leave out like"
         ) from error
     world.unwrapped.render_mode = None  # its resets are no one's to see
     return world
@@ -187,7 +187,7 @@ def schema_like(other: SceneSchema | None, schema: SceneSchema, what: str) -> Sc
 
 
 def _difference(other: SceneSchema, schema: SceneSchema) -> str:
-    """What keeps a model of one schema from speaking of the other's scenes; empty if nothing does."""
+    """Why a model of one schema can't predict scenes of the other; empty if it can."""
     if (other.up, other.planar) != (schema.up, schema.planar):
         return f"it has up={other.up!r}, planar={other.planar}"
     known = {t.name: (t.properties, t.shape, dict(t.pose)) for t in schema.types}
