@@ -347,7 +347,7 @@ def _demonstrate(shown: Demonstration, out: Path, seed: int) -> tuple[DemoOutcom
 
 
 def _show_lessons(learned: Callable[..., Iterator[Round]], lesson: Lesson, as_json: bool) -> None:
-    """Learn under a progress progress; say what came of each round, and what to do next."""
+    """Learn under a progress bar; say what came of each round, and what to do next."""
     from relgym.console.next_steps import next_steps
 
     rounds: list[Round] = []
