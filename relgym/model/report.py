@@ -36,7 +36,7 @@ __all__ = [
     "report",
 ]
 
-_OTHERWISE = "otherwise"
+_ELSE = "else"
 
 
 def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
@@ -173,7 +173,7 @@ def _pair_table(classifier: BinaryClassifier, flags: frozenset[str]) -> PairTabl
     for (name, right, wrong, _), tree in zip(classifier.describe(), trees, strict=True):
         tests = [as_relations(rule, flags) for rule in (() if tree is None else tree.rules())]
         rows.append(ClauseRow(as_relations(name, flags), right, wrong, tuple(tests)))
-    rows[-1] = ClauseRow(_OTHERWISE, rows[-1].correct, rows[-1].incorrect, rows[-1].tests)
+    rows[-1] = ClauseRow(_ELSE, rows[-1].correct, rows[-1].incorrect, rows[-1].tests)
     # §3.4.5: a negated definition's clauses describe mode j.
     other = classifier.i if classifier.positive == classifier.j else classifier.j
     return PairTable(classifier.positive, other, tuple(rows))

@@ -222,7 +222,7 @@ def _role_table(roles: tuple[RoleRow, ...]) -> str:
     for r in roles:
         who = f"a {r.type} B with {r.rule}" if r.rule else f"any {r.type}"
         rows.append([r.mode, ", ".join(r.roles), who])
-    return table(["mode", "role", "who plays it"], rows)
+    return table(["mode", "role", "bound to"], rows)
 
 
 def _legend(targets: tuple[TargetReport, ...]) -> str:

@@ -30,7 +30,7 @@ from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
 from relgym.scene.surroundings import Surroundings, surroundings
 
-__all__ = ["Evaluated", "Sight", "bounds_reached", "branches_of", "evaluate", "holds"]
+__all__ = ["Evaluated", "SceneBatch", "bounds_reached", "branches_of", "evaluate", "holds"]
 
 _Bools = NDArray[np.bool_]
 _Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ def _extractor(schema: SceneSchema) -> Extractor:
 
 
 @dataclass
-class Sight:
+class SceneBatch:
     """n scenes with the same objects, as conditions see them.
 
     Parameters
@@ -231,13 +231,13 @@ def evaluate(rules: RuleList, schema: SceneSchema, layout: SceneLayout, vectors:
         The rules speak of relations that these scenes don't know.
     """
     following = np.array(vectors, dtype=np.float64)
-    sight = Sight(schema, layout, np.asarray(vectors, dtype=np.float64), following)
+    scenes = SceneBatch(schema, layout, np.asarray(vectors, dtype=np.float64), following)
     found = Evaluated({}, {}, {}, following)
     lost: dict[tuple[str, str], _Bools] = {}
-    _move(rules, sight, found, lost)
+    _move(rules, scenes, found, lost)
     for part in rules.properties:
         for index in layout.of_type(part.type):
-            values, branch, players = _values(part, sight, index)
+            values, branch, players = _values(part, scenes, index)
             for pair in _needs(part):
                 values[lost.get(pair, np.zeros(len(vectors), dtype=np.bool_))] = np.nan
             if part.doubt:
@@ -249,22 +249,22 @@ def evaluate(rules: RuleList, schema: SceneSchema, layout: SceneLayout, vectors:
             lost[key] = lost.get(key, np.zeros(len(vectors), dtype=np.bool_)) | ~told
             name = (layout.names[index], part.property)
             found.values[name], found.branches[name], found.players[name] = values, branch, players
-    _derive(rules, sight, found, lost)
+    _derive(rules, scenes, found, lost)
     _wrap(layout, found)
     return found
 
 
-def _move(rules: RuleList, sight: Sight, found: Evaluated, lost: dict[tuple[str, str], _Bools]) -> None:
+def _move(rules: RuleList, scenes: SceneBatch, found: Evaluated, lost: dict[tuple[str, str], _Bools]) -> None:
     """Laws of motion, in place."""
     if rules.motion is None:
         return
-    book = _book(rules.motion, sight.schema)
-    layout = sight.layout
+    book = _book(rules.motion, scenes.schema)
+    layout = scenes.layout
     cast = book.cast(layout)
-    motion = book.motion(Contacts.of(cast, sight.relations, sight.vectors), sight.vectors)
+    motion = book.motion(Contacts.of(cast, scenes.relations, scenes.vectors), scenes.vectors)
     for kind, names in rules.motion.components:
         for k, prop in enumerate(names):
-            lost[kind, prop] = np.zeros(len(sight), dtype=np.bool_)
+            lost[kind, prop] = np.zeros(len(scenes), dtype=np.bool_)
             for index in layout.of_type(kind):
                 body = layout.bodies.index(index)
                 values = np.where(motion.known[:, body], motion.velocity[k, :, body], np.nan)
@@ -279,13 +279,13 @@ def _book(motion: MotionRules, schema: SceneSchema) -> LawBook:
     return motion.book(schema)
 
 
-def _derive(rules: RuleList, sight: Sight, found: Evaluated, lost: dict[tuple[str, str], _Bools]) -> None:
-    layout = sight.layout
+def _derive(rules: RuleList, scenes: SceneBatch, found: Evaluated, lost: dict[tuple[str, str], _Bools]) -> None:
+    layout = scenes.layout
     for law in rules.kinematics:
         for index in layout.of_type(law.type):
-            source = found.following if law.uses_next else sight.vectors
+            source = found.following if law.uses_next else scenes.vectors
             rate = source[:, layout.column(index, law.rate)]
-            values = sight.vectors[:, layout.column(index, law.property)] + law.step * rate
+            values = scenes.vectors[:, layout.column(index, law.property)] + law.step * rate
             if law.uses_next and (law.type, law.rate) in lost:
                 values = np.where(lost[law.type, law.rate], np.nan, values)
             told = np.isfinite(values)
@@ -315,76 +315,76 @@ def _needs(part: PropertyRules) -> frozenset[tuple[str, str]]:
     return frozenset(found - {(part.type, part.property)})
 
 
-def branches_of(part: PropertyRules, sight: Sight, index: int) -> Iterator[tuple[int, _Bools]]:
+def branches_of(part: PropertyRules, scenes: SceneBatch, index: int) -> Iterator[tuple[int, _Bools]]:
     """Each branch's number, and in which scenes it is reached and holds, shape ``(n,)``."""
-    waiting = np.ones(len(sight), dtype=np.bool_)
+    waiting = np.ones(len(scenes), dtype=np.bool_)
     for number, branch in enumerate(part.branches):
-        here = waiting & _some(sight, index, branch.cases)
-        if branch.function is not None and _absent(part, sight.layout, index, branch.function):
+        here = waiting & _some(scenes, index, branch.cases)
+        if branch.function is not None and _absent(part, scenes.layout, index, branch.function):
             continue
         yield number, here
         waiting &= ~here
 
 
 def holds(
-    sight: Sight, index: int, condition: Condition, numbers: Mapping[str, _Floats] | None = None
+    scenes: SceneBatch, index: int, condition: Condition, numbers: Mapping[str, _Floats] | None = None
 ) -> _Bools:
     """Whether a condition holds for an object, shape ``(n,)``."""
-    found = np.ones(len(sight), dtype=np.bool_)
+    found = np.ones(len(scenes), dtype=np.bool_)
     for test in condition:
-        found &= sight.holds(index, test, numbers)
+        found &= scenes.holds(index, test, numbers)
     return found
 
 
-def _some(sight: Sight, index: int, cases: tuple[Condition, ...]) -> _Bools:
+def _some(scenes: SceneBatch, index: int, cases: tuple[Condition, ...]) -> _Bools:
     """Where one of some cases holds; everywhere if there are none."""
-    found = np.full(len(sight), not cases, dtype=np.bool_)
+    found = np.full(len(scenes), not cases, dtype=np.bool_)
     for case in cases:
-        found |= holds(sight, index, case)
+        found |= holds(scenes, index, case)
     return found
 
 
 def _values(
-    part: PropertyRules, sight: Sight, index: int
+    part: PropertyRules, scenes: SceneBatch, index: int
 ) -> tuple[_Floats, NDArray[np.int64], dict[str, NDArray[np.int64]]]:
-    values, decided = np.full(len(sight), np.nan), np.full(len(sight), -1, dtype=np.int64)
+    values, decided = np.full(len(scenes), np.nan), np.full(len(scenes), -1, dtype=np.int64)
     playing: dict[str, NDArray[np.int64]] = {}
-    for number, here in branches_of(part, sight, index):
+    for number, here in branches_of(part, scenes, index):
         decided[here] = number
         function = part.branches[number].function
         if function is None or not here.any():
             continue
-        numbers, players = _cast(part, sight, index, function)
+        numbers, players = _cast(part, scenes, index, function)
         for label, bodies in players.items():
-            playing.setdefault(label, np.full(len(sight), -1, dtype=np.int64))[here] = bodies[here]
-        read = sight.reader(index, numbers)
+            playing.setdefault(label, np.full(len(scenes), -1, dtype=np.int64))[here] = bodies[here]
+        read = scenes.reader(index, numbers)
         values[here] = function.values(read, values)[here]
     if part.experience is not None:
-        values[~sight.familiar(index, part.experience)] = np.nan
+        values[~scenes.familiar(index, part.experience)] = np.nan
     for bound in part.bounds:
-        values = _bounded(part, bound, sight, index, values)
+        values = _bounded(part, bound, scenes, index, values)
     return values, decided, playing
 
 
-def _bounded(part: PropertyRules, bound: Bound, sight: Sight, index: int, values: _Floats) -> _Floats:
+def _bounded(part: PropertyRules, bound: Bound, scenes: SceneBatch, index: int, values: _Floats) -> _Floats:
     if bound.kind == "at least":
         return np.where(values < bound.value, bound.value, values)
     if bound.kind == "at most":
         return np.where(values > bound.value, bound.value, values)
     if bound.kind == "change within":
-        now = sight.column(index, part.property)
+        now = scenes.column(index, part.property)
         return np.asarray(np.clip(values, now + bound.value, now + bound.most))
-    reached = holds(sight, index, bound.tests, {f"{part.property}'": values}) & np.isfinite(values)
+    reached = holds(scenes, index, bound.tests, {f"{part.property}'": values}) & np.isfinite(values)
     return np.where(reached, bound.value, values)
 
 
-def bounds_reached(part: PropertyRules, sight: Sight, index: int, function: Sum) -> tuple[Bound, ...]:
+def bounds_reached(part: PropertyRules, scenes: SceneBatch, index: int, function: Sum) -> tuple[Bound, ...]:
     """Bounds that change what a function says of the only scene there is."""
-    numbers, _ = _cast(part, sight, index, function)
-    values = function.values(sight.reader(index, numbers), np.empty(len(sight)))
+    numbers, _ = _cast(part, scenes, index, function)
+    values = function.values(scenes.reader(index, numbers), np.empty(len(scenes)))
     found = []
     for bound in part.bounds:
-        after = _bounded(part, bound, sight, index, values)
+        after = _bounded(part, bound, scenes, index, values)
         if after[0] != values[0]:
             found.append(bound)
         values = after
@@ -412,16 +412,16 @@ def _owners(function: Sum) -> tuple[str, ...]:
 
 # ------------------------------------------------------------------ roles
 def _cast(
-    part: PropertyRules, sight: Sight, index: int, function: Sum
+    part: PropertyRules, scenes: SceneBatch, index: int, function: Sum
 ) -> tuple[dict[str, _Floats], dict[str, NDArray[np.int64]]]:
     """Numbers of the objects in a function's roles, and which bodies these are; NaN, -1 where it isn't settled."""
-    owners, layout = _owners(function), sight.layout
+    owners, layout = _owners(function), scenes.layout
     roles = [r for r in part.roles if set(r.labels) & set(owners)]
     numbers: dict[str, _Floats] = {}
     players: dict[str, NDArray[np.int64]] = {}
     if not roles:
         return numbers, players
-    levels = [_levels(sight, index, role) for role in roles]
+    levels = [_levels(scenes, index, role) for role in roles]
     patterns, which = np.unique(np.concatenate(levels, axis=1), axis=0, return_inverse=True)
     width = len(layout.bodies)
     filled = [_filled(roles, [p[k * width : (k + 1) * width] for k in range(len(roles))]) for p in patterns]
@@ -430,27 +430,27 @@ def _cast(
         bodies = np.array([-1 if f is None else f[place] for f in filled], dtype=np.int64)
         players[label] = bodies[which.reshape(-1)]
         kind = next(role.type for role in roles if label in role.labels)
-        for prop in sight.schema.type(kind).properties:
-            for mark, source in (("", sight.vectors), ("'", sight.following)):
+        for prop in scenes.schema.type(kind).properties:
+            for mark, source in (("", scenes.vectors), ("'", scenes.following)):
                 columns = [
                     layout.column(i, prop) if prop in layout.types[i].properties else 0 for i in layout.bodies
                 ]
                 at = np.array(columns, dtype=np.intp)[players[label]]
-                values = source[np.arange(len(sight)), at]
+                values = source[np.arange(len(scenes)), at]
                 numbers[f"{label}.{prop}{mark}"] = np.where(players[label] >= 0, values, np.nan)
     return numbers, players
 
 
-def _levels(sight: Sight, index: int, role: RuleRole) -> NDArray[np.int64]:
+def _levels(scenes: SceneBatch, index: int, role: RuleRole) -> NDArray[np.int64]:
     """Number of the first alternative that each body fulfils, shape ``(n, K)``; -1 for none."""
-    layout = sight.layout
-    found = np.full((len(sight), len(layout.bodies)), -1, dtype=np.int64)
+    layout = scenes.layout
+    found = np.full((len(scenes), len(layout.bodies)), -1, dtype=np.int64)
     able = [k for k, i in enumerate(layout.bodies) if i in layout.of_type(role.type) and i != index]
     for k in able:
         if not role.alternatives:
             found[:, k] = 0
         for level, condition in reversed(list(enumerate(role.alternatives))):
-            found[sight.fulfils(index, condition, k), k] = level
+            found[scenes.fulfils(index, condition, k), k] = level
     return found
 
 

@@ -1,7 +1,7 @@
 """Linear functions as text, and back: ``0.525 vx - 0.8227241 vy + 0.00042``, or with roles ``v - 2.5 box_a.friction``.
 
 A term is a weight and a name: a property of the object itself, of the only object of a type (``action.force``), of an
-object that plays a role (``box_a.friction``), a next value (``vx'``) or a product of those and their sines and cosines
+object bound to a role (``box_a.friction``), a next value (``vx'``) or a product of those and their sines and cosines
 (``action.force cos(th)``).
 """
 
