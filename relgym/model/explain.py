@@ -178,7 +178,7 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
     rules = model.rules()
     vectors = scene.vector[None]
     said = evaluate(rules, scene.schema, scene.layout, vectors)
-    seen_scene = SceneBatch(scene.schema, scene.layout, vectors, said.following)
+    scenes = SceneBatch(scene.schema, scene.layout, vectors, said.following)
     parts = iter(prediction.parts)
     found = []
     for target in model.targets:
@@ -190,7 +190,7 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
                 found.append(Explanation(one, now, digits, laws=lines))
             else:
                 part = model.property_model(target.type, target.property)
-                seen = _Seen(model, rules, part, seen_scene, said, prediction.scene, index, digits)
+                seen = _Seen(model, rules, part, scenes, said, prediction.scene, index, digits)
                 found.append(seen.explained(one, now))
     return tuple(found)
 
@@ -202,7 +202,7 @@ class _Seen:
     model: WorldModel
     rules: RuleList
     part: PropertyModel
-    seen_scene: SceneBatch
+    scenes: SceneBatch
     said: Evaluated
     following: Scene
     index: int
@@ -237,28 +237,28 @@ class _Seen:
             f"{one.property}' = {branch.function.text(self.digits)}",
             self._why(told, number),
             tuple(self._players(key)),
-            bounds_reached(told, self.seen, self.index, branch.function),
+            bounds_reached(told, self.scenes, self.index, branch.function),
             self._runner_up(one),
         )
 
     def _why(self, told: PropertyRules, number: int) -> tuple[Because, ...]:
         """Tests of the branch that hold, and for each earlier one a test that doesn't, turned round."""
         branch = told.branches[number]
-        case = next((c for c in branch.cases if holds(self.seen, self.index, c)[0]), ())
+        case = next((c for c in branch.cases if holds(self.scenes, self.index, c)[0]), ())
         found = list(case)
         for earlier in told.branches[:number]:
             for other in earlier.cases:
-                missed = [test.opposite for test in other if not self.seen.holds(self.index, test)[0]]
+                missed = [test.opposite for test in other if not self.scenes.holds(self.index, test)[0]]
                 if missed and not set(missed) & set(found):
                     found.append(missed[0])
         return tuple(Because(test, self._with(test)) for test in found)
 
     def _with(self, test: Test) -> tuple[tuple[str, str], ...]:
         """Objects of which a test is true."""
-        clause, layout = test.clause, self.seen.layout
+        clause, layout = test.clause, self.scenes.layout
         if test.negated or clause.variables == clause.arity or self.index not in layout.bodies:
             return ()
-        world = world_of(self.seen.facts(self.index, clause, test.context, {}), 0)
+        world = world_of(self.scenes.facts(self.index, clause, test.context, {}), 0)
         bound = next(solutions(clause, world, (layout.bodies.index(self.index),)), ())
         names = [layout.names[layout.bodies[body]] for body in bound]
         return tuple((chr(ord("A") + k), name) for k, name in enumerate(names) if k >= clause.arity)
@@ -270,12 +270,12 @@ class _Seen:
         for classifier in self.part.classifier.classifiers:
             if winner in (classifier.i, classifier.j):
                 for _, test in tested(self.part, classifier, functions):
-                    true = bool(self.seen.holds(self.index, test)[0])
+                    true = bool(self.scenes.holds(self.index, test)[0])
                     found[test if true else test.opposite] = None
         return tuple(Because(test, self._with(test)) for test in found)
 
     def _players(self, key: tuple[str, str]) -> Iterator[tuple[str, str]]:
-        layout = self.seen.layout
+        layout = self.scenes.layout
         for label, bodies in self.said.players.get(key, {}).items():
             if bodies[0] >= 0:
                 yield label, layout.names[layout.bodies[int(bodies[0])]]
@@ -283,7 +283,7 @@ class _Seen:
     def _runner_up(self, one: Prediction) -> RunnerUp | None:
         if self.part.bounds(one.mode) or len(self.part.classifier.modes) < 2:
             return None
-        percept = self.model.percept(Scene(self.seen.schema, self.seen.layout, self.seen.vectors[0]))
+        percept = self.model.percept(Scene(self.scenes.schema, self.scenes.layout, self.scenes.vectors[0]))
         example = self.part.example(percept, self.index, self.following.vector)
         values = self.part.mode_values(percept, self.index, self.following.vector)
         by_mode = dict(zip(self.part.classifier.modes, values, strict=True))

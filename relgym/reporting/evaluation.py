@@ -279,7 +279,9 @@ def _book(motion: MotionRules, schema: SceneSchema) -> LawBook:
     return motion.book(schema)
 
 
-def _derive(rules: RuleList, scenes: SceneBatch, found: Evaluated, lost: dict[tuple[str, str], _Bools]) -> None:
+def _derive(
+    rules: RuleList, scenes: SceneBatch, found: Evaluated, lost: dict[tuple[str, str], _Bools]
+) -> None:
     layout = scenes.layout
     for law in rules.kinematics:
         for index in layout.of_type(law.type):
