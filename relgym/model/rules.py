@@ -510,5 +510,8 @@ def _bounds(part: PropertyModel) -> Iterator[Bound]:
         tests = as_tests(Clause((Literal(text, (), False, "<=", sign * stop.bound),)), "all")
         yield Bound("if", stop.value, tests=tests, steps=counts[stop.mode])
     for landing in part.stops.landings:
-        tests = as_tests(Clause((equal_to(f"{landing.property}'", landing.at + 0.0, landing.slack),)), "all")
+        tests = as_tests(
+            Clause((equal_to(f"{landing.property}'", landing.at + 0.0, float(f"{landing.slack:.2g}")),)),
+            "all",
+        )
         yield Bound("if", landing.value, tests=tests, steps=counts[landing.mode])

@@ -168,9 +168,10 @@ def _plain(literal: Literal) -> str:
     if name.endswith(FLAG):
         return name.removesuffix(FLAG) if literal.op == ">" else f"not {name.removesuffix(FLAG)}"
     equal = _EQUAL.fullmatch(name)
-    if equal and literal.op == "<=" and literal.threshold == 0.0:
+    if equal and literal.op == "<=":
         sign = "-" if equal["sign"] == "+" else ""
-        return f"{equal['name']} = {sign}{number_text(float(equal['value']))}"
+        slack = f" within {number_text(literal.threshold)}" if literal.threshold else ""
+        return f"{equal['name']} = {sign}{number_text(float(equal['value']))}{slack}"
     if name.startswith("-") and not literal.args:  # told from the other side
         return f"{_turned(name)} {'>=' if literal.op == '<=' else '<'} {number_text(0.0 - literal.threshold)}"
     return f"{name} {literal.op} {number_text(literal.threshold)}"
@@ -264,7 +265,8 @@ def _parse_literal(text: str, whole: str) -> Literal:
             return Literal(relation, args, False, op.strip(), _number(value, whole))
     if " = " in text:
         name, value = text.rsplit(" = ", 1)
-        return equal_to(name, _number(value, whole))
+        value, _, slack = value.partition(" within ")
+        return equal_to(name, _number(value, whole), _number(slack or "0", whole))
     relation, args = _called(text)
     if args:
         return Literal(relation, args)

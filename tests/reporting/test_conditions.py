@@ -32,6 +32,7 @@ STEEP = Literal("normal-y", (0, 1), False, "<=", 0.8)
         (Clause((Literal("-x - v'", (), False, "<=", -1.5),)), "all", False, "x + v' >= 1.5"),
         (Clause((equal_to("v", 0.0),)), "all", False, "v = 0"),
         (Clause((equal_to("v", -2.0),)), "all", True, "v != -2"),
+        (Clause((equal_to("v'", 0.5, 1e-7),)), "all", False, "v' = 0.5 within 1e-07"),
         (Clause((Literal("ball", (0,)),)), "all", True, "not ball(A)"),
         (Clause((Literal("action.left?", (), False, ">", 0.5),)), "all", False, "action.left"),
         (Clause((Literal("action.left?", (), False, ">", 0.5),)), "all", True, "not action.left"),
