@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -389,7 +389,14 @@ class WorldModel:
         found = advices(self._parts)
         if self._stored is None:
             return found
-        known = {a.target: a for a in self._stored[1] if not a.spoken} | {a.target: a for a in found}
+        # Hindsight goes on without the history; what features would do is known from when there was one.
+        known, now = {a.target: a for a in self._stored[1]}, {a.target: a for a in found}
+        for target, advice in list(known.items()):
+            if target in now:
+                known[target] = replace(advice, wrong=now[target].wrong, spoken=now[target].spoken)
+            elif advice.spoken:
+                del known[target]
+        known = now | known
         return tuple(known[str(t)] for t in self.targets if str(t) in known)
 
     def explain(self, scene: Scene) -> str:
