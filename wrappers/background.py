@@ -18,7 +18,7 @@ from relgym.errors import ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.prequential import Prequential, compared
+from relgym.model.prequential import Prequential, compared
 
 __all__ = ["Background"]
 

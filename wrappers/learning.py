@@ -11,7 +11,7 @@ from relgym.envs.views import Angle, View
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.observer import Observer
-from relgym.wrappers.prequential import Prequential
+from relgym.model.prequential import Prequential
 
 __all__ = ["Learning"]
 

@@ -125,8 +125,8 @@ def upheld(view: View, observation: Any) -> View:
     return view.upheld(observation) if isinstance(view, (NumbersView, TaskView)) else view
 
 
-def remembered(view: View, path: str | os.PathLike[str]) -> View:
-    """The view that a model file holds, where it differs from an open one in its angles at most.
+def remembered(view: View, model: WorldModel | str | os.PathLike[str]) -> View:
+    """The view that a model or its file holds, where it differs from an open one in its angles at most.
 
     What was guessed of these when the model was learned stands, and so does what was taken back.
 
@@ -134,12 +134,13 @@ def remembered(view: View, path: str | os.PathLike[str]) -> View:
     ----------
     view
         The view of the env.
-    path
-        The model's file.
+    model
+        The model, or its file.
     """
     if not is_open(view):
         return view
-    held = WorldModel.load_with_extra(path)[1].get("view")
+    extra = model.extra if isinstance(model, WorldModel) else WorldModel.load_with_extra(model)[1]
+    held = extra.get("view")
     return view_from_json(held) if held and _but_angles(held) == _but_angles(view.to_json()) else view
 
 

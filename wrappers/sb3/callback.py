@@ -18,7 +18,7 @@ from relgym.errors import ConfigError
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.observer import First, Observer, Step
-from relgym.wrappers.prequential import Prequential
+from relgym.model.prequential import Prequential
 from relgym.wrappers.settings import PlainTarget
 from relgym.wrappers.views import ViewLike, chosen_view, readable
 

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from relgym.envs.arguments import checked_count
+from relgym.config.checks import checked_count
 from relgym.model.hindsight import WRONG
 from relgym.model.prediction import ScenePrediction
 from relgym.model.text import Cell, table
-from relgym.model.world_model import LearnReport
+from relgym.model.learning import LearnReport
 from relgym.scene.objects import Scene
 
 __all__ = ["WRONG", "Key", "Prequential", "StepReport", "compared"]

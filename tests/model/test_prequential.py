@@ -10,7 +10,7 @@ from relgym.errors import ConfigError
 from relgym.model.prediction import Outcome, Prediction, ScenePrediction
 from relgym.scene.objects import ObjectType
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.prequential import Prequential, compared
+from relgym.model.prequential import Prequential, compared
 
 A, B = ("ball", "vx"), ("ball", "vy")
 BALL = ObjectType("ball", ("vx", "vy"), optional=True)
