@@ -18,7 +18,7 @@ from relgym.wrappers.learning import Learning
 from relgym.wrappers.observer import STARTS, Observer, Step
 from relgym.wrappers.settings import PlainTarget
 from relgym.wrappers.study import NOTHING
-from relgym.wrappers.views import ViewLike, readable, recordable, view_of
+from relgym.wrappers.views import ViewLike, metadata_of, readable, recordable, view_of
 
 __all__ = ["STARTS", "ModelLearner"]
 
@@ -116,10 +116,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
             window=window,
             background=background,
             bad_observations=bad_observations,
-            metadata={
-                "env": None if env.spec is None else env.spec.id,
-                "render_fps": env.metadata.get("render_fps"),
-            },
+            metadata=metadata_of(env),
         )
         # Recorded arguments are deep-copied: what a spec makes goes on from a copy of the model as it now is.
         RecordConstructorArgs.__init__(

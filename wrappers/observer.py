@@ -15,11 +15,11 @@ from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, NumbersView, TaskView, View
 from relgym.errors import ObservationError, RelgymError
 from relgym.model.prediction import ScenePrediction
+from relgym.model.prequential import StepReport
 from relgym.model.storage import target_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations, Follower, Look
-from relgym.model.prequential import StepReport
 from relgym.wrappers.settings import PlainTarget, check_model, model_of, target_of
 from relgym.wrappers.study import NOTHING, Study
 from relgym.wrappers.views import is_open, remembered, settled, upheld

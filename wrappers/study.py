@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 from relgym.errors import ConfigError
-from relgym.model.fitting import test_then_train
+from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import ScenePrediction
+from relgym.model.prequential import Prequential, StepReport
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers.background import Background
-from relgym.model.prequential import Prequential, StepReport
 
 __all__ = ["NOTHING", "Study"]
 
@@ -106,7 +106,7 @@ class Study:
             if self._learn:
                 self._background.put(transition)
             return NOTHING
-        report = test_then_train(
+        report = compare_and_learn(
             self.model, transition, prediction, precision=self._precision, learn=self._learn
         )
         if prediction is not None:

@@ -22,9 +22,11 @@ __all__ = [
     "ViewLike",
     "chosen_view",
     "is_open",
+    "metadata_of",
     "readable",
     "recordable",
     "remembered",
+    "schema_of",
     "settled",
     "upheld",
     "view_of",
@@ -56,10 +58,28 @@ def view_of(
     """
     if not isinstance(env, gym.Env):
         raise ConfigError(f"expected an env, got {env!r}: gym.make makes one of an id")
-    schema = env.get_wrapper_attr("schema") if env.has_wrapper_attr("schema") else None
     return chosen_view(
-        given, env.observation_space, env.action_space, schema=schema, reward=reward, terminated=terminated
+        given,
+        env.observation_space,
+        env.action_space,
+        schema=schema_of(env),
+        reward=reward,
+        terminated=terminated,
     )
+
+
+def schema_of(env: gym.Env[Any, Any]) -> SceneSchema | None:
+    """The schema of an env whose observations are scenes; ``None`` of others."""
+    schema = env.get_wrapper_attr("schema") if env.has_wrapper_attr("schema") else None
+    return schema if isinstance(schema, SceneSchema) else None  # an attribute of that name may be anything
+
+
+def metadata_of(env: gym.Env[Any, Any]) -> dict[str, Any]:
+    """What model files say of an env to people and renderers."""
+    return {
+        "env": None if env.spec is None else env.spec.id,
+        "render_fps": env.metadata.get("render_fps"),
+    }
 
 
 def chosen_view(

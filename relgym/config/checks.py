@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from numbers import Integral
 from typing import Any
+
+import numpy as np
 
 from relgym.errors import ConfigError
 
@@ -58,6 +59,6 @@ def unit(config: object, *names: str) -> None:
 
 def checked_count(what: str, count: Any, least: int, most: int) -> int:
     """`count` as an int; `ConfigError` unless it is a whole number within the limits."""
-    if not isinstance(count, Integral) or isinstance(count, bool) or not least <= count <= most:
+    if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or not least <= count <= most:
         raise ConfigError(f"{what}={count!r}: expected a whole number from {least} to {most}")
     return int(count)

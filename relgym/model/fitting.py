@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from relgym.model.prediction import ScenePrediction
     from relgym.model.world_model import WorldModel
 
-__all__ = ["Progress", "as_transitions", "ends_of", "progressive", "test_then_train", "transitions_of"]
+__all__ = ["Progress", "as_transitions", "compare_and_learn", "ends_of", "progressive", "transitions_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Progress:
     report: StepReport
 
 
-def test_then_train(
+def compare_and_learn(
     model: WorldModel,
     transition: Transition,
     prediction: ScenePrediction | None,
@@ -68,7 +68,8 @@ def test_then_train(
     residuals, wrong = compared(prediction, transition.after, precision)
     if prediction is not None and learn:
         model.look_back(prediction, residuals, precision)
-    return StepReport(prediction, residuals, wrong, model.learn_one(transition) if learn else None)
+    learned = model.learn_one(transition) if learn else None
+    return StepReport(prediction, residuals, wrong, learned, transition)
 
 
 def progressive(
@@ -90,7 +91,7 @@ def progressive(
     report: StepReport | None = None
     for transition in transitions:
         prediction = model.predict_one(transition.before)
-        report = test_then_train(model, transition, prediction, precision=precision, learn=learn)
+        report = compare_and_learn(model, transition, prediction, precision=precision, learn=learn)
         score.add(prediction, transition, precision)
         steps += 1
         if steps % every == 0:
@@ -181,7 +182,9 @@ def transitions_of(
             f"{'none were' if acts else 'some were'} given"
         )
     done = _matrix(schema, [ACTION], actions, "actions") if acts else np.empty((count, 0))
-    later = now if next_observations is None else _matrix(schema, names, next_observations, "next_observations")
+    later = (
+        now if next_observations is None else _matrix(schema, names, next_observations, "next_observations")
+    )
     for what, array in (("actions", done), ("next_observations", later)):
         if len(array) != count:
             raise DataError(f"{what}: expected {count} rows, as many as observations, got {len(array)}")
@@ -228,9 +231,12 @@ def _matrix(schema: SceneSchema, names: Sequence[str], given: Any, what: str) ->
     columns = [f"{name}.{prop}" for name in names for prop in schema.type_of(name).properties]
     if isinstance(given, Mapping):
         if set(given) != set(names):
-            raise DataError(f"{what}: expected an array for each of {list(names)}, got {sorted(map(str, given))}")
+            raise DataError(
+                f"{what}: expected an array for each of {list(names)}, got {sorted(map(str, given))}"
+            )
         parts = [
-            _numbers(given[name], f"{what}[{name!r}]", list(schema.type_of(name).properties)) for name in names
+            _numbers(given[name], f"{what}[{name!r}]", list(schema.type_of(name).properties))
+            for name in names
         ]
         if len({len(part) for part in parts}) > 1:
             lengths = {name: len(part) for name, part in zip(names, parts, strict=True)}

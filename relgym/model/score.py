@@ -86,7 +86,14 @@ class TargetScore:
         return self._explained(self._changes)
 
     def add(
-        self, was: Float1D, came: Float1D, said: Float1D, claimed: NDArray[np.bool_], right: NDArray[np.bool_], *, angle: bool
+        self,
+        was: Float1D,
+        came: Float1D,
+        said: Float1D,
+        claimed: NDArray[np.bool_],
+        right: NDArray[np.bool_],
+        *,
+        angle: bool,
     ) -> None:
         """Take in some predictions.
 
@@ -256,7 +263,15 @@ class Score:
 
     def __str__(self) -> str:
         rows: list[Sequence[Cell]] = [
-            [name, t.count, f"{t.right:.2%}", f"{t.abstained:.2%}", f"{t.rmse:.3g}", f"{t.r2:.6f}", f"{t.skill:.6f}"]
+            [
+                name,
+                t.count,
+                f"{t.right:.2%}",
+                f"{t.abstained:.2%}",
+                f"{t.rmse:.3g}",
+                f"{t.r2:.6f}",
+                f"{t.skill:.6f}",
+            ]
             for name, t in self.targets.items()
         ]
         lines = [
@@ -308,7 +323,7 @@ def _following(layout: SceneLayout, before: Float2D, after: Sequence[Scene]) -> 
 
 
 def _apart(a: Float1D, b: Float1D, angle: bool) -> Float1D:
-    """a - b; of angles the short way round."""
+    """The difference; of angles the short way round."""
     difference: Float1D = a - b
     return np.arctan2(np.sin(difference), np.cos(difference)) if angle else difference
 
