@@ -194,14 +194,14 @@ class Dataset:
             Lengths that differ, other dtypes than numbers where no space says what they are, or a row that isn't
             what the step before it led to, though no end of an episode lies between.
         """
-        space = None if env is None else env.observation_space
-        seen = _rows(observations, observation_space or space, "observations")
-        done = _rows(actions, action_space or (None if env is None else env.action_space), "actions")
+        known = (None, None) if env is None else (env.observation_space, env.action_space)
+        space = observation_space or known[0] or _space_like(observations, "observations")
+        acts = action_space or known[1] or _space_like(actions, "actions")
+        seen = _rows(observations, space, "observations")
+        done = _rows(actions, acts, "actions")
         count = len(seen)
         following = (
-            None
-            if next_observations is None
-            else _rows(next_observations, observation_space or space, "next_observations")
+            None if next_observations is None else _rows(next_observations, space, "next_observations")
         )
         paid = None if rewards is None else _rewards(rewards)
         for what, given in (("actions", done), ("next_observations", following), ("rewards", paid)):
@@ -216,14 +216,7 @@ class Dataset:
         elif following is not None:
             _check_contiguous(seen, following, ended)
         episodes = list(_cut(seen, done, following, paid, ended, final))
-        return cls._of(
-            episodes,
-            env,
-            observation_space
-            or (None if env is None else space)
-            or _space_like(observations, "observations"),
-            action_space or (None if env is None else env.action_space) or _space_like(actions, "actions"),
-        )
+        return cls._of(episodes, env, space, acts)
 
     @classmethod
     def from_episodes(
@@ -250,14 +243,14 @@ class Dataset:
         given = list(episodes)
         if not given:
             raise DataError("no episodes to learn from; expected at least one")
-        space = observation_space or (env.observation_space if env is not None else None)
-        acts = action_space or (env.action_space if env is not None else None)
-        found = [_episode(number, e, space, acts) for number, e in enumerate(given)]
-        if space is None:
-            space = _space_like(_part(0, given[0], "observations"), "observations")
+        known = (None, None) if env is None else (env.observation_space, env.action_space)
+        space = (
+            observation_space or known[0] or _space_like(_part(0, given[0], "observations"), "observations")
+        )
+        acts = action_space or known[1]
         if acts is None:
             acts = _common([_space_like(_part(n, e, "actions"), "actions") for n, e in enumerate(given)])
-        return cls._of(found, env, space, acts)
+        return cls._of([_episode(n, e, space, acts) for n, e in enumerate(given)], env, space, acts)
 
     @classmethod
     def from_minari(
@@ -425,11 +418,14 @@ class _Log:
 
 
 # ---------------------------------------------------------------------- arrays
-def _rows(given: Any, space: spaces.Space[Any] | None, what: str) -> list[Any]:
+def _rows(given: Any, space: spaces.Space[Any], what: str) -> list[Any]:
     """Single elements of a batch of them."""
-    if isinstance(given, Mapping):
-        parts = space.spaces if isinstance(space, spaces.Dict) else {}
-        columns = {key: _rows(part, parts.get(key), f"{what}[{key!r}]") for key, part in given.items()}
+    if isinstance(space, spaces.Dict) and isinstance(given, Mapping):
+        if set(given) != set(space.spaces):
+            raise DataError(
+                f"{what}: expected the keys {sorted(space.spaces)}, got {sorted(map(str, given))}"
+            )
+        columns = {key: _rows(given[key], part, f"{what}[{key!r}]") for key, part in space.spaces.items()}
         _check_lengths({key: len(column) for key, column in columns.items()}, what)
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     if isinstance(space, spaces.Tuple) and isinstance(given, tuple) and len(given) == len(space.spaces):
@@ -440,8 +436,8 @@ def _rows(given: Any, space: spaces.Space[Any] | None, what: str) -> list[Any]:
         raise DataError(
             f"{what}: expected an array or a list with a row for each step, got {type(given).__name__}"
         )
-    if not isinstance(given, np.ndarray) and (space is None or _is_flat(space)):
-        given = _array(given, what) if space is None or _is_numbers(given) else given
+    if not isinstance(given, np.ndarray) and _is_flat(space) and _is_numbers(given):
+        given = _array(given, what)
     if isinstance(given, np.ndarray):
         if not given.ndim:
             raise DataError(f"{what}: expected a row for each step, got one number")
@@ -486,21 +482,26 @@ def _space_like(given: Any, what: str) -> spaces.Space[Any]:
     if isinstance(given, Mapping):
         return spaces.Dict({str(key): _space_like(part, f"{what}[{key!r}]") for key, part in given.items()})
     array = given if isinstance(given, np.ndarray) else _array(given, what)
+    if not array.ndim:
+        raise DataError(
+            f"{what}: expected an array or a list with a row for each step, got {type(given).__name__}"
+        )
     kind = array.dtype.kind
     if kind in "iu" and (array.ndim == 1 or array.shape[1:] == (1,)) and array.size:
         least = min(0, int(array.min()))
         return spaces.Discrete(int(array.max()) - least + 1, start=least)
-    if kind == "b":
-        return spaces.MultiBinary(array.shape[1:] or 1)
-    if kind not in "iuf":
+    if kind not in "biuf":
         raise DataError(
             f"{what}: expected an array of numbers, got dtype {array.dtype}; pass observation_space= and action_space= "
             "to say what they are"
         )
     if array.ndim < 2:
         raise DataError(
-            f"{what}: expected shape (n, k), got {array.shape}: reshape(-1, 1) if each row is one number"
+            f"{what}: expected shape (n, k), got {array.shape}: reshape(-1, 1) if each row is one number, "
+            "and astype(int) if it is a choice"
         )
+    if kind == "b":
+        return spaces.MultiBinary(array.shape[1] if array.ndim == 2 else array.shape[1:])
     dtype = array.dtype.type
     if kind == "f":
         return spaces.Box(-np.inf, np.inf, array.shape[1:], dtype)
@@ -573,9 +574,7 @@ def _part(number: int, given: Any, name: str, *, needed: bool = True) -> Any:
     return found
 
 
-def _episode(
-    number: int, given: Any, space: spaces.Space[Any] | None, acts: spaces.Space[Any] | None
-) -> Episode:
+def _episode(number: int, given: Any, space: spaces.Space[Any], acts: spaces.Space[Any]) -> Episode:
     if isinstance(given, Episode):
         return given
     seen = _rows(_part(number, given, "observations"), space, f"episode {number}: observations")

@@ -82,6 +82,10 @@ class DataLearner(Learning):
         env: gym.Env[Any, Any] | None = None,
     ) -> None:
         self.data = dataset = _dataset(data, env)
+        if learn_reward and any(episode.rewards is None for episode in dataset):
+            raise DataError(
+                "rewards weren't recorded: pass rewards= to Dataset.from_arrays, or leave out learn_reward"
+            )
         chosen = chosen_view(
             view,
             dataset.observation_space,

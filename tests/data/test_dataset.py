@@ -121,13 +121,14 @@ def test_an_env_says_what_arrays_do_not() -> None:
     lived = Dataset.collect(env, 5, seed=0)
     assert lived.schema == env.get_wrapper_attr("schema")
     assert lived.metadata["env"] == "relgym/TruckPush-v0"
-    (episode,) = lived.episodes
+    episode = lived.episodes[0]
     arrays = {
         name: np.array([o[name] for o in episode.observations[:-1]]) for name in episode.observations[0]
     }
     again = Dataset.from_arrays(arrays, np.array(episode.actions), env=env)
     assert (again.schema, again.metadata) == (lived.schema, lived.metadata)
     assert "5 steps" in repr(lived)
+    assert len(again) == len(episode) - 1
 
 
 def test_collected_with_a_policy() -> None:

@@ -31,13 +31,13 @@ def file_of(model: Any, folder: Path) -> bytes:
     return (folder / "model.relgym").read_bytes()
 
 
-@pytest.mark.parametrize("form", ["hdf5", "arrow"])
 @pytest.mark.parametrize(
-    ("name", "steps", "options"),
+    ("name", "steps", "options", "form"),
     [
-        ("CartPole-v1", 110, {"learn_reward": True, "learn_termination": True}),
-        ("Pendulum-v1", 60, {}),
-        ("relgym/BallBoxRamp-v0", 230, {}),
+        ("CartPole-v1", 30, {"learn_reward": True, "learn_termination": True}, "hdf5"),
+        ("Pendulum-v1", 40, {}, "arrow"),
+        ("relgym/BallBoxRamp-v0", 210, {}, "hdf5"),
+        ("relgym/TruckPush-v0", 15, {}, "arrow"),
     ],
 )
 def test_byte_for_byte_the_model_learned_online(
