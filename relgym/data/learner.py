@@ -31,7 +31,7 @@ class DataLearner(Learning):
     """Goes through recorded episodes as `ModelLearner` goes through an env: predict, compare, learn.
 
     The model is the same, to the last byte of its file, as that of a `ModelLearner` which saw the episodes happen.
-    `relgym.fit` is this class in one call; by itself it also tells the `view`, and `foretell` answers in the env's
+    `relgym.fit` is this class in one call; by itself it also tells the `view`, and `predict` answers in the env's
     terms.
 
     Parameters

@@ -220,7 +220,7 @@ class Score:
         before, said
             State vectors before and as predicted, shape ``(n, layout.width)``.
         after
-            The n scenes that came; what has vanished from them isn't judged.
+            The n scenes that came; what has vanished from them isn't evaluated.
         claimed
             Which parts the model predicted, rather than abstained, shape ``(n, len(parts))``.
         precision
