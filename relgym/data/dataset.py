@@ -429,9 +429,9 @@ def _rows(given: Any, space: spaces.Space[Any], what: str) -> list[Any]:
         _check_lengths({key: len(column) for key, column in columns.items()}, what)
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     if isinstance(space, spaces.Tuple) and isinstance(given, tuple) and len(given) == len(space.spaces):
-        columns = {k: _rows(part, space.spaces[k], f"{what}[{k}]") for k, part in enumerate(given)}
-        _check_lengths({k: len(column) for k, column in columns.items()}, what)
-        return list(zip(*columns.values(), strict=True))
+        parts = {k: _rows(part, space.spaces[k], f"{what}[{k}]") for k, part in enumerate(given)}
+        _check_lengths({k: len(column) for k, column in parts.items()}, what)
+        return list(zip(*parts.values(), strict=True))
     if isinstance(given, (str, bytes)) or not hasattr(given, "__len__"):
         raise DataError(
             f"{what}: expected an array or a list with a row for each step, got {type(given).__name__}"
