@@ -11,6 +11,7 @@ if __name__ != "relgym.wrappers":
 
 _HOMES = {
     "ActionRepeat": "relgym.wrappers.action_repeat",
+    "AgentsView": "relgym.envs.views",
     "Angle": "relgym.envs.views",
     "FlatView": "relgym.wrappers.flat",
     "FunctionView": "relgym.envs.views",
@@ -33,6 +34,7 @@ _HOMES = {
 
 __all__ = [
     "ActionRepeat",
+    "AgentsView",
     "Angle",
     "FlatView",
     "FunctionView",

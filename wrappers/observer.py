@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -13,7 +14,7 @@ from gymnasium.error import ResetNeeded
 from relgym.config import ModelConfig
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, NumbersView, TaskView, View
-from relgym.errors import ObservationError, RelgymError
+from relgym.errors import ConfigError, ObservationError, RelgymError
 from relgym.model.prediction import ScenePrediction
 from relgym.model.prequential import StepReport
 from relgym.model.storage import target_to_json
@@ -225,8 +226,7 @@ class Observer:
         scene = self.followers[number].begin(*first, look)
         if scene is not None and len(self._starts) < STARTS:
             self._starts.append(scene)
-            # So that model.save, too, writes a file to dream from.
-            self.study.model.extra = self.extra()
+            self.note()
 
     # ------------------------------------------------------------------ angles
     def _regard(self, observations: Sequence[Any]) -> bool:
@@ -256,7 +256,7 @@ class Observer:
         self._starts = [view.scene(self.view.observation(scene)) for scene in self._starts]
         self.view, self._study = view, study
         if self._starts:
-            study.model.extra = self.extra()
+            self.note()
         for follower in self.followers:
             if first:
                 follower.view = view
@@ -331,6 +331,14 @@ class Observer:
     def extra(self) -> dict[str, Any]:
         """All that a model file says of the env: its record and its view."""
         return self.record.to_json() | {"view": self.view.to_json()}
+
+    def note(self) -> None:
+        """Tell the model of its env, so that `WorldModel.save`, too, writes a file to dream from.
+
+        Of a space of somebody's own, which no file can hold, nothing is told.
+        """
+        with suppress(ConfigError):
+            self.study.model.extra = self.extra()
 
     def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
         """Write model, spaces, view and some first scenes to one file, atomically."""

@@ -10,8 +10,9 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from relgym.envs.agents import AgentsSpace
 from relgym.envs.arguments import checked_action
-from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
+from relgym.envs.views import AgentsView, NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
 from relgym.scene.schema import SceneSchema
@@ -41,8 +42,9 @@ def view_of(
 ) -> View:
     """The view of an env.
 
-    An env with a ``schema`` (`relgym.envs.SceneEnv`) shows scenes already. Any other is seen as numbers: one
-    object, or one per key of a Dict (`NumbersView`).
+    An env with a ``schema`` (`relgym.envs.SceneEnv`) shows scenes already, and one of several agents
+    (`relgym.envs.AgentsEnv`) an object per agent. Any other is seen as numbers: one object, or one per key of a Dict
+    (`NumbersView`).
 
     Parameters
     ----------
@@ -111,10 +113,12 @@ def chosen_view(
     """
     view: Any
     if given is None:
-        if not isinstance(schema, SceneSchema):  # an attribute of that name may be anything
-            view = NumbersView(observation_space, action_space)
-        else:
+        if isinstance(schema, SceneSchema):  # an attribute of that name may be anything
             view = SceneView(schema, observation_space, action_space)
+        elif isinstance(observation_space, AgentsSpace):
+            view = AgentsView(observation_space, action_space)
+        else:
+            view = NumbersView(observation_space, action_space)
     elif isinstance(given, Mapping):
         view = view_from_json(given)
     else:

@@ -123,7 +123,7 @@ class DataLearner(Learning):
                 before = follower.act(known)
                 prediction = observer.expect(before)
                 yield observer.follow(0, before, prediction, _step(episode, k, known))
-        observer.study.model.extra = observer.extra()
+        observer.note()
 
     def run(self) -> DataLearner:
         """Go through all episodes once; returns itself."""
