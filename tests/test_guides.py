@@ -12,10 +12,25 @@ from types import CodeType
 import pytest
 
 ROOT = Path(__file__).parents[1]
-GUIDE = (ROOT / "docs" / "guides" / "your-own-env.md").read_text(encoding="utf-8")
-BLOCKS: list[tuple[str, str]] = re.findall(r"^```(\w+)\n(.*?)^```$", GUIDE, re.DOTALL | re.MULTILINE)
-SNIPPETS = [(code, text) for (kind, code), (_, text) in pairwise(BLOCKS) if kind == "python"]
-SCRIPTS = [(line.split()[1:], text) for (kind, line), (_, text) in pairwise(BLOCKS) if kind == "bash"]
+GUIDES = ("your-own-env", "learning-from-data")
+
+
+def blocks_of(guide: str) -> list[tuple[str, str]]:
+    text = (ROOT / "docs" / "guides" / f"{guide}.md").read_text(encoding="utf-8")
+    return re.findall(r"^```(\w+)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+
+
+def snippets_of(guide: str) -> list[tuple[str, str]]:
+    return [(code, text) for (kind, code), (_, text) in pairwise(blocks_of(guide)) if kind == "python"]
+
+
+SNIPPETS = [(guide, number) for guide in GUIDES for number in range(len(snippets_of(guide)))]
+SCRIPTS = [
+    (line.split()[1:], text)
+    for guide in GUIDES
+    for (kind, line), (_, text) in pairwise(blocks_of(guide))
+    if kind == "bash"
+]
 
 
 def defined_in(code: str) -> CodeType:
@@ -35,9 +50,10 @@ def assert_shown(text: str, printed: str) -> None:
     assert re.fullmatch(pattern, printed, re.DOTALL), f"the guide shows\n{text}\nand this came:\n{printed}"
 
 
-def test_every_output_has_code_that_printed_it() -> None:
-    kinds = [kind for kind, _ in BLOCKS]
-    assert set(kinds) == {"python", "bash", "text"}
+@pytest.mark.parametrize("guide", GUIDES)
+def test_every_output_has_code_that_printed_it(guide: str) -> None:
+    kinds = [kind for kind, _ in blocks_of(guide)]
+    assert {"python", "text"} <= set(kinds) <= {"python", "bash", "text"}
     for kind, following in zip(kinds, [*kinds[1:], ""], strict=True):
         assert (kind == "text") != (following == "text")
 
@@ -50,16 +66,27 @@ def test_what_is_left_out_and_what_is_not() -> None:
             assert_shown(text, "a\nb\nc\n")
 
 
-@pytest.mark.parametrize("number", range(len(SNIPPETS)))
+# Minari wants more said of a data set than a guide does.
+@pytest.mark.filterwarnings("ignore::UserWarning:minari")
+@pytest.mark.parametrize(("guide", "number"), SNIPPETS)
 def test_the_code_of_the_guide(
-    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    guide: str,
+    number: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """With what the code above it has imported and defined."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
+    snippets = snippets_of(guide)
+    for extra in ("minari", "pettingzoo"):
+        if extra in snippets[number][0]:
+            pytest.importorskip(extra)
     names: dict[str, object] = {"__name__": "__main__"}
-    for code, _ in SNIPPETS[:number]:
+    for code, _ in snippets[:number]:
         exec(defined_in(code), names)
-    code, text = SNIPPETS[number]
+    code, text = snippets[number]
     exec(code, names)
     assert_shown(text, capsys.readouterr().out)
 

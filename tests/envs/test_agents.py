@@ -154,12 +154,12 @@ def test_from_data_as_online(tmp_path: Path) -> None:
 
 def test_an_env_of_pettingzoo() -> None:
     """Rock, paper, scissors: what a player sees is what the other one did, whoever of them it is."""
-    rps = pytest.importorskip("pettingzoo.classic.rps_v2")
-    learner = lived(AgentsEnv(rps.parallel_env(max_cycles=40)), 120)
+    pettingzoo = pytest.importorskip("pettingzoo")
+    learner = lived(AgentsEnv(pettingzoo.make("parallel", "classic/rps-v2", max_cycles=40)), 120)
     (mode,) = learner.model.modes("player", "x")
     assert mode.formula() == "x' = player_a.a"
     with pytest.raises(ConfigError, match="aec_to_parallel"):
-        AgentsEnv(rps.env())
+        AgentsEnv(pettingzoo.make("aec", "classic/rps-v2"))
 
 
 def test_pettingzoo_accepts_the_env_of_these_tests() -> None:

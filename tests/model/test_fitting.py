@@ -126,7 +126,7 @@ def test_what_is_no_config_is_refused_as_by_the_learner() -> None:
     assert WorldModel(ALONE, None).config == ModelConfig()
     with pytest.raises(ConfigError, match="expected a ModelConfig, or a dict of what differs"):
         WorldModel(ALONE, 3)  # type: ignore[arg-type]
-    with pytest.raises(ConfigError, match="speed.*see relgym.config.ModelConfig"):
+    with pytest.raises(ConfigError, match=r"speed.*see relgym.config.ModelConfig"):
         WorldModel(ALONE, {"speed": 3})
     with pytest.raises(ConfigError, match="draws must be a whole number"):
         WorldModel(ALONE, {"clustering": {"draws": "many"}})
@@ -186,7 +186,7 @@ def test_one_bad_transition_among_good_ones_teaches_nothing() -> None:
     good = transitions(4)
     bad = Scene(PUSHED, good[0].after.layout, np.array([1.0, np.inf, 0.0, 0.0]))
     model = WorldModel(PUSHED)
-    with pytest.raises(DataError, match="transition 2: .*'left', property 'v'.*inf"):
+    with pytest.raises(DataError, match=r"transition 2: .*'left', property 'v'.*inf"):
         model.fit([*good[:2], Transition(good[2].before, bad), good[3]])
     assert model.seen == 0
 
