@@ -1,4 +1,4 @@
-"""The wrapper that learns a model of an env while an agent acts in it (design §5)."""
+"""The wrapper that learns a model of an env while an agent acts in it."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ from gymnasium import spaces
 
 from relgym.envs.agents import AgentsSpace
 from relgym.envs.arguments import checked_action
+from relgym.envs.model_files import made_how
 from relgym.envs.views import AgentsView, NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
@@ -77,11 +78,8 @@ def schema_of(env: gym.Env[Any, Any]) -> SceneSchema | None:
 
 
 def metadata_of(env: gym.Env[Any, Any]) -> dict[str, Any]:
-    """What model files say of an env to people and renderers."""
-    return {
-        "env": None if env.spec is None else env.spec.id,
-        "render_fps": env.metadata.get("render_fps"),
-    }
+    """What model files say of an env: how it was made, and for renderers."""
+    return made_how(env.spec) | {"render_fps": env.metadata.get("render_fps")}
 
 
 def chosen_view(

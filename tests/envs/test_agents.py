@@ -21,7 +21,7 @@ from relgym.wrappers import ModelLearner
 
 
 def still(env: AgentsEnv) -> dict[str, Any]:
-    return {a: 0 if a == "gate" else np.zeros(1) for a in env.agents_env.agents}
+    return {a: 0 if a == "door" else np.zeros(1) for a in env.agents_env.agents}
 
 
 def lived(env: gym.Env[Any, Any], steps: int, **options: Any) -> ModelLearner:
@@ -37,9 +37,9 @@ def lived(env: gym.Env[Any, Any], steps: int, **options: Any) -> ModelLearner:
 
 def test_elements_may_lack_agents() -> None:
     space = AgentsEnv(Runners(2)).action_space
-    assert space.contains({"gate": 1}) and space.contains({})
+    assert space.contains({"door": 1}) and space.contains({})
     assert space.contains(space.sample())
-    assert not space.contains({"gate": 5})
+    assert not space.contains({"door": 5})
     assert not space.contains({"cow": 1})
     assert not space.contains([1])
     again = space_from_json(json.loads(json.dumps(space_to_json(space))))
@@ -49,13 +49,13 @@ def test_elements_may_lack_agents() -> None:
 def test_one_env_of_all_agents() -> None:
     env = AgentsEnv(Runners(2, length=3))
     observation, info = env.reset(seed=1)
-    assert set(observation) == {"runner_0", "runner_1", "gate"}
+    assert set(observation) == {"runner_0", "runner_1", "door"}
     assert env.observation_space.contains(observation)
-    assert info == {"agents": {"runner_0": {}, "runner_1": {}, "gate": {}}}
+    assert info == {"agents": {"runner_0": {}, "runner_1": {}, "door": {}}}
     for last in (False, False, True):
         _, reward, terminated, truncated, info = env.step(still(env))
         assert (reward, terminated, truncated) == (0.0, False, last)
-    assert info["truncations"] == {"runner_0": True, "runner_1": True, "gate": True}
+    assert info["truncations"] == {"runner_0": True, "runner_1": True, "door": True}
     assert env.render() == "runners"
     env.close()
     assert env.agents_env.closed
@@ -67,15 +67,15 @@ def test_agents_leave_and_are_paid() -> None:
     env.agents_env.state["runner_0"] = np.array([4.9, 1.0])
     seen, reward, terminated, truncated, info = env.step(still(env))
     assert (reward, terminated, truncated) == (1.0, False, False)
-    assert set(seen) == {"runner_0", "runner_1", "gate"}
+    assert set(seen) == {"runner_0", "runner_1", "door"}
     assert info["terminations"]["runner_0"]
     seen, *_ = env.step({**still(env), "runner_0": np.ones(1)})  # it isn't there any more
-    assert set(seen) == {"runner_1", "gate"}
+    assert set(seen) == {"runner_1", "door"}
 
 
 def test_it_ends_when_nobody_is_left() -> None:
     env = AgentsEnv(Runners(1, goal=5.0))
-    env.agents_env.possible_agents.remove("gate")
+    env.agents_env.possible_agents.remove("door")
     env.reset(seed=1)
     env.agents_env.state["runner_0"] = np.array([4.9, 1.0])
     _, reward, terminated, truncated, _ = env.step(still(env))
@@ -85,7 +85,7 @@ def test_it_ends_when_nobody_is_left() -> None:
 def test_everybody_there_has_to_act() -> None:
     env = AgentsEnv(Runners(2))
     env.reset(seed=1)
-    with pytest.raises(ActionError, match=r"without \['runner_1', 'gate'\]"):
+    with pytest.raises(ActionError, match=r"without \['runner_1', 'door'\]"):
         env.step({"runner_0": np.zeros(1)})
     with pytest.raises(ActionError, match="expected an action for each of"):
         env.step(3)  # type: ignore[arg-type]

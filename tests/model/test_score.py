@@ -45,7 +45,7 @@ def test_by_hand() -> None:
     assert (score.right, score.abstained, score.r2) == (1 / 3, 1 / 3, target.r2)
 
 
-def test_objects_that_vanish_are_not_judged() -> None:
+def test_objects_that_vanish_are_not_compared() -> None:
     score = Score()
     said = {"a": ("v", 1.0, True), "b": ("v", 7.0, True)}
     score.add(*step({"a": [1.0, 0, 0], "b": [2.0, 0, 0]}, {"a": [1.0, 0, 0]}, said))

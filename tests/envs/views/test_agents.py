@@ -15,7 +15,7 @@ from relgym.envs.views import AgentsView, TaskView, view_from_json
 from relgym.errors import ConfigError, ObservationError
 
 RUNNERS = AgentsEnv(Runners(2))
-SEEN = {"runner_1": np.array([3.0, 0.5]), "gate": np.array([0.1])}
+SEEN = {"runner_1": np.array([3.0, 0.5]), "door": np.array([0.1])}
 
 
 def view_of(**options: Any) -> AgentsView:
@@ -29,40 +29,40 @@ def of(seen: dict[str, Any], done: dict[str, Any] | None = None, **options: Any)
 
 def test_agents_of_a_kind_are_of_a_type() -> None:
     view = view_of()
-    assert dict(view.schema.objects) == {"runner_0": "runner", "runner_1": "runner", "gate": "gate"}
+    assert dict(view.schema.objects) == {"runner_0": "runner", "runner_1": "runner", "door": "door"}
     assert view.schema.type("runner").properties == ("x0", "x1", "a")
     assert view.schema.type("runner").exogenous == ("a",)
-    assert view.schema.type("gate").optional
+    assert view.schema.type("door").optional
     assert view.precision == 0.0
 
 
 def test_scenes_and_back() -> None:
     view = view_of()
     scene = view.scene(SEEN)
-    assert scene.layout.names == ("gate", "runner_1")  # Gymnasium sorts the keys of a Dict
-    acting = view.with_action(scene, {"gate": 1, "runner_0": np.ones(1), "runner_1": np.array([-0.5])})
+    assert scene.layout.names == ("door", "runner_1")  # Gymnasium sorts the keys of a Dict
+    acting = view.with_action(scene, {"door": 1, "runner_0": np.ones(1), "runner_1": np.array([-0.5])})
     assert acting["runner_1"].values.tolist() == [3.0, 0.5, -0.5]
-    assert acting["gate"].values.tolist() == [0.1, 1.0]
-    assert scene["gate"].values.tolist() == [0.1, 0.0]  # stays as it was
+    assert acting["door"].values.tolist() == [0.1, 1.0]
+    assert scene["door"].values.tolist() == [0.1, 0.0]  # stays as it was
     shown = view.observation(acting)
-    assert {agent: seen.tolist() for agent, seen in shown.items()} == {"runner_1": [3.0, 0.5], "gate": [0.1]}
+    assert {agent: seen.tolist() for agent, seen in shown.items()} == {"runner_1": [3.0, 0.5], "door": [0.1]}
     idle = view.with_action(acting, {})
     assert idle == scene
 
 
 def test_with_a_task_around() -> None:
     view = TaskView(view_of())
-    acting = view.with_action(view.scene(SEEN), {"gate": 1, "runner_1": np.zeros(1)})
+    acting = view.with_action(view.scene(SEEN), {"door": 1, "runner_1": np.zeros(1)})
     assert acting["task"].values.tolist() == [0.0, 0.0]
-    assert acting["gate"]["a"] == 1.0
+    assert acting["door"]["a"] == 1.0
     assert view.observation(view.with_outcome(acting, 2.0, True)).keys() == SEEN.keys()
 
 
 def test_names_and_choices() -> None:
-    view = view_of(names={"runner": ("x", "v")}, actions={"gate": ("shut", "open")})
+    view = view_of(names={"runner": ("x", "v")}, actions={"door": ("shut", "open")})
     assert view.schema.type("runner").properties == ("x", "v", "a")
-    assert view.schema.type("gate").properties == ("x", "a", "shut", "open")
-    assert view.schema.type("gate").flags == ("shut", "open")
+    assert view.schema.type("door").properties == ("x", "a", "shut", "open")
+    assert view.schema.type("door").flags == ("shut", "open")
     again = view_from_json(json.loads(json.dumps(view.to_json())))
     assert isinstance(again, AgentsView)
     assert again.schema == view.schema
@@ -123,8 +123,8 @@ def test_bad_observations(seen: Any, message: str) -> None:
         (lambda: of({"first one": spaces.Discrete(2)}), "Python identifiers"),
         (lambda: view_of(names={"cow": ("x",)}), r"no agents are of kinds \['cow'\]"),
         (lambda: view_of(names={"runner": ("x", "a")}), r"\['a'\] name both"),
-        (lambda: view_of(kinds={"gate": "gate"}), "a kind for each of"),
-        (lambda: view_of(kinds=dict.fromkeys(("gate", "runner_0", "runner_1"), "one")), "name them apart"),
+        (lambda: view_of(kinds={"door": "door"}), "a kind for each of"),
+        (lambda: view_of(kinds=dict.fromkeys(("door", "runner_0", "runner_1"), "one")), "name them apart"),
         (lambda: of({"a": spaces.Text(3)}), "pass view="),
         (lambda: view_of().check_actions(spaces.Discrete(2)), "the view was made for actions of"),
     ],
