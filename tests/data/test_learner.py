@@ -130,6 +130,34 @@ def test_from_transitions_too(tmp_path: Path) -> None:
     assert file_of(model, tmp_path) == file_of(online, tmp_path)
 
 
+def test_from_what_a_recorder_kept(tmp_path: Path) -> None:
+    from relgym.wrappers.sb3.recorder import TransitionRecorder
+
+    online = lived(ball(), 90)
+    recorder = TransitionRecorder(ball())
+    recorder.action_space.seed(0)
+    recorder.reset(seed=0)
+    for _ in range(90):
+        *_, terminated, truncated, _ = recorder.step(recorder.action_space.sample())
+        if terminated or truncated:
+            recorder.reset()
+    model = relgym.fit(recorder.take())
+    model.extra = online.model.extra
+    assert file_of(model, tmp_path) == file_of(online, tmp_path)
+
+
+def test_from_a_recording_of_the_experiments() -> None:
+    from relgym.experiments.recording import record
+
+    view = NumbersView(Slider().observation_space, Slider().action_space)
+    kept = record(Slider(30), view, lambda _, rng: rng.uniform(-1.0, 1.0, 1), 80, seed=1)
+    data = Dataset.from_arrays(
+        kept.before, kept.actions, kept.after, terminations=kept.terminated, truncations=kept.truncated
+    )
+    model = relgym.fit(data, view=kept.view)
+    assert model.modes("self", "x1")[0].formula() == "x1' = 0.8 x1 + 0.5 action.a"
+
+
 def test_from_arrays_too(tmp_path: Path) -> None:
     online = lived(cart(), 25)
     data = Dataset.collect(cart(), 25, seed=0)
