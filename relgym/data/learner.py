@@ -273,7 +273,7 @@ def score(
             f"model={model!r}: expected a WorldModel; WorldModel.load(path) reads one from a file"
         )
     if (transitions := _listed(data)) is not None:
-        return model.score(transitions, precision=model.schema.precision)
+        return model.score(transitions)
     dataset = _dataset(data, env)
     chosen = _view_of(model, dataset, view)
     return scored(model, _transitions(chosen, dataset, model, bad_observations), chosen.precision)

@@ -155,7 +155,7 @@ class WorldModel:
         *,
         terminations: Any = None,
         truncations: Any = None,
-        precision: float = 0.0,
+        precision: float | None = None,
     ) -> Self:
         """Learn from many transitions, in their order, as if they came one by one.
 
@@ -177,7 +177,7 @@ class WorldModel:
         terminations, truncations
             Where episodes ended, shape ``(n,)``; of use without `next_observations`.
         precision
-            Relative precision of the numbers: 0 for float64, 5e-7 for float32.
+            Relative precision of the numbers: 0 for float64, 5e-7 for float32. Default: the schema's.
 
         Raises
         ------
@@ -217,7 +217,7 @@ class WorldModel:
         *,
         terminations: Any = None,
         truncations: Any = None,
-        precision: float = 0.0,
+        precision: float | None = None,
         every: int = 1,
     ) -> Iterator[Progress]:
         """Learn as `fit` does, and report how each transition was predicted before it was learned from.
@@ -232,7 +232,7 @@ class WorldModel:
             A report after so many transitions, and one of what remains.
         """
         found = self._transitions(observations, actions, next_observations, terminations, truncations)
-        return progressive(self, found, every=every, precision=precision)
+        return progressive(self, found, every=every, precision=self._precision(precision))
 
     def score(
         self,
@@ -242,14 +242,17 @@ class WorldModel:
         *,
         terminations: Any = None,
         truncations: Any = None,
-        precision: float = 0.0,
+        precision: float | None = None,
     ) -> Score:
         """How well it predicts transitions that it hasn't learned from: RMSE, R², share right, share abstained.
 
         Nothing is learned. Arguments as of `fit`; cost: as `predict_batch`.
         """
         found = self._transitions(observations, actions, next_observations, terminations, truncations)
-        return scored(self, found, precision)
+        return scored(self, found, self._precision(precision))
+
+    def _precision(self, given: float | None) -> float:
+        return self.schema.precision if given is None else given
 
     def _transitions(
         self, observations: Any, actions: Any, next_observations: Any, terminations: Any, truncations: Any

@@ -121,9 +121,10 @@ def test_withdrawn_angles_are_among_the_worlds() -> None:
     assert lived(NotAngles(), 60).withdrawn
 
 
-def test_from_transitions_too(tmp_path: Path) -> None:
-    online = lived(ball(), 90)
-    transitions = [r.transition for r in DataLearner(Dataset.collect(ball(), 90, seed=0), learn=False)]
+@pytest.mark.parametrize(("make", "steps"), [(ball, 90), (cart, 25)])
+def test_from_transitions_too(make: Callable[[], gym.Env[Any, Any]], steps: int, tmp_path: Path) -> None:
+    online = lived(make(), steps)
+    transitions = [r.transition for r in DataLearner(Dataset.collect(make(), steps, seed=0), learn=False)]
     assert all(isinstance(t, Transition) for t in transitions)
     model = relgym.fit(transitions)
     model.extra = online.model.extra  # transitions know of no env
