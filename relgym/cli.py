@@ -181,7 +181,7 @@ def rules(
 @app.command()
 def explain(
     model: ModelFile,
-    step: Annotated[int, typer.Option(help="Which scene of the episode.", min=0)] = 0,
+    step: Annotated[int, typer.Option(help="Random steps to take before.", min=0)] = 0,
     env_id: OtherEnv = None,
     arg: Arguments = None,
     view: ViewOption = None,
