@@ -33,6 +33,7 @@ WORDS = {
     "redraw": "resample",
     "redrawn": "resampled",
     "rival": "runner-up (prediction), alternative (law), replacement (model), baseline (comparison)",
+    "silence": "no prediction",
     "silent": "abstaining; it abstains",
     "sight": "measurement",
     "stopgap": "fallback value",
