@@ -34,12 +34,13 @@ MAY_IMPORT = {
     "envs": CORE,
     "wrappers": CORE | {"envs"},
     "experiments": CORE | {"baselines", "envs", "wrappers"},
-    "cli": CORE | {"baselines", "envs", "wrappers", "experiments"},
+    "console": CORE | {"envs", "wrappers", "experiments"},
+    "cli": CORE | {"baselines", "envs", "wrappers", "experiments", "console"},
     "__main__": frozenset({"cli"}),
 }
 """Other packages each package may import; a line here is a decision about the design, not a way to pass."""
 
-FACADE_USERS = frozenset({"experiments", "cli"})
+FACADE_USERS = frozenset({"experiments", "console", "cli"})
 """Packages that may `import relgym` itself: those above everything that the façade offers."""
 
 CORE_LIBRARIES = frozenset({"numpy", "scipy"})

@@ -805,7 +805,11 @@ def test_what_a_file_says_of_the_env_survives(truck: ModelLearner) -> None:
     data = json.loads(json.dumps(record.to_json()))
     assert EnvRecord.from_json(data, truck.model.schema) == record
     assert len(record.starts) == 12
-    assert record.metadata == {"env": "relgym/TruckPush-v0", "render_fps": truck.metadata["render_fps"]}
+    assert record.metadata == {
+        "env": "relgym/TruckPush-v0",
+        "arguments": {"n_boxes": 1, "resample": "step"},
+        "render_fps": truck.metadata["render_fps"],
+    }
 
 
 def test_spaces_survive_json() -> None:
