@@ -54,7 +54,7 @@ ROOMS = {"room": "package, subpackage"}
 
 ALLOWED = {
     "bar": (
-        r"progress bar|BarColumn|\bbar\.(add_task|advance|tasks|update|reset|start|stop|console|finished)|_progress\(|bar=bar"
+        r"progress bar|BarColumn|\bbar\.(add_task|advance|tasks|update|reset|start|stop|console|finished|set_label)|_progress\(|bar=bar"
         r"|\bbar: Progress|^    bar$|\b(panel|axes|ax)\.bar(h)?\(|colour ?bar|color ?bar|bars? of progress"
     ),
     "block": r"with`` block|code block|np\.block|[Bb]locks? the way",
@@ -75,7 +75,6 @@ ALLOWED_IN = {
         "tests/scene/geometry/",
         "tests/test_console_guide.py",  # fenced code blocks
         "tests/test_pages.py",
-        "docs/tools/",
     ),
 }
 """Files in which a word has its ordinary sense."""
