@@ -62,7 +62,7 @@ class Horizons:
     stopped
         How many ended early, without a prediction.
     lacking
-        Targets without whose prediction they ended.
+        Targets whose missing predictions ended them.
     bodies
         Whether positions decide.
     after
