@@ -35,7 +35,6 @@ WORDS = {
     "rival": "runner-up (prediction), alternative (law), replacement (model), baseline (comparison)",
     "silence": "no prediction",
     "silent": "abstaining; it abstains",
-    "sight": "measurement",
     "stopgap": "fallback value",
 }
 """Retired words, alone or as a part of a name, also in the plural; and what to write instead."""
@@ -54,7 +53,8 @@ ROOMS = {"room": "package, subpackage"}
 
 ALLOWED = {
     "bar": (
-        r"progress bar|BarColumn|\bbar\.(add_task|advance|tasks|update|reset|start|stop|console|finished|set_label)|_progress\(|bar=bar"
+        r"progress bar|BarColumn|_progress\(|bar=bar"
+        r"|\bbar\.(add_task|advance|tasks|update|reset|start|stop|console|finished|set_label)"
         r"|\bbar: Progress|^    bar$|\b(panel|axes|ax)\.bar(h)?\(|colour ?bar|color ?bar|bars? of progress"
     ),
     "block": r"with`` block|code block|np\.block|[Bb]locks? the way",
