@@ -21,10 +21,10 @@ from relgym.planning.simulators import ModelSimulator
 from relgym.planning.tree import TreeSearch
 from relgym.scene.objects import TASK, SceneLayout
 from relgym.wrappers.action_repeat import ActionRepeat
-from relgym.wrappers.sb3.apprentice import Apprentice
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
 from relgym.wrappers.sb3.stock import changing
+from relgym.wrappers.sb3.trainer import ModelTrainer
 from relgym.wrappers.views import ViewLike
 
 __all__ = ["PlanningAgent"]
@@ -60,7 +60,7 @@ class PlanningAgent:
 
     Attributes
     ----------
-    trainer : Apprentice
+    trainer : ModelTrainer
         The model, how far it is to be trusted, and what has been learned of the task.
     coverage : Coverage or None
         What has been seen; made with the first step.
@@ -101,7 +101,7 @@ class PlanningAgent:
             raise ConfigError(f"exploration={exploration!r}: expected a finite number of at least 0")
         if model is None:
             model = WorldModel(self._recorder.view.schema, config)
-        self.trainer = Apprentice(
+        self.trainer = ModelTrainer(
             model, _task(task, env), DynaConfig(shuffle=0, seed=checked_count("seed", seed, 0, 2**31))
         )
         self.exploration = float(exploration)

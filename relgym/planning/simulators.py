@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import checked_count
 from relgym.envs.base import SceneEnv
 from relgym.envs.learned_model_batch import DreamStep
-from relgym.envs.learned_model_judges import BatchJudges, TaskFunctions, check_judges
+from relgym.envs.learned_model_rewards import BatchStepEvaluator, TaskFunctions, check_reward_functions
 from relgym.envs.learned_model_setting import Setting
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError, RelgymError
@@ -87,7 +87,7 @@ class ModelSimulator:
         The view through which the model sees observations; default: the one it was learned through.
     task
         Reward and termination: an object with functions `rewards` and `terminations` of arrays, such as an env's task or
-        `relgym.wrappers.sb3.LearnedTask`. Default: that of `like`, or the model's own predictions of the object `task`.
+        `relgym.wrappers.sb3.LearnedRewardModel`. Default: that of `like`, or the model's own predictions of the object `task`.
     repeat
         Env steps that a decision lasts (`relgym.wrappers.ActionRepeat`).
     min_margin
@@ -115,7 +115,7 @@ class ModelSimulator:
     ) -> None:
         self._setting = Setting.of(model, like, view, snapshot=False)
         self._task = self._setting.task if task is None else task
-        check_judges(None, None, self._task, model, batched=True, at_once=False)
+        check_reward_functions(None, None, self._task, model, batched=True, at_once=False)
         self.model = model
         self.repeat = checked_count("repeat", repeat, 1, 10**6)
         self._actions = self._setting.shown.deeds()
@@ -155,8 +155,8 @@ class ModelSimulator:
     def prepare(self) -> None:
         """Settle who says what steps are worth; a live model may have learned it by now."""
         place = self._setting
-        judges = BatchJudges.of(None, None, self._task, self.model, place.layout)
-        self._step = DreamStep(place, judges, self._task, self._actions, None, self._margin)
+        evaluates = BatchStepEvaluator.of(None, None, self._task, self.model, place.layout)
+        self._step = DreamStep(place, evaluates, self._task, self._actions, None, self._margin)
 
     def step(self, states: Float2D, actions: NDArray[Any]) -> Steps:
         """Follow n actions from n states."""
