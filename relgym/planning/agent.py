@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.envs.arguments import checked_count
+from relgym.envs.arguments import checked_count, checked_least
+from relgym.envs.learned_model_rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.planning.exploration import Coverage
@@ -97,14 +98,12 @@ class PlanningAgent:
         self.env: gym.Env[Any, Any] = (
             ActionRepeat(self._recorder, self.repeat) if repeat > 1 else self._recorder
         )
-        if not (isinstance(exploration, (int, float)) and 0.0 <= exploration < np.inf):
-            raise ConfigError(f"exploration={exploration!r}: expected a finite number of at least 0")
+        self.exploration = checked_least("exploration", exploration, 0.0)
         if model is None:
             model = WorldModel(self._recorder.view.schema, config)
         self.trainer = ModelTrainer(
             model, _task(task, env), DynaConfig(shuffle=0, seed=checked_count("seed", seed, 0, 2**31))
         )
-        self.exploration = float(exploration)
         self.random_steps = checked_count("random_steps", random_steps, 0, 10**9)
         self.coverage: Coverage | None = None
         self.steps = 0
@@ -141,8 +140,8 @@ class PlanningAgent:
         simulator = ModelSimulator(
             self.model,
             self._like,
-            task=self.trainer.judge,
-            repeat=self.repeat,  # type: ignore[arg-type]
+            task=cast(TaskFunctions, self.trainer.reward_model),
+            repeat=self.repeat,
         )
         objective = Objective()
         if explores and self.exploration > 0.0 and self.coverage is not None:

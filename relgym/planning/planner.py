@@ -100,8 +100,8 @@ class Planner:
     def __post_init__(self) -> None:
         if not isinstance(self.simulator, Simulator):
             raise ConfigError(
-                f"simulator={self.simulator!r}: expected a ModelSimulator(model), an EnvSimulator(env), or an object with "
-                "action_space, observation_space, state, prepare and step"
+                f"simulator={self.simulator!r}: expected a ModelSimulator(model), an EnvSimulator(env), or an object "
+                "with action_space, observation_space, state, prepare and step"
             )
         if self.commit is not None:
             checked_count("commit", self.commit, 1, 10**9)

@@ -10,6 +10,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
 from relgym.planning.actions import ActionCoder
 from relgym.planning.rollouts import Objective, Plan, roll_out
@@ -328,6 +329,6 @@ def _varied(
 
 
 def _check(horizon: int, candidates: int, rounds: int) -> None:
-    for name, value, least in (("horizon", horizon, 1), ("candidates", candidates, 2), ("rounds", rounds, 1)):
-        if not isinstance(value, int) or isinstance(value, bool) or value < least:
-            raise ConfigError(f"{name}={value!r}: expected a whole number of at least {least}")
+    checked_count("horizon", horizon, 1, 10**6)
+    checked_count("candidates", candidates, 2, 10**7)
+    checked_count("rounds", rounds, 1, 10**4)

@@ -86,8 +86,9 @@ class ModelSimulator:
     view
         The view through which the model sees observations; default: the one it was learned through.
     task
-        Reward and termination: an object with functions `rewards` and `terminations` of arrays, such as an env's task or
-        `relgym.wrappers.sb3.LearnedRewardModel`. Default: that of `like`, or the model's own predictions of the object `task`.
+        Reward and termination: an object with functions `rewards` and `terminations` of arrays, such as an env's task
+        or `relgym.wrappers.sb3.LearnedRewardModel`. Default: that of `like`, or what the model
+        predicts of the object `task`.
     repeat
         Env steps that a decision lasts (`relgym.wrappers.ActionRepeat`).
     min_margin
@@ -202,8 +203,8 @@ class EnvSimulator:
         inner = env.unwrapped
         if not isinstance(inner, SceneEnv) or inner.task is None:
             raise ConfigError(
-                f"{env}: expected an env of relgym's with a task, whose state can be set; of any other learn a model and "
-                "plan with ModelSimulator(model)"
+                f"{env}: expected an env of relgym's with a task, whose state can be set; of any other learn a model "
+                "and plan with ModelSimulator(model)"
             )
         self._env = copy.deepcopy(inner)
         self._env.reset(seed=0)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
 from relgym.planning.actions import ActionCoder
 from relgym.planning.rollouts import Objective, Plan
@@ -65,9 +66,7 @@ class TreeSearch:
 
     def __post_init__(self) -> None:
         for name in ("horizon", "expansions", "batch", "hold", "cells", "patience"):
-            value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-                raise ConfigError(f"{name}={value!r}: expected a whole number of at least 1")
+            checked_count(name, getattr(self, name), 1, 10**9)
         if not 0.0 <= self.greedy <= 1.0:
             raise ConfigError(f"greedy={self.greedy!r}: expected a share in [0, 1]")
 
