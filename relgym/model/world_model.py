@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError, SchemaError
 from relgym.laws.book import LawBook
@@ -112,7 +113,7 @@ class WorldModel:
         """The model of one target; `QueryError` when there is none."""
         return self._parts.property_model(type_name, prop)
 
-    def modes(self, type_name: str, prop: str) -> tuple[Any, ...]:
+    def modes(self, type_name: str, prop: str) -> tuple[Mode, ...]:
         """Modes of one target, by id; `QueryError` when it is none."""
         return self.property_model(type_name, prop).modes
 
