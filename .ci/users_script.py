@@ -32,7 +32,7 @@ def learn(steps: int) -> WorldModel:
     for _ in range(steps):
         _, _, terminated, truncated, info = env.step(env.action_space.sample())
         report: StepReport = info["relgym"]
-        print(reveal_type(report.wrong), report.predicted)
+        print(reveal_type(report.wrong), reveal_type(report.prediction))
         if terminated or truncated:
             env.reset()
     reveal_type(env)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from relgym.envs.arguments import checked_count
+from relgym.html import html_table
 from relgym.model.hindsight import WRONG
 from relgym.model.prediction import ScenePrediction
 from relgym.model.text import Cell, table
@@ -44,6 +45,22 @@ class StepReport:
     residuals: Mapping[Key, float] = field(compare=False)
     wrong: tuple[Key, ...] = field(compare=False)
     learned: LearnReport | None = field(compare=False)
+
+    def _repr_html_(self) -> str:
+        told = () if self.prediction is None else self.prediction.parts
+        said = {(part.object, part.property): part for part in told}
+        rows = [
+            (
+                f"{key[0]}.{key[1]}",
+                f"{said[key].value:.7g}",
+                f"{off:.2g}",
+                "wrong" if key in self.wrong else "right",
+            )
+            for key, off in self.residuals.items()
+        ]
+        return html_table(
+            "Predicted, then observed", ("target", "predicted", "observed − predicted", ""), rows
+        )
 
 
 class Prequential:

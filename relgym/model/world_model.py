@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError, SchemaError
+from relgym.html import html_text
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
@@ -83,6 +84,9 @@ class WorldModel:
     def __repr__(self) -> str:
         parts = ", ".join(f"{t}: {len(self._parts.models[t].modes)} modes" for t in self.targets)
         return f"WorldModel({parts or 'no targets yet'}; {self.seen} transitions)"
+
+    def _repr_html_(self) -> str:
+        return html_text(repr(self), self.describe())
 
     @property
     def schema(self) -> SceneSchema:
