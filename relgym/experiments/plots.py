@@ -235,7 +235,11 @@ def _draw_key(figure: Any, models: Mapping[str, None]) -> None:
 
 def _line(k: int) -> dict[str, Any]:
     """Style of the k-th model's lines."""
-    return {"color": "black" if k == 0 else _COLOURS[k], "lw": 1.1 if k == 0 else 1.6, "ls": "-" if k == 0 else ":"}
+    return {
+        "color": "black" if k == 0 else _COLOURS[k],
+        "lw": 1.1 if k == 0 else 1.6,
+        "ls": "-" if k == 0 else ":",
+    }
 
 
 # ------------------------------------------------------------------ an episode
