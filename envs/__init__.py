@@ -9,7 +9,7 @@ if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` lo
     from relgym.envs.base import EnvState, SceneEnv
     from relgym.envs.flat import FlatSpec, Flattener
     from relgym.envs.learned_model import LearnedModelEnv
-    from relgym.envs.learned_model_judges import in_batches
+    from relgym.envs.learned_model_rewards import in_batches
     from relgym.envs.learned_model_starts import drawn_from
     from relgym.envs.learned_model_vector import LearnedModelVectorEnv
     from relgym.envs.rendering import render_scene
@@ -34,7 +34,7 @@ _HOMES = {
     "Task": "relgym.envs.tasks",
     "TruckPushEnv": "relgym.envs.truck_push",
     "drawn_from": "relgym.envs.learned_model_starts",
-    "in_batches": "relgym.envs.learned_model_judges",
+    "in_batches": "relgym.envs.learned_model_rewards",
     "render_scene": "relgym.envs.rendering",
 }
 """Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""

@@ -17,9 +17,9 @@ if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` lo
     )
     from relgym.wrappers.action_repeat import ActionRepeat
     from relgym.wrappers.flat import FlatView, VectorFlatView
-    from relgym.wrappers.glimpses import Glimpses
     from relgym.wrappers.model_learner import ModelLearner
     from relgym.wrappers.prequential import Prequential, StepReport
+    from relgym.wrappers.truncated_episodes import TruncatedEpisodes
     from relgym.wrappers.vector_model_learner import VectorModelLearner
     from relgym.wrappers.views import view_of
 
@@ -34,7 +34,7 @@ _HOMES = {
     "Angle": "relgym.envs.views",
     "FlatView": "relgym.wrappers.flat",
     "FunctionView": "relgym.envs.views",
-    "Glimpses": "relgym.wrappers.glimpses",
+    "TruncatedEpisodes": "relgym.wrappers.truncated_episodes",
     "ModelLearner": "relgym.wrappers.model_learner",
     "NumbersView": "relgym.envs.views",
     "Part": "relgym.envs.views",
@@ -56,7 +56,6 @@ __all__ = [
     "Angle",
     "FlatView",
     "FunctionView",
-    "Glimpses",
     "ModelLearner",
     "NumbersView",
     "Part",
@@ -66,6 +65,7 @@ __all__ = [
     "Static",
     "StepReport",
     "TableView",
+    "TruncatedEpisodes",
     "VectorFlatView",
     "VectorModelLearner",
     "View",

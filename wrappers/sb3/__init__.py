@@ -7,14 +7,12 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` loads it
-    from relgym.wrappers.sb3.apprentice import Apprentice
+    from relgym.wrappers.sb3.acceptance import ModelAcceptance
     from relgym.wrappers.sb3.callback import ModelCallback
     from relgym.wrappers.sb3.config import DynaConfig
     from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv, explore
     from relgym.wrappers.sb3.dyna import Dyna
-    from relgym.wrappers.sb3.gate import TrustGate
     from relgym.wrappers.sb3.imagination import Imagination
-    from relgym.wrappers.sb3.judges import LearnedTask
     from relgym.wrappers.sb3.permuting import PermutedReplay
     from relgym.wrappers.sb3.recorder import TransitionRecorder
     from relgym.wrappers.sb3.replay import (
@@ -23,17 +21,19 @@ if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` lo
         MixedReplayBuffer,
         replay_options,
     )
+    from relgym.wrappers.sb3.reward_models import LearnedRewardModel
     from relgym.wrappers.sb3.stock import SceneStock
+    from relgym.wrappers.sb3.trainer import ModelTrainer
     from relgym.wrappers.sb3.vec_env import VectorAsVecEnv
 
 _HOMES = {
-    "Apprentice": "relgym.wrappers.sb3.apprentice",
+    "ModelTrainer": "relgym.wrappers.sb3.trainer",
     "DreamCheckup": "relgym.wrappers.sb3.dreaming",
     "DreamVecEnv": "relgym.wrappers.sb3.dreaming",
     "Dyna": "relgym.wrappers.sb3.dyna",
     "DynaConfig": "relgym.wrappers.sb3.config",
     "Imagination": "relgym.wrappers.sb3.imagination",
-    "LearnedTask": "relgym.wrappers.sb3.judges",
+    "LearnedRewardModel": "relgym.wrappers.sb3.reward_models",
     "MixedDictReplayBuffer": "relgym.wrappers.sb3.replay",
     "MixedNStepReplayBuffer": "relgym.wrappers.sb3.replay",
     "MixedReplayBuffer": "relgym.wrappers.sb3.replay",
@@ -41,7 +41,7 @@ _HOMES = {
     "PermutedReplay": "relgym.wrappers.sb3.permuting",
     "SceneStock": "relgym.wrappers.sb3.stock",
     "TransitionRecorder": "relgym.wrappers.sb3.recorder",
-    "TrustGate": "relgym.wrappers.sb3.gate",
+    "ModelAcceptance": "relgym.wrappers.sb3.acceptance",
     "explore": "relgym.wrappers.sb3.dreaming",
     "VectorAsVecEnv": "relgym.wrappers.sb3.vec_env",
     "replay_options": "relgym.wrappers.sb3.replay",
@@ -49,21 +49,21 @@ _HOMES = {
 """Where each public name lives; loaded on first use."""
 
 __all__ = [
-    "Apprentice",
     "DreamCheckup",
     "DreamVecEnv",
     "Dyna",
     "DynaConfig",
     "Imagination",
-    "LearnedTask",
+    "LearnedRewardModel",
     "MixedDictReplayBuffer",
     "MixedNStepReplayBuffer",
     "MixedReplayBuffer",
+    "ModelAcceptance",
     "ModelCallback",
+    "ModelTrainer",
     "PermutedReplay",
     "SceneStock",
     "TransitionRecorder",
-    "TrustGate",
     "VectorAsVecEnv",
     "explore",
     "replay_options",
