@@ -77,7 +77,7 @@ def kinds_of(
 ) -> NDArray[np.intp]:
     """What happened, as places in `KINDS`, from displacements before and after, ``(n, 2)`` each, and heights, ``(n,)``.
 
-    Evaluated after the fact, to tell errors apart: what turns the ball round is a paddle, what throws it back at a wall is
+    Told after the fact, to tell errors apart: what turns the ball round is a paddle, what throws it back at a wall is
     the wall. The frame after that, serves and goals are other changes.
     """
     turned, same = before * after < 0.0, (before == after).all(axis=1)

@@ -38,7 +38,7 @@ _Columns = dict[str, NDArray[np.float64]]
 def highway(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Measure]:
     """Row 7: where cars will be, and row 8's part for it: the stream as it comes, beside other learners.
 
-    Steps that end an episode are crashes, which push the cars apart; they are evaluated apart, and in the stream with all.
+    Steps that end an episode are crashes, which push the cars apart; they are counted apart, and in the stream too.
     """
     targets = [Target(name, "x") for name in LIMITS]
     found: dict[tuple[str, float], list[float]] = {}

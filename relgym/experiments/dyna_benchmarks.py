@@ -1,8 +1,8 @@
 """Issue "Dream": what must be shown, row by row, measured against its bar.
 
-``python -m relgym.experiments.dyna_benchmarks 1 --arms relgym sac --seeds 2`` runs two arms of row 1 with two seeds each, and
-reports all that is known of the row. Results are kept in a store: what is there already isn't computed again, so that
-the whole comparison (``make dyna-full``) can be stopped and resumed. ``--page`` writes the page of results.
+``python -m relgym.experiments.dyna_benchmarks 1 --arms relgym sac --seeds 2`` runs two arms of row 1 with two seeds
+each, and reports all that is known of the row. Results are kept in a store: what is there already isn't computed again,
+so that the whole comparison (``make dyna-full``) can be stopped and resumed. ``--page`` writes the page of results.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ __all__ = ["main", "page", "shown", "wanted"]
 
 _HEAD: Final = """# What dreaming is worth
 
-`python -m relgym.experiments.dyna_benchmarks` wrote this page, but for what stands below the tables, which it leaves alone.
-Each section is a row of bars. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than five, no
-more were run (*of* in the tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250 real
-steps; *each* lists the real steps to it, the smallest first. *time* is processor time, tests included (a run has one
-thread); *learning* and *dreaming* are wall time on a machine with two cores that did other things too, and so may be
-longer. The [guide](../guides/dyna.md) says how it works."""
+`python -m relgym.experiments.dyna_benchmarks` wrote this page, but for what stands below the tables, which it leaves
+alone. Each section is a row of bars. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than
+five, no more were run (*of* in the tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250
+real steps; *each* lists the real steps to it, the smallest first. *time* is processor time, tests included (a run has
+one thread); *learning* and *dreaming* are wall time on a machine with two cores that did other things too, and so may
+be longer. The [guide](../guides/dyna.md) says how it works."""
 
 
 def wanted(row: Row, *, seeds: int, arms: Sequence[str]) -> list[Task]:

@@ -1,6 +1,7 @@
 """Issue "Chapter III whole": what must be shown, row by row, measured against its bar.
 
-``python -m relgym.experiments.thesis_benchmarks 1 2 --json bars.json`` measures rows 1 and 2 and writes the figures down as well.
+``python -m relgym.experiments.thesis_benchmarks 1 2 --json bars.json`` measures rows 1 and 2 and writes
+the figures down as well.
 """
 
 from __future__ import annotations

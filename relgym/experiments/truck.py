@@ -1,4 +1,4 @@
-"""The box pushing domain beyond Table 3.1: constants per episode, bystanders, other numbers of boxes (rows 9 and 10)."""
+"""The box pushing domain beyond Table 3.1: constants per episode, bystanders, other numbers of boxes."""
 
 from __future__ import annotations
 
