@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, cycle
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ _DOTS: Final = 90
 
 _COLOURS: Final = ("#1f4e79", "#c44e52", "#6aa879", "#8e6eb0")
 _TIME: Final = "plasma"
-_ASPECT: Final = 1.9
+_ASPECT: Final = 2.15
 """Width of a panel with a scene in it over its height."""
 
 _PIXELS: Final = 520
@@ -34,6 +35,9 @@ _PIXELS: Final = 520
 
 _SNAPSHOTS: Final = 5
 """Scenes that are drawn of what leaves the place where it began."""
+
+_Styles: TypeAlias = Mapping[str, Mapping[str, Any]]
+"""Style of lines by model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,11 +151,12 @@ def draw_trajectories(path: Path, trajectories: Sequence[Trajectory]) -> Path:
         matplotlib or pygame isn't installed.
     """
     figure = _figure(12.0, 0.7 + 3.35 * len(trajectories))
+    styles = _styles(trajectories)
     rows = figure.add_gridspec(len(trajectories), 2, width_ratios=(2, 1))
     for k, shown in enumerate(trajectories):
-        _draw_episode(figure, rows[k, 0], shown)
-        _draw_errors(figure.add_subplot(rows[k, 1]), shown)
-    _draw_key(figure, dict.fromkeys(dream.by for shown in trajectories for dream in shown.imagined))
+        _draw_episode(figure, rows[k, 0], shown, styles)
+        _draw_errors(figure.add_subplot(rows[k, 1]), shown, styles)
+    _draw_key(figure, styles)
     figure.savefig(path, dpi=_DOTS)
     return path
 
@@ -192,6 +197,7 @@ def draw_curves(path: Path, curves: Mapping[str, Sequence[Curve]]) -> Path:
         panel.set_title(title, fontsize=10)
         panel.set_xlabel("steps seen")
         panel.set_xlim(left=0)
+        panel.locator_params(axis="x", nbins=5)
         panel.xaxis.set_major_formatter("{x:,.0f}")
         panel.axhspan(-0.08, 1.0, color="0.94", zorder=0)
         panel.grid(alpha=0.3)
@@ -209,64 +215,63 @@ def _figure(width: float, height: float) -> Any:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def _draw_key(figure: Any, models: Mapping[str, None]) -> None:
+def _draw_key(figure: Any, styles: _Styles) -> None:
     """What the lines mean, once for all rows."""
     from matplotlib.lines import Line2D
 
     purple, orange = "#6a00a8", "#fca636"  # of the colours of time
     handles = [
-        (Line2D([], [], color=purple, lw=5, alpha=0.8), Line2D([], [], color=orange, lw=5, alpha=0.8)),
-        *(Line2D([], [], **_line(k)) for k in range(len(models))),
+        (Line2D([], [], color=purple, lw=5), Line2D([], [], color=orange, lw=5)),
+        *(Line2D([], [], **style) for style in styles.values()),
     ]
     from matplotlib.legend_handler import HandlerTuple
 
-    names = ["what really happened", *(f"imagined from the first scene alone: {name}" for name in models)]
+    names = ["what really happened", *(f"imagined from the first scene alone, {name}" for name in styles)]
     figure.legend(
         handles,
         names,
         loc="outside upper center",
         ncols=len(names),
         frameon=False,
-        fontsize=10,
+        fontsize=9,
         handler_map={tuple: HandlerTuple(ndivide=None, pad=0.0)},
         handlelength=3.0,
     )
 
 
-def _line(k: int) -> dict[str, Any]:
-    """Style of the k-th model's lines."""
-    return {
-        "color": "black" if k == 0 else _COLOURS[k],
-        "lw": 1.1 if k == 0 else 1.6,
-        "ls": "-" if k == 0 else ":",
-    }
+def _styles(trajectories: Sequence[Trajectory]) -> _Styles:
+    """Style of each model's lines."""
+    models = dict.fromkeys(dream.by for shown in trajectories for dream in shown.imagined)
+    first = {"color": "black", "lw": 1.1, "ls": "-"}
+    others = ({"color": colour, "lw": 1.6, "ls": ":"} for colour in cycle(_COLOURS[1:]))
+    return dict(zip(models, chain([first], others), strict=False))
 
 
 # ------------------------------------------------------------------ an episode
-def _draw_episode(figure: Any, slot: Any, shown: Trajectory) -> None:
+def _draw_episode(figure: Any, slot: Any, shown: Trajectory, styles: _Styles) -> None:
     whole = _with(scene_view(shown.scene), shown.marks)
     paths = [shown.path(shown.real)]
     low, high = paths[0].min(axis=0), paths[0].max(axis=0)
     if whole.left <= low[0] and high[0] <= whole.left + whole.width:
         panel = figure.add_subplot(slot)
-        _draw_in_scene(panel, shown, _around(shown, whole))
+        _draw_in_scene(panel, shown, _around(shown, whole), styles)
     else:
         strip = slot.subgridspec(2, _SNAPSHOTS, height_ratios=(5, 4))
         _draw_snapshots([figure.add_subplot(strip[0, k]) for k in range(_SNAPSHOTS)], shown)
         panel = figure.add_subplot(strip[1, :])
-        _draw_in_time(panel, shown)
+        _draw_in_time(panel, shown, styles)
     bar = figure.colorbar(_time(len(shown.real) - 1), ax=panel, pad=0.01, aspect=18)
     bar.set_label("step", fontsize=9)
 
 
-def _draw_in_scene(panel: Any, shown: Trajectory, view: View) -> None:
+def _draw_in_scene(panel: Any, shown: Trajectory, view: View, styles: _Styles) -> None:
     """The first scene, the last one shining through, and over them the paths."""
     size = (max(1, round(_PIXELS * view.width / view.height)), _PIXELS)
     first, last = (
         render_scene(shown.scene_at(shown.real, k), size=size, view=view, marks=shown.marks) for k in (0, -1)
     )
     moved = (first != last).any(axis=2, keepdims=True)
-    picture = np.where(moved, 0.45 * first + 0.55 * last, first).astype(np.uint8)
+    picture = np.where(moved, 0.7 * first + 0.3 * last, first).astype(np.uint8)
     right, top = view.left + view.width, view.bottom + view.height
     panel.imshow(picture, extent=(view.left, right, view.bottom, top), interpolation="bilinear")
     real = shown.path(shown.real)
@@ -276,7 +281,7 @@ def _draw_in_scene(panel: Any, shown: Trajectory, view: View) -> None:
         error = shown.error(dream)
         astray = np.flatnonzero(error > STRAY)
         start = 0 if k == 0 else max(0, int(astray[0]) - 1) if len(astray) else len(error)
-        panel.plot(*shown.path(dream.vectors)[start : dream.predicted + 1].T, zorder=4, **_line(k))
+        panel.plot(*shown.path(dream.vectors)[start : dream.predicted + 1].T, zorder=4, **styles[dream.by])
     panel.plot(*real[0], "o", ms=9, mfc="white", mec="black", mew=1.6, zorder=6)
     _say(panel, real[0], "start", view)
     for step, word in shown.events:
@@ -291,7 +296,7 @@ def _draw_real(panel: Any, real: Float2D) -> None:
     from matplotlib.collections import LineCollection
 
     pieces = np.stack([real[:-1], real[1:]], axis=1)
-    line = LineCollection(list(pieces), cmap=_TIME, linewidths=5, alpha=0.8, capstyle="round", zorder=3)
+    line = LineCollection(list(pieces), cmap=_TIME, linewidths=5, capstyle="round", zorder=3)
     line.set_array(np.arange(len(pieces)))
     panel.add_collection(line)
 
@@ -332,15 +337,15 @@ def _draw_snapshots(panels: Sequence[Any], shown: Trajectory) -> None:
     panels[len(panels) // 2].set_title(shown.title, fontsize=10)
 
 
-def _draw_in_time(panel: Any, shown: Trajectory) -> None:
+def _draw_in_time(panel: Any, shown: Trajectory, styles: _Styles) -> None:
     """Position by step, for what leaves the place where it began."""
 
     def over_time(vectors: Float2D) -> Float2D:
         return np.column_stack([np.arange(len(vectors)), shown.path(vectors)[:, 0]])
 
     _draw_real(panel, over_time(shown.real))
-    for k, dream in reversed(list(enumerate(shown.imagined))):
-        panel.plot(*over_time(dream.vectors)[: dream.predicted + 1].T, zorder=4, **_line(k))
+    for dream in shown.imagined[::-1]:
+        panel.plot(*over_time(dream.vectors)[: dream.predicted + 1].T, zorder=4, **styles[dream.by])
     panel.plot(*over_time(shown.real)[0], "o", ms=9, mfc="white", mec="black", mew=1.6, zorder=6)
     panel.set(xlabel="step", ylabel=f"{shown.mover}.px")
     panel.autoscale_view()
@@ -348,14 +353,19 @@ def _draw_in_time(panel: Any, shown: Trajectory) -> None:
     panel.grid(alpha=0.3)
 
 
-def _draw_errors(panel: Any, shown: Trajectory) -> None:
-    for k, dream in reversed(list(enumerate(shown.imagined))):
+def _draw_errors(panel: Any, shown: Trajectory, styles: _Styles) -> None:
+    for dream in shown.imagined[::-1]:
         error = shown.error(dream)
         stop = "" if dream.predicted == len(shown.real) - 1 else f", stops after {dream.predicted}"
         label = f"{dream.by}: at most {error.max():.0e}{stop}"
-        panel.semilogy(np.arange(len(error)), np.maximum(error, 1e-17), label=label, **_line(k) | {"ls": "-"})
+        panel.semilogy(
+            np.arange(len(error)),
+            np.maximum(error, 1e-17),
+            label=label,
+            **(dict(styles[dream.by]) | {"ls": "-"}),
+        )
     panel.axhline(STRAY, color="0.5", lw=0.8, ls="--")
-    panel.set_ylim(1e-17, 1e3)
+    panel.set_ylim(1e-17, 1e6)  # with room for the legend
     panel.set_yticks([1e-16, 1e-12, 1e-8, 1e-4, 1e0])
     panel.set_title("distance between real and imagined (log scale)", fontsize=10)
     panel.set_xlabel("step")
@@ -384,8 +394,18 @@ def _around(shown: Trajectory, whole: View) -> View:
     low, high = low - pad, high + pad
     height = max(float(high[1] - low[1]), float(high[0] - low[0]) / _ASPECT)
     width = height * _ASPECT
-    middle = (low + high) / 2.0
-    return View(float(middle[0]) - width / 2, float(middle[1]) - height / 2, width, height)
+    left, bottom = (low + high - [width, height]) / 2.0
+    # Nothing is beyond the whole: where the part would reach over an edge, it is moved inside.
+    left = _within(float(left), width, whole.left, whole.width)
+    bottom = _within(float(bottom), height, whole.bottom, whole.height)
+    return View(left, bottom, width, height)
+
+
+def _within(start: float, length: float, first: float, whole: float) -> float:
+    """Where a stretch begins if it is to lie within another; centred on it if it is longer."""
+    if length >= whole:
+        return first + (whole - length) / 2.0
+    return min(max(start, first), first + whole - length)
 
 
 def _with(view: View, marks: Sequence[Region]) -> View:
