@@ -13,7 +13,7 @@ from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers.background import Background
-from relgym.wrappers.prequential import Prequential, StepReport, compared
+from relgym.wrappers.prequential import Outcomes, Prequential, StepReport, compared
 
 __all__ = ["NOTHING", "Study"]
 
@@ -107,7 +107,8 @@ class Study:
             return NOTHING
         residuals, wrong = compared(prediction, transition.after, self._precision)
         if prediction is not None:
-            self.prequential.count(residuals, wrong)
+            outcomes = Outcomes.of(prediction, transition.before, residuals)
+            self.prequential.count(residuals, wrong, outcomes)
             if self._learn:
                 self.model.look_back(prediction, residuals, self._precision)
         learned = self.model.learn_one(transition) if self._learn else None
