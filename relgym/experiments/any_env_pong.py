@@ -1,4 +1,4 @@
-"""Pong through its list of objects, as bars: what the ball does in the air, at walls and at paddles.
+"""Pong through its list of objects, as a benchmark: what the ball does in the air, at walls and at paddles.
 
 Predicted are the ball's displacements per frame, whole pixels: exact or wrong.
 """
@@ -40,7 +40,7 @@ _TARGETS: Final = (Target("ball", "dx"), Target("ball", "dy"))
 
 
 def pong(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Measure]:
-    """Row 6, learned from one recording and tested on another, and row 8's part for it.
+    """Learned from one recording and tested on another; and the stream as it comes.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def kinds_of(
 
 
 def _shares(columns: dict[str, NDArray[np.float64]], *, verbose: bool) -> Iterator[tuple[str, float, float]]:
-    """Figures with their bars, which they must reach."""
+    """Figures with the limits that they must reach."""
     before = columns["now"]
     after, said = before + columns["change"], before + columns["said"]
     exact, kinds = np.abs(said - after) < 0.5, kinds_of(before, after, columns["seen"][:, HEIGHT])
