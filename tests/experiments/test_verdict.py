@@ -55,8 +55,9 @@ def test_agrees_with_single_predictions(model: WorldModel, episodes: list[Episod
 
 def test_what_is_off_is_wrong_and_where_is_told(model: WorldModel, episodes: list[Episode]) -> None:
     episode = episodes[0]
-    vectors, at = episode.vectors.copy(), 50
-    vectors[at + 1 :, episode.layout.column(episode.layout.index("ball"), "vx")] += 1e-8
+    vectors, at = episode.vectors.copy(), len(episode) - 1
+    for prop in ("vx", "px"):
+        vectors[-1, episode.layout.column(episode.layout.index("ball"), prop)] += 1e-8
     corner = np.zeros(len(episode), dtype=bool)
     corner[at] = True
     changed = replace(episode, vectors=vectors, truth=replace(episode.truth, corner=corner))
