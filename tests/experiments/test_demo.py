@@ -61,6 +61,7 @@ def test_the_first_episode_is_the_hardest() -> None:
         assert curve[0].wrong[target] > curve[-1].wrong[target]
 
 
+@pytest.mark.slow
 def test_two_processes_tell_what_one_does(tmp_path: Path) -> None:
     shown = [replace(each, episodes=2, training=partial(_first, each.training)) for each in SHOWN[::2]]
     shown = [replace(each, testing=partial(_first, each.testing)) for each in shown]
@@ -78,7 +79,8 @@ def test_two_processes_tell_what_one_does(tmp_path: Path) -> None:
         for jobs in (1, 2)
     }
     for (one, dreams), (other, same) in zip(found[1], found[2], strict=True):
-        assert replace(one, seconds=0.0) == replace(other, seconds=0.0)
+        # As text, for NaN is not even equal to itself.
+        assert repr(replace(one, seconds=0.0)) == repr(replace(other, seconds=0.0))
         assert [d.predicted for d in dreams] == [d.predicted for d in same]
         for a, b in zip(dreams, same, strict=True):
             np.testing.assert_array_equal(a.vectors, b.vectors)
