@@ -12,7 +12,7 @@ __all__ = ["check_keys"]
 
 
 def check_keys(space: spaces.Space[Any]) -> None:
-    """Refuse a Dict with a dot in a key now; PyTorch would when a policy is made, and not say which key.
+    """Refuse a Dict with a dot in a key now; PyTorch would when a policy is made, and not say what to do.
 
     Raises
     ------

@@ -94,7 +94,7 @@ def test_errors_reach_tensorboard(tmp_path: Any) -> None:
 
     agent = algorithm("PPO", vec_env())
     agent.set_logger(configure(str(tmp_path), ["tensorboard"]))
-    agent.learn(96, callback=callback(view=view_of_slider))
+    agent.learn(96, callback=callback(view=view_of_slider, log_every=1))
     agent.logger.close()
     told = EventAccumulator(str(tmp_path)).Reload()
     assert {"relgym/nrmse", "relgym/calibration", "relgym/coverage", "relgym/wrong"} <= set(

@@ -345,7 +345,6 @@ def test_the_log_tells(tmp_path: Any) -> None:
     for name in (
         "error",
         "nrmse",
-        "calibration",
         "coverage",
         "accepted",
         "imagined",

@@ -52,5 +52,5 @@ def test_the_remedy_works() -> None:
         env, lambda seen: {new: seen[old] for new, old in names.items()}, space
     )
     PPO("MultiInputPolicy", TransitionRecorder(renamed), n_steps=8, batch_size=8, device="cpu").learn(8)
-    with pytest.raises(KeyError, match=r"can't contain"):  # what PyTorch says of the other
+    with pytest.raises(KeyError, match="contain"):  # what PyTorch says of the other
         PPO("MultiInputPolicy", env, device="cpu")
