@@ -36,6 +36,9 @@ _PIXELS: Final = 520
 _SNAPSHOTS: Final = 5
 """Scenes that are drawn of what leaves the place where it began."""
 
+_FAR: Final = 5.0
+"""One picture shows a whole episode that needs a view at most so many times as wide as its first scene's."""
+
 _Styles: TypeAlias = Mapping[str, Mapping[str, Any]]
 """Style of lines by model."""
 
@@ -249,10 +252,8 @@ def _styles(trajectories: Sequence[Trajectory]) -> _Styles:
 
 # ------------------------------------------------------------------ an episode
 def _draw_episode(figure: Any, slot: Any, shown: Trajectory, styles: _Styles) -> None:
-    whole = _with(scene_view(shown.scene), shown.marks)
-    paths = [shown.path(shown.real)]
-    low, high = paths[0].min(axis=0), paths[0].max(axis=0)
-    if whole.left <= low[0] and high[0] <= whole.left + whole.width:
+    first, whole = scene_view(shown.scene), _whole(shown)
+    if whole.width <= _FAR * first.width:
         panel = figure.add_subplot(slot)
         _draw_in_scene(panel, shown, _around(shown, whole), styles)
     else:
@@ -382,14 +383,27 @@ def _time(steps: int) -> Any:
 
 
 # ------------------------------------------------------------------ what to show
+def _whole(shown: Trajectory) -> View:
+    """A view that shows the first and the last scene, all marks, and the way between."""
+    views = [
+        scene_view(shown.scene),
+        scene_view(shown.scene_at(shown.real, -1)),
+        _box(shown.path(shown.real)),
+    ]
+    return _union([*views, *shown.marks])
+
+
 def _around(shown: Trajectory, whole: View) -> View:
-    """The part of the scene in which things happen: all paths with room around them, never more than the whole."""
+    """The part of the whole in which things happen: all paths, marks and whatever moved, with room around them."""
     paths = [shown.path(shown.real), *(shown.path(d.vectors)[: d.predicted + 1] for d in shown.imagined)]
-    points = np.concatenate(paths)
-    low, high = points.min(axis=0), points.max(axis=0)
-    for mark in shown.marks:
-        low = np.minimum(low, [mark.left, mark.bottom])
-        high = np.maximum(high, [mark.left + mark.width, mark.bottom + mark.height])
+    first, last = (shown.scene_at(shown.real, k) for k in (0, -1))
+    moved = [o.name for o in first if o.name in last and (o.values != last[o.name].values).any()]
+    bodies = [scene_view(scene, moved, margin=0.0) for scene in (first, last)]
+    part = _union([_box(np.concatenate(paths)), *bodies, *shown.marks])
+    low, high = (
+        np.array([part.left, part.bottom]),
+        np.array([part.left + part.width, part.bottom + part.height]),
+    )
     pad = 0.1 * max(whole.width, whole.height)
     low, high = low - pad, high + pad
     height = max(float(high[1] - low[1]), float(high[0] - low[0]) / _ASPECT)
@@ -408,9 +422,14 @@ def _within(start: float, length: float, first: float, whole: float) -> float:
     return min(max(start, first), first + whole - length)
 
 
-def _with(view: View, marks: Sequence[Region]) -> View:
-    """A view that shows these regions too."""
-    parts: list[View | Region] = [view, *marks]
+def _box(points: Float2D) -> View:
+    """The smallest view of some points."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return View(float(low[0]), float(low[1]), float(high[0] - low[0]), float(high[1] - low[1]))
+
+
+def _union(parts: Sequence[View | Region]) -> View:
+    """The smallest view that shows all of these."""
     left, bottom = min(p.left for p in parts), min(p.bottom for p in parts)
     right, top = max(p.left + p.width for p in parts), max(p.bottom + p.height for p in parts)
     return View(left, bottom, right - left, top - bottom)
