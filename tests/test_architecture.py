@@ -34,6 +34,7 @@ MAY_IMPORT = {
     "envs": CORE,
     "wrappers": CORE | {"envs"},
     "data": CORE | {"envs", "wrappers"},
+    "planning": CORE | {"envs", "wrappers"},
     "experiments": CORE | {"baselines", "data", "envs", "wrappers"},
     "console": CORE | {"data", "envs", "wrappers", "experiments"},
     "cli": CORE | {"baselines", "data", "envs", "wrappers", "experiments", "console"},
