@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from relgym.html import html_text
 from relgym.laws.text import LEGEND, LawRow
 from relgym.model.advice import Advice
 from relgym.model.text import Cell, amount, indented, table, wrapped
@@ -46,7 +47,7 @@ class ClauseRow:
     Attributes
     ----------
     clause
-        The clause; ``otherwise`` for the examples that no clause covers (the thesis' row "Negative").
+        The clause; ``else`` for the examples that no clause covers (the thesis' row "Negative").
     correct, incorrect
         Training examples that were decided here, rightly and wrongly: those that just one of the two modes
         explains, whichever mode they belong to. Estimates, where only a sample of them is remembered.
@@ -69,7 +70,7 @@ class PairTable:
     mode
         The mode that the clauses speak for.
     other
-        The mode that holds otherwise.
+        The mode that holds if no clause does.
     rows
         Clauses in the order in which they are tried.
     """
@@ -187,6 +188,9 @@ class ModelReport:
         parts += [f"{'─' * 80}\n{target}" for target in self.targets]
         legend = _legend(self.targets)
         return "\n\n".join([*parts, f"{'─' * 80}\n{legend}"] if legend else parts)
+
+    def _repr_html_(self) -> str:
+        return html_text(f"Learned from {amount(self.transitions, 'transition')}", str(self))
 
 
 def _mode_table(target: TargetReport) -> str:
