@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -52,7 +53,7 @@ def test_the_ball_in_text(ball: WorldModel) -> None:
 def test_the_truck_in_text() -> None:
     model = learned(truck_episodes(seed=0))
     assert agreed(model, scenes(truck_episodes(seed=1, test=True))) >= 0.999
-    assert "box_a, box_b, box_c := any box" in model.describe()
+    assert re.search(r"box_., box_., box_. := any box", model.describe())
     assert "Scenes held truck × 1, box × 3; other numbers of objects were never seen." in model.describe()
 
 
