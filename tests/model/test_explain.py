@@ -83,7 +83,8 @@ def test_a_law_says_which_piece_holds() -> None:
     scenes = scenes_of(list(ball_episodes(1, seed=2, episodes=8)), 300)
     for each in resting(model, scenes):
         assert "rests: v'_n = max(u_n, -0.9 v_n) = 0" in str(each)
-        assert "bounces" not in str(each)
+        # It may well bounce off a wall at the same time.
+        assert not any("bounces" in line and "n = (0, 1)" in line for line in str(each).split("\n"))
     said = [str(e) for s in scenes for e in explanations(model, s)]
     assert any("bounces: v'_n" in text for text in said)
 
