@@ -13,10 +13,12 @@ NEEDS = {"docs/guides/dyna.md": pytest.mark.sb3}
 SMALLER = {
     "docs/guides/dyna.md": {
         "agent.learn(1_000, callback=Dyna(model, DynaConfig(updates=40, catch_up=10_000))": (
-            "agent.learn(120, callback=Dyna(model, DynaConfig(updates=2, catch_up=100))"
+            "agent.learn(40, callback=Dyna(model, DynaConfig(updates=2, catch_up=20))"
         ),
         "agent.learn(1_000": "agent.learn(30",
-        "agent.learn(200_000": "agent.learn(6_000",
+        "steps=1_000, seed=0": "steps=450, seed=0",
+        "num_envs=64": "num_envs=4",
+        "agent.learn(200_000": "agent.learn(256",
     }
 }
 """What is made smaller in tests, of pages that show no output."""
