@@ -67,7 +67,7 @@ lint: $(DEV)     ## ruff: rules and format
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
-format: $(DEV)   ## let ruff mend what it can
+format: $(DEV)   ## let ruff fix what it can
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
