@@ -65,7 +65,7 @@ def test_a_renewed_text_leaves_out_what_the_old_one_did() -> None:
     assert pages.renewed("…\nend\n", printed) == "…\nend\n"
 
 
-def test_blocks_that_are_run(tmp_path: Path) -> None:
+def test_what_is_run(tmp_path: Path) -> None:
     page = "```python\nprint(1)\n```\nso\n```text\n1\n```\n<!-- not run: hours -->\n```sh\nrelgym dyna\n```\n"
     page += "```toml\n```\n"
     (only,) = pages.snippets(page)
@@ -74,7 +74,15 @@ def test_blocks_that_are_run(tmp_path: Path) -> None:
     assert pages.run(only, {}, tmp_path) == "1\n"
 
 
+def test_commands_with_their_output(tmp_path: Path) -> None:
+    page = "```console\n$ relgym envs\n…\n$ relgym learn CartPol-v1 --out a\nrelgym: there is no\n```\n"
+    first, second = pages.snippets(page)
+    assert (first.code, first.shown) == ("relgym envs", "…\n")
+    assert page[slice(*second.span)] == second.shown == "relgym: there is no\n"
+    assert "CartPole-v1" in pages.run(second, {}, tmp_path)
+
+
 @pytest.mark.parametrize("line", ["make tea", "pip install 'relgym[tea]'", "brew tea"])
 def test_commands_that_nobody_can_run(line: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="tea"):
-        pages.run(pages.Snippet("commands", f"{line}\n", None, (0, 0), 1), {}, tmp_path)
+        pages.run(pages.Snippet("sh", f"{line}\n", None, (0, 0), 1), {}, tmp_path)
