@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
+import gymnasium as gym
 import pages
 import pytest
+from PIL import Image
+
+import relgym  # noqa: F401  (registers the envs)
 
 NEEDS = {"docs/guides/dyna.md": pytest.mark.sb3}
 """Pages whose code needs an extra."""
@@ -86,3 +92,33 @@ def test_commands_with_their_output(tmp_path: Path) -> None:
 def test_commands_that_nobody_can_run(line: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="tea"):
         pages.run(pages.Snippet("sh", f"{line}\n", None, (0, 0), 1), {}, tmp_path)
+
+
+def test_every_env_has_a_picture_that_moves() -> None:
+    folder = pages.ROOT / "docs" / "envs"
+    shown = {path.stem for path in folder.glob("*.md")} - {"index"}
+    assert shown == {path.stem for path in folder.glob("*.webp")} == set(animations().ANIMATIONS)
+    assert len(shown) == sum(name.startswith("relgym/") for name in gym.registry)
+    for name in shown:
+        path = folder / f"{name}.webp"
+        assert f"({path.name})" in (folder / f"{name}.md").read_text(encoding="utf-8")
+        assert path.stat().st_size < 300_000
+        with Image.open(path) as picture:
+            assert getattr(picture, "n_frames", 1) > 20
+
+
+def test_pictures_are_drawn_by_the_script(tmp_path: Path) -> None:
+    """One of them: what it writes moves as the committed one does."""
+    with (
+        Image.open(animations().write("truck-push", tmp_path)) as drawn,
+        Image.open(pages.ROOT / "docs" / "envs" / "truck-push.webp") as kept,
+    ):
+        assert (drawn.size, drawn.n_frames) == (kept.size, kept.n_frames)  # type: ignore[attr-defined]
+
+
+def animations() -> ModuleType:
+    spec = spec_from_file_location("animations", pages.ROOT / "docs" / "tools" / "animations.py")
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
