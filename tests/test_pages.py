@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -97,7 +98,7 @@ def test_commands_that_nobody_can_run(line: str, tmp_path: Path) -> None:
 def test_every_env_has_a_picture_that_moves() -> None:
     folder = pages.ROOT / "docs" / "envs"
     shown = {path.stem for path in folder.glob("*.md")} - {"index"}
-    assert shown == {path.stem for path in folder.glob("*.webp")} == set(animations().ANIMATIONS)
+    assert shown == {path.stem for path in folder.glob("*.webp")} == set(tool("animations").ANIMATIONS)
     assert len(shown) == sum(name.startswith("relgym/") for name in gym.registry)
     for name in shown:
         path = folder / f"{name}.webp"
@@ -110,15 +111,34 @@ def test_every_env_has_a_picture_that_moves() -> None:
 def test_pictures_are_drawn_by_the_script(tmp_path: Path) -> None:
     """One of them: what it writes moves as the committed one does."""
     with (
-        Image.open(animations().write("truck-push", tmp_path)) as drawn,
+        Image.open(tool("animations").write("truck-push", tmp_path)) as drawn,
         Image.open(pages.ROOT / "docs" / "envs" / "truck-push.webp") as kept,
     ):
         assert (drawn.size, drawn.n_frames) == (kept.size, kept.n_frames)  # type: ignore[attr-defined]
 
 
-def animations() -> ModuleType:
-    spec = spec_from_file_location("animations", pages.ROOT / "docs" / "tools" / "animations.py")
+def test_what_is_wrong_with_a_site(tmp_path: Path) -> None:
+    good = '<h1 id="relgym.A">A</h1> <a href="b.html#x">b</a> <a href="https://gymnasium.farama.org">g</a>'
+    (tmp_path / "a.html").write_text(good, encoding="utf-8")
+    (tmp_path / "b.html").write_text('<p id="x"><a href="a.html">a</a></p>', encoding="utf-8")
+    check = tool("check_site").faults
+    assert check(tmp_path, {"relgym.A"}) == []
+    assert check(tmp_path, {"relgym.B"}) == ["the reference lacks relgym.B"]
+    for page, fault in {
+        '<a href="c.html">c</a>': "c.html leads nowhere",
+        '<a href="a.html#y">a</a>': "a.html#y: the page has no such place",
+        '<script src="https://example.org/a.js"></script>': "loads https://example.org/a.js from elsewhere",
+        "<p>==== ====</p>": "reStructuredText was left as it is",
+    }.items():
+        (tmp_path / "b.html").write_text(f'<p id="x">{page}</p>', encoding="utf-8")
+        assert check(tmp_path, {"relgym.A"}) == [f"b.html: {fault}"]
+
+
+def tool(name: str) -> ModuleType:
+    """A script of docs/tools."""
+    spec = spec_from_file_location(name, pages.ROOT / "docs" / "tools" / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look there
     spec.loader.exec_module(module)
     return module
