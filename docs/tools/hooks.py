@@ -16,15 +16,13 @@ FROM_ROOT = {"changelog.md": "CHANGELOG.md", "contributing.md": "CONTRIBUTING.md
 """Pages of the site that are files of the repository's root."""
 
 
-def on_config(config: Any) -> Any:
-    """Lay the package out for mkdocstrings, which reads sources and knows nothing of `package-dir`."""
-    # Copies: griffe follows links, and would look for envs/ where they lead.
+def on_startup(**_: Any) -> None:
+    """Lay the package out, before mkdocstrings looks for it: that reads sources and knows nothing of `package-dir`."""
     leave = shutil.ignore_patterns("__pycache__")
     shutil.rmtree(LAYOUT, ignore_errors=True)
     shutil.copytree(ROOT / "relgym", LAYOUT, ignore=leave)
     for name in ("envs", "wrappers"):
         shutil.copytree(ROOT / name, LAYOUT / name, ignore=leave)
-    return config
 
 
 def on_files(files: Files, config: Any) -> Files:
