@@ -347,17 +347,17 @@ def _demonstrate(shown: Demonstration, out: Path, seed: int) -> tuple[DemoOutcom
 
 
 def _show_lessons(learned: Callable[..., Iterator[Round]], lesson: Lesson, as_json: bool) -> None:
-    """Learn under a progress bar; say what came of each round, and what to do next."""
+    """Learn under a progress progress; say what came of each round, and what to do next."""
     from relgym.console.next_steps import next_steps
 
     rounds: list[Round] = []
-    with _progress(TimeRemainingColumn(), TextColumn("{task.fields[wrong]}")) as bar:
-        task = bar.add_task("learning", total=lesson.steps, wrong="")
+    with _progress(TimeRemainingColumn(), TextColumn("{task.fields[wrong]}")) as progress:
+        task = progress.add_task("learning", total=lesson.steps, wrong="")
 
         def tick(done: int, wrong: float) -> None:
-            if done < bar.tasks[0].completed:  # another round
-                bar.reset(task, total=lesson.steps, wrong="")
-            bar.update(task, completed=done, wrong=f"wrong lately: {wrong:.1%}")
+            if done < progress.tasks[0].completed:  # another round
+                progress.reset(task, total=lesson.steps, wrong="")
+            progress.update(task, completed=done, wrong=f"wrong lately: {wrong:.1%}")
 
         for number, found in enumerate(learned(lesson, tick), start=1):
             rounds.append(found)
