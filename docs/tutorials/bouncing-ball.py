@@ -86,7 +86,7 @@ apart = [np.abs(np.subtract(seen, thought)).max() for _, seen, thought in episod
 print(f"{len(apart)} episodes: real and imagined balls are never more than {max(apart):.1e} apart")
 
 # %%
-fig, axes = plt.subplots(1, 3, figsize=(9, 2.8))
+fig, axes = plt.subplots(1, 3, figsize=(9, 1.9))
 for ax, (first, seen, imagined) in zip(axes, episodes, strict=False):
     for name, colour in (("box", "steelblue"), ("ramp", "seagreen"), ("floor", "0.8")):
         x, y, w, h = (first[name][prop] for prop in ("px", "py", "sx", "sy"))
