@@ -181,7 +181,7 @@ def rules(
 @app.command()
 def explain(
     model: ModelFile,
-    step: Annotated[int, typer.Option(help="Which scene of the episode.", min=0)] = 0,
+    step: Annotated[int, typer.Option(help="Random steps to take before.", min=0)] = 0,
     env_id: OtherEnv = None,
     arg: Arguments = None,
     view: ViewOption = None,
@@ -347,7 +347,7 @@ def _demonstrate(shown: Demonstration, out: Path, seed: int) -> tuple[DemoOutcom
 
 
 def _show_lessons(learned: Callable[..., Iterator[Round]], lesson: Lesson, as_json: bool) -> None:
-    """Learn under a progress progress; say what came of each round, and what to do next."""
+    """Learn under a progress bar; say what came of each round, and what to do next."""
     from relgym.console.next_steps import next_steps
 
     rounds: list[Round] = []

@@ -9,10 +9,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 FACADES = {
     "relgym.config": "relgym/config/__init__.py",
+    "relgym.data": "relgym/data/__init__.py",
     "relgym.envs": "envs/__init__.py",
     "relgym.envs.views": "envs/views/__init__.py",
     "relgym.errors": "relgym/errors.py",
     "relgym.logic": "relgym/logic/__init__.py",
+    "relgym.planning": "relgym/planning/__init__.py",
     "relgym.scene": "relgym/scene/__init__.py",
     "relgym.wrappers": "wrappers/__init__.py",
     "relgym.wrappers.sb3": "wrappers/sb3/__init__.py",

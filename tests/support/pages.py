@@ -83,6 +83,7 @@ def run(snippet: Snippet, names: dict[str, object], folder: Path) -> str:
         return _command(snippet.code, folder, ends=(0, 2), stderr=subprocess.STDOUT)
     if snippet.kind == "sh":
         return "".join(_command(line, folder) for line in _lines(snippet.code))
+    os.environ["MINARI_DATASETS_PATH"] = str(folder / "minari")  # not among the reader\'s own data sets
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         # Lines of the page, for tracebacks.
