@@ -10,8 +10,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError, SchemaError
+from relgym.html import html_text
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
@@ -84,6 +86,9 @@ class WorldModel:
         parts = ", ".join(f"{t}: {len(self._parts.models[t].modes)} modes" for t in self.targets)
         return f"WorldModel({parts or 'no targets yet'}; {self.seen} transitions)"
 
+    def _repr_html_(self) -> str:
+        return html_text(repr(self), self.describe())
+
     @property
     def schema(self) -> SceneSchema:
         """The scenes' schema."""
@@ -113,7 +118,7 @@ class WorldModel:
         """The model of one target; `QueryError` when there is none."""
         return self._parts.property_model(type_name, prop)
 
-    def modes(self, type_name: str, prop: str) -> tuple[Any, ...]:
+    def modes(self, type_name: str, prop: str) -> tuple[Mode, ...]:
         """Modes of one target, by id; `QueryError` when it is none."""
         return self.property_model(type_name, prop).modes
 
