@@ -176,13 +176,30 @@ def learn(
 def rules(
     model: ModelFile,
     digits: Annotated[int, typer.Option(help="Significant digits of coefficients.", min=1, max=17)] = 7,
+    details: Annotated[bool, typer.Option(help="Tables of modes, clauses of each pair, and roles.")] = False,
+    check: Annotated[bool, typer.Option(help="Measure on fresh steps how well the text agrees.")] = False,
+    steps: Annotated[int, typer.Option(help="So many steps for --check.", min=1)] = 2000,
+    env_id: OtherEnv = None,
+    arg: Arguments = None,
+    view: ViewOption = None,
+    seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
-    """Print a model: modes, functions, clauses, roles."""
-    from relgym.console.models import loaded
+    """Print a model as rules: if, elif, else."""
+    from relgym.console.models import loaded, opened
+    from relgym.wrappers.follower import scenes_of
 
-    known = loaded(model)
-    _echo_json(_report(known, digits)) if as_json else typer.echo(known.describe(digits=digits))
+    if as_json:
+        _echo_json(_report(loaded(model), digits))
+        return
+    if not check:
+        typer.echo(loaded(model).describe(details=details, digits=digits))
+        return
+    with _working("checking"):
+        found = opened(model, env_id, pairs("--arg", arg), view)
+        fresh = scenes_of(found.env, found.view, steps, seed=seed)
+        text = found.model.describe(details=details, digits=digits, check=fresh)
+    typer.echo(text)
 
 
 @app.command()

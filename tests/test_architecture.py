@@ -19,7 +19,7 @@ from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 FOUNDATION = frozenset({"errors", "config", "html"})
 ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ENGINES | {"clustering", "classification", "laws"}
-CORE = LEARNERS | {"model"}
+CORE = LEARNERS | {"reporting", "model"}
 
 MAY_IMPORT = {
     "errors": frozenset(),
@@ -31,7 +31,8 @@ MAY_IMPORT = {
     "clustering": ENGINES,
     "classification": ENGINES,
     "laws": ENGINES | {"clustering"},
-    "model": LEARNERS,
+    "reporting": ENGINES | {"clustering", "laws"},
+    "model": LEARNERS | {"reporting"},
     "baselines": CORE,
     "envs": CORE,
     "wrappers": CORE | {"envs"},
