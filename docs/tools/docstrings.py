@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import sys
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import griffe
 
 sys.path.insert(0, str(Path(__file__).parent))
-from facades import FACADES, public_names
+from facades import public_names
 
 _RULE = re.compile(r"^ *=+(?: +=+)+ *$")
 _HEADING = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
@@ -31,14 +30,6 @@ _NAME = re.compile(r"(?<![`\[\w])`([A-Za-z_][\w.]*)`(?![`\]])")
 
 class PlainDocstrings(griffe.Extension):
     """Rewrites every docstring before it is parsed."""
-
-    def on_module_members(self, *, mod: griffe.Module, **kwargs: Any) -> None:
-        """Show griffe, which reads and doesn't run, the names that a façade loads on first use."""
-        for table in ("_HOMES", "_LAZY_NAMES"):
-            if table in mod.members and mod.path in FACADES:
-                for name, home in ast.literal_eval(str(mod.members[table].value)).items():
-                    if name not in mod.members:
-                        mod.set_member(name, griffe.Alias(name, f"{home}.{name}", parent=mod))
 
     def on_object(self, *, obj: griffe.Object, **kwargs: Any) -> None:
         """Convert headings and tables, and link names."""

@@ -30,7 +30,8 @@ def public_names() -> dict[str, str]:
     found: dict[str, str] = {}
     for facade, file in FACADES.items():
         for name in names_in((ROOT / file).read_text(encoding="utf-8")):
-            found.setdefault(name, f"{facade}.{name}")
+            if not name.startswith("__"):
+                found.setdefault(name, f"{facade}.{name}")
     return found
 
 

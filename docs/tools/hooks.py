@@ -1,28 +1,15 @@
-"""What the site is made of beside the pages in docs/: pages from the repository's root, and the package's layout."""
+"""What the site is made of beside the pages in docs/: pages from the repository's root."""
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Any
 
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[2]
-LAYOUT = ROOT / "build" / "docs" / "relgym"
-"""relgym as it is once installed, with envs/ and wrappers/ in it; mkdocstrings reads it."""
-
 FROM_ROOT = {"changelog.md": "CHANGELOG.md", "contributing.md": "CONTRIBUTING.md", "index.md": "README.md"}
 """Pages of the site that are files of the repository's root."""
-
-
-def on_startup(**_: Any) -> None:
-    """Lay the package out, before mkdocstrings looks for it: that reads sources and knows nothing of `package-dir`."""
-    leave = shutil.ignore_patterns("__pycache__")
-    shutil.rmtree(LAYOUT, ignore_errors=True)
-    shutil.copytree(ROOT / "relgym", LAYOUT, ignore=leave)
-    for name in ("envs", "wrappers"):
-        shutil.copytree(ROOT / name, LAYOUT / name, ignore=leave)
 
 
 def on_files(files: Files, config: Any) -> Files:
