@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.errors import ConfigError, ModelFileError, SchemaError
+from relgym.errors import ConfigError, ModelFileError, RelgymError
+from relgym.files.reading import FileLimits
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
@@ -356,28 +357,36 @@ class WorldModel:
         return parts_to_json(self._parts, history=history) | {"seen": self.seen}
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> WorldModel:
+    def load(cls, path: str | os.PathLike[str], *, limits: FileLimits | None = None) -> WorldModel:
         """Read a model file.
+
+        Parameters
+        ----------
+        path
+            The file.
+        limits
+            How much it may ask for before it is refused; default: those of `FileLimits`. A file is read within them,
+            whoever made it.
 
         Raises
         ------
         ModelFileError
-            Truncated, edited, foreign or of another version.
+            Truncated, edited, foreign, of another version, too large, or inconsistent.
         """
-        return cls.load_with_extra(path)[0]
+        return cls.load_with_extra(path, limits=limits)[0]
 
     @classmethod
-    def load_with_extra(cls, path: str | os.PathLike[str]) -> tuple[WorldModel, dict[str, Any]]:
-        """Read a model file and the caller's data in it."""
-        body, arrays = read_model(path)
+    def load_with_extra(
+        cls, path: str | os.PathLike[str], *, limits: FileLimits | None = None
+    ) -> tuple[WorldModel, dict[str, Any]]:
+        """Read a model file and the caller's data in it; arguments as of `load`."""
+        body, arrays = read_model(path, limits)
         try:
             parts = parts_from_json(body, arrays)
             model = cls(parts.schema, parts.config, targets=())
-            model._parts, model.seen, model.frozen = parts, int(body["seen"]), arrays is None
-            model.extra = dict(body["extra"])
+            model._parts, model.seen, model.frozen = parts, body["seen"], arrays is None
+            model.extra = body["extra"]
             restore_hindsight(parts, body.get("hindsight", {}))
             return model, model.extra
-        except (KeyError, TypeError, IndexError, ConfigError, SchemaError) as error:
-            raise ModelFileError(
-                f"{path}: a part of the model is missing or malformed ({error!r}); save it again"
-            ) from None
+        except RelgymError as error:
+            raise ModelFileError(f"{path}: {error}") from None
