@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.errors import ModelFileError
+from relgym.files.reading import check_depth
 from relgym.model.parts import Parts
 from relgym.model.storage import schema_from_json, schema_to_json, target_from_json, target_to_json
 
@@ -61,6 +63,10 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     from relgym.model.file_format import Body
 
     body = checked(data, Body, "the model")
+    try:
+        check_depth(body.extra)
+    except ValueError as error:
+        raise ModelFileError(f"extra: {error}; save the model again with other data") from None
     schema = schema_from_json(data["schema"])
     targets = [target_from_json(part["target"]) for part in data["targets"]]
     parts = Parts(schema, body.config, None if body.open else targets)

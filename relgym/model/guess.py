@@ -141,9 +141,10 @@ class Guesses:
     def from_json(cls, target: Target, data: dict[str, Any]) -> Guesses:
         """Read what `to_json` wrote."""
         found = cls()
-        if data:
-            found.best, found.beyond = (_read(target, data.get(name)) for name in ("best", "beyond"))
-            found.errors, found._due = np.array(data["errors"], dtype=np.float64), int(data["due"])
+        found.best, found.beyond = (_read(target, data.get(name)) for name in ("best", "beyond"))
+        if "errors" in data:
+            found.errors = np.array(data["errors"], dtype=np.float64)
+        found._due = data.get("due", LEAST)
         return found
 
 

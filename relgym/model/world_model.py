@@ -382,11 +382,20 @@ class WorldModel:
         """Read a model file and the caller's data in it; arguments as of `load`."""
         body, arrays = read_model(path, limits)
         try:
-            parts = parts_from_json(body, arrays)
-            model = cls(parts.schema, parts.config, targets=())
-            model._parts, model.seen, model.frozen = parts, body["seen"], arrays is None
-            model.extra = body["extra"]
-            restore_hindsight(parts, body.get("hindsight", {}))
-            return model, model.extra
-        except RelgymError as error:
+            model = cls._restored(body, arrays)
+        except ModelFileError as error:
             raise ModelFileError(f"{path}: {error}") from None
+        return model, model.extra
+
+    @classmethod
+    def _restored(cls, body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None) -> WorldModel:
+        """The model that a file's body and history stand for; `ModelFileError` unless all of it fits together."""
+        try:
+            parts = parts_from_json(body, arrays)
+            restore_hindsight(parts, body.get("hindsight", {}))
+        except RelgymError as error:
+            raise error if isinstance(error, ModelFileError) else ModelFileError(str(error)) from None
+        model = cls(parts.schema, parts.config, targets=())
+        model._parts, model.seen, model.frozen = parts, body["seen"], arrays is None
+        model.extra = body["extra"]
+        return model
