@@ -46,9 +46,10 @@ class MultiDiscreteSpace(Record, tag_field="kind", tag="multi-discrete"):
 class MultiBinarySpace(Record, tag_field="kind", tag="multi-binary"):
     """`gymnasium.spaces.MultiBinary`."""
 
-    n: Annotated[int, Meta(ge=1, le=10**6)] | Annotated[
-        list[Annotated[int, Meta(ge=1, le=10**6)]], Meta(min_length=1, max_length=8)
-    ]
+    n: (
+        Annotated[int, Meta(ge=1, le=10**6)]
+        | Annotated[list[Annotated[int, Meta(ge=1, le=10**6)]], Meta(min_length=1, max_length=8)]
+    )
 
 
 class DictSpace(Record, tag_field="kind", tag="dict"):
@@ -104,7 +105,7 @@ class StaticRecord(Record):
     shape: ShapeRecord | None
 
 
-class AngleRecord(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class AngleRecord(Struct, array_like=True, forbid_unknown_fields=True):
     """Names of two numbers that are cosine and sine of an angle, and the angle's."""
 
     cos: Name
@@ -184,11 +185,10 @@ class SpacesRecord(Record):
     action: SpaceRecord
 
 
-class EnvBody(Struct, frozen=True):
+class EnvBody(Struct):
     """What a model keeps of its env; whoever saves it may add fields of his own."""
 
     spaces: SpacesRecord
     starts: list[StartRecord]
     metadata: dict[str, Any]
     view: ViewRecord | None = None
-

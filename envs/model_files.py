@@ -64,14 +64,18 @@ class EnvRecord:
         from relgym.envs.file_format import EnvBody
         from relgym.files.records import checked
 
-        body = checked(data, EnvBody, "what the model's file says of its env")
+        body: EnvBody = checked(data, EnvBody, "what the model's file says of its env")
         fps = body.metadata.get("render_fps", 50)
         if type(fps) not in (int, float) or not 0.0 < fps < 1e6:
-            raise ModelFileError(f"render_fps: expected pictures per second, got {fps!r:.50}; save the model again")
+            raise ModelFileError(
+                f"render_fps: expected pictures per second, got {fps!r:.50}; save the model again"
+            )
         try:
             starts = tuple(_scene(schema, start.objects, start.vector) for start in body.starts)
         except ObservationError as error:
-            raise ModelFileError(f"a first scene doesn't fit the schema ({error}); save the model again") from None
+            raise ModelFileError(
+                f"a first scene doesn't fit the schema ({error}); save the model again"
+            ) from None
         seen, acted = (space_from_json(data["spaces"][name]) for name in ("observation", "action"))
         return cls(seen, acted, starts, dict(body.metadata))
 
@@ -150,5 +154,7 @@ def _difference(other: SceneSchema, schema: SceneSchema) -> str:
 def _scene(schema: SceneSchema, objects: list[str], numbers: list[float]) -> Scene:
     layout = schema.layout(objects)
     if len(numbers) != layout.width:
-        raise ObservationError(f"expected {layout.width} numbers for {list(layout.names)}, got {len(numbers)}")
+        raise ObservationError(
+            f"expected {layout.width} numbers for {list(layout.names)}, got {len(numbers)}"
+        )
     return Scene(schema, layout, np.array(numbers, dtype=np.float64))

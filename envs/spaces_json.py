@@ -96,8 +96,8 @@ def _multi_discrete(data: Mapping[str, Any]) -> spaces.MultiDiscrete:
     return spaces.MultiDiscrete(counts, start=start)
 
 
-def _box(data: Mapping[str, Any]) -> spaces.Box:
-    dtype = np.dtype(data["dtype"])
+def _box(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    dtype: Any = np.dtype(data["dtype"])
     low, high = (_numbers(data[end], float) for end in ("low", "high"))
     if low.shape != high.shape or np.isnan(low).any() or np.isnan(high).any() or (low > high).any():
         raise ValueError("expected low and high of one shape, low at most high")
@@ -106,8 +106,7 @@ def _box(data: Mapping[str, Any]) -> spaces.Box:
         if (low < limits.min).any() or (high > limits.max).any():
             raise ValueError(f"expected bounds that {dtype} can hold")
     with np.errstate(over="ignore"):  # beyond the dtype's numbers there is no bound
-        ends = [_cast(end, dtype) for end in (low, high)]
-    return spaces.Box(*ends, dtype=dtype.type)
+        return spaces.Box(_cast(low, dtype), _cast(high, dtype), dtype=dtype.type)
 
 
 def _cast(bounds: NDArray[np.float64], dtype: np.dtype[Any]) -> NDArray[Any]:

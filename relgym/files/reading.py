@@ -53,7 +53,7 @@ _HEADER: Final = re.compile(
 _DATE: Final = (1980, 1, 1, 0, 0, 0)
 
 
-class _Unreadable(Exception):
+class _UnreadableError(Exception):
     """Why a file can't be read; callers say which file, and raise their own kind of error."""
 
 
@@ -90,8 +90,8 @@ class FileLimits:
                 raise ConfigError(f"limits: {field.name} must be a whole number of at least 1, got {value!r}")
 
 
-def _too_large(what: str, size: int, most: int, field: str) -> _Unreadable:
-    return _Unreadable(
+def _too_large(what: str, size: int, most: int, field: str) -> _UnreadableError:
+    return _UnreadableError(
         f"{what}: {size:,}, and at most {most:,} are allowed; if you trust the file, load it with "
         f"limits=FileLimits({field}={size})"
     )
@@ -118,12 +118,12 @@ def read_bytes(path: str | os.PathLike[str], limits: FileLimits, *, error: type[
                 said = _too_large("bytes of the file", found.st_size, limits.file, "file")
                 raise error(f"{os.fspath(path)!r} is too large: {said}")
             return file.read(limits.file + 1)
-    except (OSError, ValueError) as problem:
-        if isinstance(problem, RelgymError):
-            raise
-        said = getattr(problem, "strerror", None) or str(problem)
+    except RelgymError:
+        raise
+    except (OSError, ValueError) as problem:  # ValueError: a null byte in the path
+        why = getattr(problem, "strerror", None) or str(problem)
         raise error(
-            f"{os.fspath(path)!r} can't be read ({said}): expected a file that relgym has written"
+            f"{os.fspath(path)!r} can't be read ({why}): expected a file that relgym has written"
         ) from problem
 
 
@@ -142,7 +142,7 @@ def parse_json(data: bytes, limits: FileLimits) -> Any:
         found = json.loads(text)
         if "\\ud" in text or "\\uD" in text:  # half a pair of surrogates is no text, and no file can hold it
             json.dumps(found, ensure_ascii=False).encode()
-    except (_Unreadable, RecursionError, ValueError) as problem:
+    except (_UnreadableError, RecursionError, ValueError) as problem:
         said = "it is nested too deep" if isinstance(problem, RecursionError) else str(problem)
         raise ValueError(said) from None
     return found
@@ -192,7 +192,15 @@ def _content(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
         raise ValueError(f"{info.filename}: {problem}") from None
 
 
-_BROKEN: Final = (zipfile.BadZipFile, EOFError, OSError, KeyError, NotImplementedError, RuntimeError, zlib.error)
+_BROKEN: Final = (
+    zipfile.BadZipFile,
+    EOFError,
+    OSError,
+    KeyError,
+    NotImplementedError,
+    RuntimeError,
+    zlib.error,
+)
 """What `zipfile` raises of archives that are damaged, encrypted, or packed in a way that it doesn't know."""
 
 
@@ -224,7 +232,9 @@ def write_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
             content = io.BytesIO()
-            np.lib.format.write_array(content, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False)
+            np.lib.format.write_array(
+                content, np.ascontiguousarray(array), version=(1, 0), allow_pickle=False
+            )
             info = zipfile.ZipInfo(f"{name}.npy", date_time=_DATE)
             archive.writestr(info, content.getbuffer(), zipfile.ZIP_DEFLATED)
     return buffer.getvalue()
@@ -286,13 +296,13 @@ def _claim(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> _Claim:
 
 def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo, claim: _Claim) -> NDArray[Any]:
     found = np.empty(claim.shape, dtype=claim.dtype)
-    room = memoryview(found.reshape(-1)).cast("B") if found.size else memoryview(b"")
+    room = found.reshape(-1).view(np.uint8)
     try:
         with archive.open(info) as stream:
             _exactly(stream, claim.start)
             for start in range(0, claim.nbytes, _CHUNK):
                 size = min(_CHUNK, claim.nbytes - start)
-                room[start : start + size] = _exactly(stream, size)
+                room[start : start + size] = np.frombuffer(_exactly(stream, size), dtype=np.uint8)
             if stream.read(1):
                 raise ValueError(f"{info.filename}: there is more in it than its header says")
     except _BROKEN as problem:

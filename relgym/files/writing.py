@@ -65,6 +65,8 @@ def write_whole(path: str | os.PathLike[str], data: bytes, *, error: type[Relgym
                 temporary.unlink(missing_ok=True)
             raise
         _sync(target.parent)
+    except RelgymError:
+        raise
     except (OSError, ValueError) as problem:  # ValueError: a null byte in the path
         raise error(f"{os.fspath(path)!r} can't be written: {_why(problem)}") from problem
 

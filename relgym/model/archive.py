@@ -62,7 +62,7 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     from relgym.model.file_checks import check_body
     from relgym.model.file_format import Body
 
-    body = checked(data, Body, "the model")
+    body: Body = checked(data, Body, "the model")
     try:
         check_depth(body.extra)
     except ValueError as error:

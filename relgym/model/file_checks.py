@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import binascii
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, Final
@@ -38,12 +38,14 @@ from relgym.model.file_format import (
     ClustererRecord,
     DefinitionRecord,
     ExemplarsRecord,
+    LandingRecord,
     LawsRecord,
     LearnedLawsRecord,
     LiteralRecord,
     ModeRecord,
     PairRecord,
     PropertyRecord,
+    StopRecord,
     TableRecord,
     TargetRecord,
     TreeRecord,
@@ -186,7 +188,9 @@ class _TargetCheck:
         _distinct(ids, f"{where}.modes")
         _require(0 not in ids, f"{where}.modes", "0 is the id of noise")
         _require(max(ids, default=0) < clusterer.next_id, f"{where}.next_id", "it is taken")
-        _require(sorted(ids) == [i for i, _, _ in clusterer.fitted], f"{where}.fitted", "expected every mode once")
+        _require(
+            sorted(ids) == [i for i, _, _ in clusterer.fitted], f"{where}.fitted", "expected every mode once"
+        )
         _distinct([i for i, _, _ in clusterer.searches], f"{where}.searches")
         for k, mode in enumerate(clusterer.modes):
             self._check_mode(mode, f"{where}.modes[{k}]")
@@ -206,7 +210,9 @@ class _TargetCheck:
             features = bool(self.parts.config.features) and k == 0
             _require(features or offered.issuperset(names), where, f"{role.type!r} has no {names}")
         kinds = [(role.type, tuple(role.terms)) for role in mode.roles[1:]]
-        _require(len(kinds) <= 2 * _CHOICES, where, f"expected at most {2 * _CHOICES} roles beside the target's")
+        _require(
+            len(kinds) <= 2 * _CHOICES, where, f"expected at most {2 * _CHOICES} roles beside the target's"
+        )
 
     # ------------------------------------------------------------------ when modes hold
     def _check_classifier(self, classifier: ClassifierRecord, ids: tuple[int, ...]) -> None:
@@ -223,7 +229,11 @@ class _TargetCheck:
         _require(found == list(combinations(modes, 2)), f"{where}.pairs", "expected every pair of modes once")
         for k, pair in enumerate(classifier.pairs):
             self._check_pair(pair, f"{where}.pairs[{k}]", self._scope(classifier, found[k]))
-        _require((classifier.exemplars is not None) == self.history, f"{where}.exemplars", "they go with the history")
+        _require(
+            (classifier.exemplars is not None) == self.history,
+            f"{where}.exemplars",
+            "they go with the history",
+        )
         _distinct([key for key, _ in classifier.certain], f"{where}.certain")
         if classifier.exemplars is not None:
             _check_exemplars(classifier.exemplars, classifier, ids, f"{where}.exemplars")
@@ -238,7 +248,9 @@ class _TargetCheck:
             _require(getattr(found, name) == plain[name], f"{where}.{name}", f"expected {plain[name]!r:.200}")
         names = [name for name, _ in found.follows]
         _distinct(names, f"{where}.follows")
-        _require(set(names) <= set(plain["own"]), f"{where}.follows", f"expected some of {plain['own']!r:.200}")
+        _require(
+            set(names) <= set(plain["own"]), f"{where}.follows", f"expected some of {plain['own']!r:.200}"
+        )
 
     def _scope(self, classifier: ClassifierRecord, modes: Sequence[int]) -> Scope:
         base = self.parts.perception.vocabulary(self.parts.schema.type(self.target.type))
@@ -251,7 +263,9 @@ class _TargetCheck:
         self._check_definition(definition, f"{where}.classifier.definition", scope, arity=1)
         for k, (context, draft) in enumerate(pair.draft or ()):
             self._check_definition(draft, f"{where}.draft[{k}]", scope, arity=1)
-            _require(context not in [c for c, _ in (pair.draft or ())[:k]], f"{where}.draft", "a context twice")
+            _require(
+                context not in [c for c, _ in (pair.draft or ())[:k]], f"{where}.draft", "a context twice"
+            )
         trees, stages = pair.classifier.trees, len(definition.clauses)
         _require(len(trees) == stages + 1, f"{where}.classifier.trees", f"expected {stages + 1} of them")
         outcomes = 0
@@ -271,7 +285,9 @@ class _TargetCheck:
         counts = pair.classifier.counts
         _require(len(counts) == outcomes, f"{where}.classifier.counts", f"expected {outcomes} of them")
 
-    def _check_definition(self, definition: DefinitionRecord, where: str, scope: Scope, *, arity: int) -> None:
+    def _check_definition(
+        self, definition: DefinitionRecord, where: str, scope: Scope, *, arity: int
+    ) -> None:
         _require(definition.arity == arity, f"{where}.arity", f"expected {arity}")
         counted = len(definition.coverage)
         _require(
@@ -306,8 +322,8 @@ class _TargetCheck:
         kinds = {(kind, tuple(weights)) for kind, weights in casting.kinds}
         most = max((sum((k, tuple(w)) == kind for k, w in casting.kinds) for kind in kinds), default=0)
         _require(most <= _CHOICES, where, f"expected at most {_CHOICES} roles of one kind")
-        for name, part in (("definitions", casting.definitions), ("common", casting.common)):
-            _require(len(part) == len(kinds), f"{where}.{name}", f"expected {len(kinds)}, one for each kind of role")
+        sizes = {len(kinds), len(casting.definitions), len(casting.common)}
+        _require(len(sizes) == 1, where, f"expected {len(kinds)} definitions, one for each kind of role")
         base = self._scope(classifier, ())
         scope = Scope(base.relations, base.unary, (), ())
         for definition in casting.definitions:
@@ -315,7 +331,9 @@ class _TargetCheck:
                 self._check_definition(definition, f"{where}.definitions", scope, arity=2)
         stances = 2 * len(classifier.vocabulary.relations) + len(classifier.vocabulary.unary)
         for common in casting.common:
-            _require(common is None or max(common, default=0) < stances, f"{where}.common", f"expected < {stances}")
+            _require(
+                common is None or max(common, default=0) < stances, f"{where}.common", f"expected < {stances}"
+            )
 
     def _check_bounds(self, model: PropertyRecord, ids: Collection[int]) -> None:
         """Limits, stops and landings are modes, and none that take part in the vote."""
@@ -323,14 +341,18 @@ class _TargetCheck:
         if len(limits) == 2:
             least, most = limits[0][1], limits[1][1]
             _require(least <= most, f"{self.where}.limits", "expected the low one below the high one")
-        every = [*model.stops.stops, *model.stops.landings]
+        every: list[StopRecord | LandingRecord] = [*model.stops.stops, *model.stops.landings]
         voting = set(model.classifier.modes)
         for mode in (*(bound[0] for bound in limits), *(each.mode for each in every)):
             _require(mode in ids, f"{self.where}.limits or stops", f"there is no mode {mode}")
-            _require(mode not in voting, f"{self.where}.limits or stops", f"mode {mode} takes part in the vote")
+            _require(
+                mode not in voting, f"{self.where}.limits or stops", f"mode {mode} takes part in the vote"
+            )
         properties = self.parts.schema.type(self.target.type).properties
         for each in every:
-            _require(each.property in properties, f"{self.where}.stops", f"there is no property {each.property!r}")
+            _require(
+                each.property in properties, f"{self.where}.stops", f"there is no property {each.property!r}"
+            )
         for stop in model.stops.stops:
             _require(abs(stop.side) == 1.0, f"{self.where}.stops", "expected the side -1 or 1")
 
@@ -345,7 +367,9 @@ def _check_literal(literal: LiteralRecord, where: str, scope: Scope) -> None:
         _require(name in scope.scalars, where, f"there is no number {name!r}")
         return
     _require(name in [n for n, _ in scope.pair], where, f"there is no number {name!r} of two objects")
-    _require(places == 2 and literal.args[0] == 0 and literal.args[1] != 0, where, "expected (A, another object)")
+    _require(
+        places == 2 and literal.args[0] == 0 and literal.args[1] != 0, where, "expected (A, another object)"
+    )
 
 
 def _variables(clause: Sequence[LiteralRecord], arity: int) -> int:
@@ -377,13 +401,19 @@ def _check_exemplars(
     sizes, size, names = found.columns.sizes, found.columns.size, classifier.vocabulary
     expected = {"R": names.relations, "U": names.unary, "F": names.pair, "A": names.own, "M": found.modes}
     for axis, those in expected.items():
-        _require(getattr(sizes, axis) == len(those), f"{where}.columns.sizes.{axis}", f"expected {len(those)}")
+        _require(
+            getattr(sizes, axis) == len(those), f"{where}.columns.sizes.{axis}", f"expected {len(those)}"
+        )
     _require(sizes.K == sizes.K2, f"{where}.columns.sizes", "expected K and K2 to be equal")
     arrays = {}
-    _require(set(found.columns.arrays) == set(COLUMNS), f"{where}.columns.arrays", f"expected {sorted(COLUMNS)}")
+    _require(
+        set(found.columns.arrays) == set(COLUMNS), f"{where}.columns.arrays", f"expected {sorted(COLUMNS)}"
+    )
     for name, column in COLUMNS.items():
         shape = (size, *(getattr(sizes, axis) for axis in column.axes))
-        arrays[name] = _decoded(found.columns.arrays[name], column.dtype, shape, f"{where}.columns.arrays.{name}")
+        arrays[name] = _decoded(
+            found.columns.arrays[name], column.dtype, shape, f"{where}.columns.arrays.{name}"
+        )
     _check_values(arrays, sizes.K, ids, len(found.cells), where)
     _check_cells(found, arrays, where)
 
@@ -411,12 +441,18 @@ def _check_values(arrays: _Arrays, objects: int, ids: Collection[int], cells: in
     _require(exists[np.arange(n), target].all(), f"{where}: target", "expected an object that exists")
     for name in ("close", "approached"):
         _require(not (arrays[name] & ~exists).any(), f"{where}: {name}", "expected objects that exist")
-        _require(arrays[name][np.arange(n), target].all(), f"{where}: {name}", "expected the target among them")
+        _require(
+            arrays[name][np.arange(n), target].all(), f"{where}: {name}", "expected the target among them"
+        )
     both = exists[:, :, None] & exists[:, None, :]
     _require(not (arrays["table"] & ~both[:, None]).any(), f"{where}: table", "expected objects that exist")
     _require(not (arrays["unary"] & ~exists[:, None]).any(), f"{where}: unary", "expected objects that exist")
     _require(_within(arrays["row"], 0, 2**53), f"{where}: row", "expected numbers of examples")
-    _require(np.isin(arrays["assigned"], [-1, *ids]).all(), f"{where}: assigned", f"expected -1 or one of {list(ids)}")
+    _require(
+        np.isin(arrays["assigned"], [-1, *ids]).all(),
+        f"{where}: assigned",
+        f"expected -1 or one of {list(ids)}",
+    )
     _require(_within(arrays["cell"], 0, cells), f"{where}: cell", "expected one of the cells")
     _require(_within(arrays["roles"], -1, objects), f"{where}: roles", "expected objects, or -1")
 
@@ -424,7 +460,9 @@ def _check_values(arrays: _Arrays, objects: int, ids: Collection[int], cells: in
 def _check_cells(found: ExemplarsRecord, arrays: _Arrays, where: str) -> None:
     """The cells share out all slots, and agree with what the slots say of themselves."""
     slots = [slot for *_, members in found.cells for slot in members]
-    _require(sorted(slots) == list(range(found.columns.size)), f"{where}.cells", "expected every slot in one cell")
+    _require(
+        sorted(slots) == list(range(found.columns.size)), f"{where}.cells", "expected every slot in one cell"
+    )
     _distinct([(mode, key) for mode, key, _, _ in found.cells], f"{where}.cells")
     cell, assigned = arrays["cell"].tolist(), arrays["assigned"].tolist()
     for number, (mode, _, _, members) in enumerate(found.cells):
@@ -446,7 +484,11 @@ def _check_laws(record: LawsRecord, learner: LawLearner, arrays: _Arrays | None)
         _require(law.type in sources, "laws.free", f"no law is learned of {law.type!r}")
         own = sources[law.type]
         counts = {len(own.velocity), len(own.moving)}
-        _require(len(law.components) in counts, "laws.free", f"expected {sorted(counts)} components of {law.type!r}")
+        _require(
+            len(law.components) in counts,
+            "laws.free",
+            f"expected {sorted(counts)} components of {law.type!r}",
+        )
         for terms in law.components:
             _check_terms(terms, {*own.names, ONE}, "laws.free")
     _distinct(record.governed, "laws.governed")
@@ -459,7 +501,9 @@ def _check_laws(record: LawsRecord, learner: LawLearner, arrays: _Arrays | None)
     for a, b, prop, _, _ in laws.shares:
         _require(a in sources and b in sources, "laws.shares", f"no law is learned of {a!r} and {b!r}")
         _require(not prop or (prop in names[a] and prop in names[b]), "laws.shares", f"there is no {prop!r}")
-    _require([name for name, *_ in laws.ledger] == sorted(sources), "laws.ledger", f"expected {sorted(sources)}")
+    _require(
+        [name for name, *_ in laws.ledger] == sorted(sources), "laws.ledger", f"expected {sorted(sources)}"
+    )
     kept = (laws.random, laws.store, laws.learners)
     whole = all(each is not None for each in kept) if arrays is not None else not any(kept)
     _require(whole, "laws", "random, store and learners go with the history")
@@ -470,14 +514,18 @@ def _check_laws(record: LawsRecord, learner: LawLearner, arrays: _Arrays | None)
 def _check_terms(terms: Sequence[tuple[str, float]], known: Collection[str], where: str) -> None:
     names = [name for name, _ in terms]
     _distinct(names, where)
-    _require(set(known).issuperset(names), where, f"there is nothing called {sorted(set(names) - set(known))}")
+    _require(
+        set(known).issuperset(names), where, f"there is nothing called {sorted(set(names) - set(known))}"
+    )
 
 
 def _check_pair_law(laws: LearnedLawsRecord, learner: LawLearner) -> None:
     pair = laws.pair
     assert pair is not None
     axes = Axes.of(learner.schema)
-    _require(pair.frame != "turned" or len(axes.used) == 2, "laws.pair.frame", "'turned' is a frame of the plane")
+    _require(
+        pair.frame != "turned" or len(axes.used) == 2, "laws.pair.frame", "'turned' is a frame of the plane"
+    )
     letters = axis_names(pair.frame, len(axes.used))
     _require(len(pair.axes) == len(letters), "laws.pair.axes", f"expected the axes {letters}")
     bodies = {t.name for t in learner.schema.types if t.has_body}
@@ -506,7 +554,11 @@ def _check_kept(laws: LearnedLawsRecord, learner: LawLearner, arrays: _Arrays) -
     assert laws.store is not None and laws.learners is not None
     bodies = {t.name for t in learner.schema.types if t.has_body}
     for a, b in laws.store.kinds:
-        _require(a in learner.sources and b in bodies, "laws.store.kinds", f"there is no contact of {a!r} and {b!r}")
+        _require(
+            a in learner.sources and b in bodies,
+            "laws.store.kinds",
+            f"there is no contact of {a!r} and {b!r}",
+        )
     _distinct(laws.store.kinds, "laws.store.kinds")
     names = sorted(learner.sources)
     _require([name for name, *_ in laws.learners] == names, "laws.learners", f"expected {names}")
@@ -524,7 +576,9 @@ def _check_kept(laws: LearnedLawsRecord, learner: LawLearner, arrays: _Arrays) -
 def _stored(arrays: _Arrays, name: str, width: int, limit: int, seen: int, cells: int) -> NDArray[Any]:
     """The rows of a store: as wide as they must be, not too many, all in one of its cells."""
     rows = _array(arrays, f"{name}.rows", "float64", (None, width))
-    _require(len(rows) <= min(limit, seen), f"{name}.rows", f"expected at most {min(limit, seen)}, got {len(rows)}")
+    _require(
+        len(rows) <= min(limit, seen), f"{name}.rows", f"expected at most {min(limit, seen)}, got {len(rows)}"
+    )
     _require(np.isfinite(rows).all(), f"{name}.rows", "expected finite numbers")
     found = _array(arrays, f"{name}.cells", "int64", (len(rows),))
     _require(_within(found, 0, cells), f"{name}.cells", "expected one of the cells")
@@ -536,7 +590,9 @@ def _array(arrays: _Arrays, name: str, dtype: str, shape: tuple[int | None, ...]
     _require(name in arrays, "history", f"the array {name!r} is missing")
     found = arrays[name]
     fits = len(shape) == found.ndim and all(w in (None, n) for w, n in zip(shape, found.shape, strict=True))
-    _require(found.dtype == np.dtype(dtype) and fits, f"history: {name}", f"expected {dtype} of shape {shape}")
+    _require(
+        found.dtype == np.dtype(dtype) and fits, f"history: {name}", f"expected {dtype} of shape {shape}"
+    )
     return found
 
 
@@ -548,7 +604,11 @@ def _check_history(body: Body, parts: Parts, targets: Sequence[Target], arrays: 
     if body.laws is not None:
         stores = ["contacts", *(f"free{k}" for k in range(len(body.laws.laws.learners or ())))]
         expected |= {f"laws.{store}.{name}" for store in stores for name in ("rows", "cells")}
-    _require(set(arrays) == expected, "history", f"arrays are missing or too many: {sorted(set(arrays) ^ expected)[:5]}")
+    _require(
+        set(arrays) == expected,
+        "history",
+        f"arrays are missing or too many: {sorted(set(arrays) ^ expected)[:5]}",
+    )
     signatures: dict[str, list[SlotSignature]] = {}
     for k, (name, table) in enumerate(zip(types, body.tables, strict=True)):
         signatures[name] = _check_table(table, name, parts, arrays, f"table{k}")
@@ -587,7 +647,11 @@ def _check_table(
     for number, signature in enumerate(signatures):
         _check_bodies(bodies[ids == number], signature, f"history: {at}.bodies")
     serial = _array(arrays, f"{at}.serial", "int64", (n,))
-    _require(n == 0 or ((np.diff(serial) > 0).all() and serial[0] >= 0), f"history: {at}.serial", "expected an order")
+    _require(
+        n == 0 or ((np.diff(serial) > 0).all() and serial[0] >= 0),
+        f"history: {at}.serial",
+        "expected an order",
+    )
     _require(n == 0 or serial[-1] < table.seen, f"history: {at}.serial", "there are more rows than were seen")
     return signatures
 
@@ -632,7 +696,9 @@ def _check_examples(
         function = Mode.from_json(target, _plain(mode))
         for number in np.unique(seen[labels == mode.id]).tolist():
             bound = bind(function, signatures[number])
-            _require(bound is not None, f"history: {at}.labels", f"mode {mode.id} can't explain what it is said to")
+            _require(
+                bound is not None, f"history: {at}.labels", f"mode {mode.id} can't explain what it is said to"
+            )
 
 
 def _plain(mode: ModeRecord) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, TypeAlias
 
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, field
 
 from relgym.config import ModelConfig
 from relgym.files.records import (
@@ -32,12 +32,14 @@ __all__ = [
     "ColumnsRecord",
     "DefinitionRecord",
     "ExemplarsRecord",
+    "LandingRecord",
     "LawsRecord",
     "LiteralRecord",
     "ModeRecord",
     "PairRecord",
     "SchemaRecord",
     "ShapeRecord",
+    "StopRecord",
     "TargetModel",
     "TargetRecord",
     "TreeRecord",
@@ -99,7 +101,7 @@ class TypeRecord(Record):
     flags: list[Name] = []
 
 
-class TargetRecord(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class TargetRecord(Struct, array_like=True, forbid_unknown_fields=True):
     """A target: type, property, and the (type, property) pairs whose next values it is given."""
 
     type: Name
@@ -107,7 +109,7 @@ class TargetRecord(Struct, frozen=True, array_like=True, forbid_unknown_fields=T
     given: list[Pair]
 
 
-class KinematicsRecord(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class KinematicsRecord(Struct, array_like=True, forbid_unknown_fields=True):
     """A declared law ``property' = property + step * rate'``, or ``* rate``."""
 
     type: Name
@@ -296,7 +298,7 @@ class CastingRecord(Record):
 
 
 # ---------------------------------------------------------------------- what else is known of a target
-class SplitRecord(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class SplitRecord(Struct, array_like=True, forbid_unknown_fields=True):
     """How far examples scatter where a number is at most a threshold, and where it is greater."""
 
     name: Name
@@ -305,7 +307,7 @@ class SplitRecord(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     above: Spread
 
 
-class SpreadRecord(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class SpreadRecord(Struct, array_like=True, forbid_unknown_fields=True):
     """How far a mode's examples scatter: over all, by action, or by a number's threshold."""
 
     mode: ModeOrNoise
@@ -375,10 +377,10 @@ class PropertyRecord(Record):
     spreads: list[SpreadRecord]
     classifier: ClassifierRecord
     casting: list[tuple[ModeId, CastingRecord]]
-    guess: GuessRecord = GuessRecord()
-    scope: ScopeRecord = ScopeRecord()
-    limits: LimitsRecord = LimitsRecord()
-    stops: StopsRecord = StopsRecord()
+    guess: GuessRecord = field(default_factory=GuessRecord)
+    scope: ScopeRecord = field(default_factory=ScopeRecord)
+    limits: LimitsRecord = field(default_factory=LimitsRecord)
+    stops: StopsRecord = field(default_factory=StopsRecord)
 
 
 class TargetModel(Record):
@@ -435,7 +437,8 @@ class PairLawRecord(Record):
 
     frame: Literal["contact", "point", "turned", "centres", "own", "world"]
     axes: Annotated[
-        list[Annotated[list[AxisLawRecord], Meta(min_length=1, max_length=256)]], Meta(min_length=1, max_length=3)
+        list[Annotated[list[AxisLawRecord], Meta(min_length=1, max_length=256)]],
+        Meta(min_length=1, max_length=3),
     ]
     bits: Spread
     grips: list[tuple[Name, Name, Finite]]

@@ -81,15 +81,17 @@ def write_model(
     try:
         check_depth(body.get("extra"))
         whole = {"body": body, "history": digest}
-        text = _canonical(
-            {"format": FORMAT, "version": VERSION, "sha256": _digest(whole), **whole}
-        ).encode()
+        text = _canonical({"format": FORMAT, "version": VERSION, "sha256": _digest(whole), **whole}).encode()
     except (TypeError, ValueError, RecursionError) as error:
         raise ModelFileError(
             f"the model can't be saved: {error}; expected extra to be plain data (numbers, strings, lists, dicts "
             "with strings as keys) that isn't nested deep"
         ) from None
-    write_whole(path, text if history is None else write_members({_TEXT: text, _HISTORY: history}), error=ModelFileError)
+    write_whole(
+        path,
+        text if history is None else write_members({_TEXT: text, _HISTORY: history}),
+        error=ModelFileError,
+    )
 
 
 def read_model(

@@ -27,7 +27,7 @@ def main() -> int:
     numbers = range(asked.first, asked.first + asked.files)
     if asked.case is not None:
         numbers = range(asked.case, asked.case + 1)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:
         fuzzer, until = Fuzzer(Path(folder), asked.seed), time.monotonic() + 60.0 * asked.minutes
         tally = Tally()
         for number in numbers:

@@ -151,13 +151,11 @@ class Mutator:
         rng, found = self.rng, dict(arrays)
         name = rng.choice(sorted(found))
         array = found[name].copy()
-        match rng.randrange(9):
-            case 0:
-                del found[name]
-                return found
-            case 1:
-                found[f"{name}x"] = array
-                return found
+        way = rng.randrange(9)
+        if way < 2:
+            del found[name]
+            return found if way else found | {f"{name}x": array}
+        match way:
             case 2:
                 array = array[: rng.randrange(len(array) + 1)]
             case 3:
@@ -170,16 +168,18 @@ class Mutator:
                 other = rng.choice(sorted(found))
                 array, found[other] = found[other], array
             case _:
-                flat = array.reshape(-1)
-                for _ in range(rng.choice((1, 1, 20))):
-                    if flat.size:
-                        value = rng.choice((0, 1, -1, 2, 7, 100, 2**14, 1e9, 1e30, 1e308, -1e308, 1e-300, math.nan))
-                        if array.dtype.kind == "i":
-                            most = np.iinfo(array.dtype)
-                            value = int(max(min(0 if value != value else value, most.max), most.min))
-                        flat[rng.randrange(flat.size)] = value
+                self._other_values(array.reshape(-1))
         found[name] = array
         return found
+
+    def _other_values(self, flat: NDArray[Any]) -> None:
+        rng = self.rng
+        for _ in range(rng.choice((1, 1, 20)) if flat.size else 0):
+            value = rng.choice((0, 1, -1, 2, 7, 100, 2**14, 1e9, 1e30, 1e308, -1e308, 1e-300, math.nan))
+            if flat.dtype.kind == "i":
+                most = np.iinfo(flat.dtype)
+                value = int(max(min(0 if value != value else value, most.max), most.min))
+            flat[rng.randrange(flat.size)] = value
 
 
 def _walk(node: Any, path: _Path) -> Iterator[tuple[_Path, Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final, Protocol, TypeAlias
 
@@ -13,13 +13,17 @@ from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig, ModelConfig
 from relgym.envs.tasks import Judgement, Judging
-from relgym.errors import ConfigError, ModelFileError, SchemaError
+from relgym.errors import ConfigError, ModelFileError, RelgymError
+from relgym.files.reading import FileLimits
+from relgym.files.records import checked
 from relgym.model.prediction import BatchPrediction
+from relgym.model.scenes import mismatch
 from relgym.model.storage import schema_from_json, schema_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, ObjectType, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.sb3.acting import acting_all
+from relgym.wrappers.sb3.file_format import RewardModelBody
 
 __all__ = ["Acting", "Judge", "LearnedTask", "NeuralModel", "NeuralTask", "check_rewards"]
 
@@ -156,7 +160,13 @@ class LearnedTask(Judging):
         self.model.save(path, history=True, extra={**self.model.extra, _FILE: data})
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], *, acting: Acting | None = None) -> LearnedTask:
+    def load(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        acting: Acting | None = None,
+        limits: FileLimits | None = None,
+    ) -> LearnedTask:
         """Read what `save` wrote: it judges and learns on as if it had never been saved.
 
         Parameters
@@ -165,34 +175,53 @@ class LearnedTask(Judging):
             The file.
         acting
             As of the class: functions aren't part of the file.
+        limits
+            How much the file may ask for; default: those of `FileLimits`.
 
         Raises
         ------
         ModelFileError
             No file of a judge, a damaged one, or one of another version.
         """
-        model, extra = WorldModel.load_with_extra(path)
+        model, extra = WorldModel.load_with_extra(path, limits=limits)
         if _FILE not in extra:
             raise ModelFileError(
                 f"{path} holds a model but no learned task: expected what LearnedTask.save wrote"
             )
-        data = extra[_FILE]
         try:
-            judge = cls(
-                schema_from_json(data["schema"]), {(t, p) for t, p in data["changing"]}, acting=acting
+            judge = cls._restored(
+                checked(extra[_FILE], RewardModelBody, "the learned task"), extra[_FILE], model
             )
-            judge._ends.extend(map(np.array, data["ends"]))
-            judge._latest.extend(map(np.array, data["latest"]))
-            judge._earlier.extend(map(np.array, data["earlier"]))
-            judge._passed, judge._rng.bit_generator.state = int(data["passed"]), data["rng"]
-            judge._together = {(int(r), int(e)) for r, e in data["together"]}
-            seen, modes = data["reviewed"]
-            judge._reviewed = (int(seen), tuple(modes))
-        except (KeyError, TypeError, ValueError, SchemaError) as error:
-            raise ModelFileError(
-                f"{path}: a part of the learned task is missing or malformed ({error!r}); save it again"
-            ) from None
-        judge.model, model.extra = model, {name: part for name, part in extra.items() if name != _FILE}
+        except RelgymError as error:
+            raise ModelFileError(f"{path}: {error}") from None
+        judge._acting = acting
+        model.extra = {name: part for name, part in extra.items() if name != _FILE}
+        return judge
+
+    @classmethod
+    def _restored(cls, body: RewardModelBody, data: Mapping[str, Any], model: WorldModel) -> LearnedTask:
+        """What a file holds of it, taken over once all of it is known to fit together."""
+        schema = schema_from_json(data["schema"])
+        for name, prop in body.changing:
+            if prop not in schema.type(name).properties:
+                raise ModelFileError(f"type {name!r} has no property {prop!r} that could change")
+        judge = cls(schema, set(body.changing))
+        if (difference := mismatch(judge.model.schema, model.schema)) or model.frozen:
+            raise ModelFileError(f"its model is of another world: {difference or 'it has no history'}")
+        width = model.schema.layout().width
+        if model.schema.layout() != judge.model.schema.layout() or set(model.targets) != set(
+            judge.model.targets
+        ):
+            raise ModelFileError("its model is of another world: other objects or targets")
+        for each in (*body.ends, *body.latest, *body.earlier):
+            if len(each) != width:
+                raise ModelFileError(f"a remembered step has {len(each)} numbers, expected {width}")
+        judge._ends.extend(map(np.array, body.ends))
+        judge._latest.extend(map(np.array, body.latest))
+        judge._earlier.extend(map(np.array, body.earlier))
+        judge._passed, judge._rng.bit_generator.state = body.passed, data["rng"]
+        judge._together, judge._reviewed = set(body.together), (body.reviewed[0], tuple(body.reviewed[1]))
+        judge.model = model
         return judge
 
     def _small_schema(self) -> SceneSchema:
