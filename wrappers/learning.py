@@ -40,7 +40,7 @@ class Learning:
         """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``."""
         return self._observer.study.model
 
-    def foretell(
+    def predict(
         self, observation: Any, action: Any, info: Mapping[str, Any] | None = None
     ) -> ScenePrediction:
         """What the model says would follow an observation and an action.

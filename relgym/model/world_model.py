@@ -307,7 +307,7 @@ class WorldModel:
         return advices(self._parts)
 
     def explain(self, scene: Scene) -> str:
-        """Why this prediction: mode, function, roles, clause and rival of every target."""
+        """Why this prediction: mode, function, roles, clause and runner-up of every target."""
         from relgym.model.explain import explain
 
         return explain(self, scene)

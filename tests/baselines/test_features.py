@@ -5,9 +5,9 @@ import pytest
 
 from relgym.baselines.features import ContactFeatures, ThesisFeatures, columns, features
 from relgym.errors import ConfigError, SchemaError
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 
-*_, BLOCK = ball_blocks(1, seed=100, blocks=3, order=None)  # the ball begins in the air
+*_, BLOCK = ball_episodes(1, seed=100, blocks=3, order=None)  # the ball begins in the air
 ROWS = BLOCK.vectors[:-1]
 
 
@@ -51,7 +51,7 @@ def test_only_contacts_can_tell_of_a_missing_object() -> None:
     from dataclasses import replace
 
     alone = replace(BALL_EXPERIMENTS[1], objects=("box",))
-    room = next(iter(ball_blocks(alone, seed=100, blocks=1)))
+    room = next(iter(ball_episodes(alone, seed=100, blocks=1)))
     layout = BLOCK.schema.layout(room.layout.names)
     assert ContactFeatures(BLOCK.schema, "ball").rows(layout, room.vectors).shape == (201, 26)
     with pytest.raises(SchemaError, match="can't tell who is missing"):

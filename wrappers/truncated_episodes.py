@@ -9,10 +9,10 @@ from gymnasium.utils import RecordConstructorArgs
 
 from relgym.envs.arguments import checked_count, refuse_vector_env
 
-__all__ = ["Glimpses"]
+__all__ = ["TruncatedEpisodes"]
 
 
-class Glimpses(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+class TruncatedEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """Truncates most episodes after a few steps; now and then one lasts as long as it will.
 
     What follows on a beginning, a model can dream; other beginnings (other rooms, other objects) it can't. So real
@@ -50,7 +50,7 @@ class Glimpses(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         return begun
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Take a step; of a glimpse, the last one says that it is truncated."""
+        """Take a step; of a truncated episode, the last one says that it is truncated."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         self._taken += 1
         late = bool(self._episode % self.whole) and self._taken >= self.steps
