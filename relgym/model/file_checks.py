@@ -399,7 +399,13 @@ def _check_exemplars(
 ) -> None:
     _require(found.modes == classifier.modes, f"{where}.modes", f"expected {classifier.modes}")
     sizes, size, names = found.columns.sizes, found.columns.size, classifier.vocabulary
-    expected = {"R": names.relations, "U": names.unary, "F": names.pair, "A": names.own, "M": found.modes}
+    expected: dict[str, list[Any]] = {
+        "R": names.relations,
+        "U": names.unary,
+        "F": names.pair,
+        "A": names.own,
+        "M": found.modes,
+    }
     for axis, those in expected.items():
         _require(
             getattr(sizes, axis) == len(those), f"{where}.columns.sizes.{axis}", f"expected {len(those)}"
