@@ -107,7 +107,7 @@ def read_bytes(path: str | os.PathLike[str], limits: FileLimits, *, error: type[
     """
     try:
         # A pipe that nobody writes to would never open, and a device never end.
-        handle = os.open(path, os.O_RDONLY | os.O_NONEPISODE | getattr(os, "O_CLOEXEC", 0))
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_CLOEXEC", 0))
         with os.fdopen(handle, "rb") as file:
             found = os.fstat(file.fileno())
             if stat.S_ISDIR(found.st_mode):

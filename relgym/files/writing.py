@@ -130,7 +130,7 @@ def _clean(target: Path) -> None:
 
 def _remove_leftover(path: Path) -> None:
     with suppress(OSError):
-        handle = os.open(path, os.O_WRONLY | os.O_NONEPISODE | os.O_NOFOLLOW)
+        handle = os.open(path, os.O_WRONLY | os.O_NONBLOCK | os.O_NOFOLLOW)
         try:
             if _lock(handle, wait=False):
                 path.unlink(missing_ok=True)
