@@ -117,7 +117,7 @@ def read_bytes(path: str | os.PathLike[str], limits: FileLimits, *, error: type[
             if found.st_size > limits.file:
                 said = _too_large("bytes of the file", found.st_size, limits.file, "file")
                 raise error(f"{os.fspath(path)!r} is too large: {said}")
-            return file.read(limits.file + 1)
+            return file.read(found.st_size + 1)
     except RelgymError:
         raise
     except (OSError, ValueError) as problem:  # ValueError: a null byte in the path

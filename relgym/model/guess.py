@@ -104,7 +104,8 @@ class Guesses:
         """
         (modes, typical_modes), (own, typical) = self.errors.tolist()
         # Squares are compared: so the typical error, itself a square of what is kept, counts to the fourth.
-        gains = own * typical**4 < modes * typical_modes**4
+        # Multiplied, since a power of a number that is too great would be an error, and the product is infinite.
+        gains = own * _fourth(typical) < modes * _fourth(typical_modes)
         return self.best is not None and own < modes and gains
 
     def compare(self, modes: float, own: float) -> None:
@@ -146,6 +147,10 @@ class Guesses:
             found.errors = np.array(data["errors"], dtype=np.float64)
         found._due = data.get("due", LEAST)
         return found
+
+
+def _fourth(number: float) -> float:
+    return (number * number) * (number * number)
 
 
 def _read(target: Target, data: list[Any] | None) -> Guess | None:
