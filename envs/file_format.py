@@ -1,18 +1,22 @@
 """The declared format of what a model file says of its env: spaces, first scenes, and the view of its observations.
 
-It stands under `extra` in the file's body (`relgym.model.file_format`).
+It stands under `extra` in the file's body (`relgym.model.file_format`). ``python -m relgym.envs.file_format`` prints
+the JSON Schema of whole files, as it stands in `docs/reference/model-file.schema.json`.
 """
 
 from __future__ import annotations
 
+import json
 from typing import Annotated, Any, Literal, TypeAlias
 
+import msgspec
 from msgspec import Meta, Struct
 
 from relgym.files.records import Amount, Finite, Name, Pair, Record
-from relgym.model.file_format import SchemaRecord, ShapeRecord
+from relgym.model.file_format import Body, SchemaRecord, ShapeRecord
+from relgym.model.storage import FORMAT, VERSION
 
-__all__ = ["EnvBody", "SpaceRecord", "ViewRecord"]
+__all__ = ["EnvBody", "SpaceRecord", "ViewRecord", "json_schema"]
 
 _Whole: TypeAlias = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
 _Choices: TypeAlias = Annotated[int, Meta(ge=1, le=2**63 - 1)]
@@ -192,3 +196,33 @@ class EnvBody(Struct):
     starts: list[StartRecord]
     metadata: dict[str, Any]
     view: ViewRecord | None = None
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of a model file: of its text, or of the member ``model.json`` of one with history."""
+    (body, env), records = msgspec.json.schema_components((Body, EnvBody), ref_template="#/$defs/{name}")
+    records["Body"]["properties"]["extra"] |= {
+        "description": f"The caller's data; a learner's: {env['$ref']}"
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"relgym model file, version {VERSION}",
+        "type": "object",
+        "properties": {
+            "format": {"const": FORMAT},
+            "version": {"const": VERSION},
+            "sha256": {"type": "string", "description": "of the canonical JSON of body and history"},
+            "history": {
+                "type": ["string", "null"],
+                "description": "SHA-256 of history.npz; null without history",
+            },
+            "body": body,
+        },
+        "required": ["format", "version", "sha256", "history", "body"],
+        "additionalProperties": False,
+        "$defs": records,
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=1, sort_keys=True, ensure_ascii=False))

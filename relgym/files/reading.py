@@ -111,20 +111,18 @@ def read_bytes(path: str | os.PathLike[str], limits: FileLimits, *, error: type[
         with os.fdopen(handle, "rb") as file:
             found = os.fstat(file.fileno())
             if stat.S_ISDIR(found.st_mode):
-                raise error(f"{os.fspath(path)!r} is a folder: expected the path of a file")
+                raise error(f"{path} can't be read (it is a folder): expected the path of a file")
             if not stat.S_ISREG(found.st_mode):
-                raise error(f"{os.fspath(path)!r} is a special file: expected the path of a plain file")
+                raise error(f"{path} can't be read (it is a special file): expected the path of a plain file")
             if found.st_size > limits.file:
                 said = _too_large("bytes of the file", found.st_size, limits.file, "file")
-                raise error(f"{os.fspath(path)!r} is too large: {said}")
+                raise error(f"{path} is too large: {said}")
             return file.read(found.st_size + 1)
     except RelgymError:
         raise
     except (OSError, ValueError) as problem:  # ValueError: a null byte in the path
         why = getattr(problem, "strerror", None) or str(problem)
-        raise error(
-            f"{os.fspath(path)!r} can't be read ({why}): expected a file that relgym has written"
-        ) from problem
+        raise error(f"{path} can't be read ({why}): expected a file that relgym has written") from problem
 
 
 def parse_json(data: bytes, limits: FileLimits) -> Any:

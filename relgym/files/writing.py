@@ -68,14 +68,14 @@ def write_whole(path: str | os.PathLike[str], data: bytes, *, error: type[Relgym
     except RelgymError:
         raise
     except (OSError, ValueError) as problem:  # ValueError: a null byte in the path
-        raise error(f"{os.fspath(path)!r} can't be written: {_why(problem)}") from problem
+        raise error(f"{path} can't be written {_why(problem)}") from problem
 
 
 def _why(problem: OSError | ValueError) -> str:
     if isinstance(problem, OSError) and problem.errno in _FULL:
-        return f"no space left ({problem.strerror}); make room, or choose a path on another disk, and write again"
+        return f"(no space left: {problem.strerror}): make room, or choose a path on another disk, and write again"
     said = getattr(problem, "strerror", None) or str(problem)
-    return f"{said}; expected a path in a folder that exists and may be written to"
+    return f"({said}): expected a path in a folder that exists and may be written to"
 
 
 def _mode_of(target: Path, path: str | os.PathLike[str], error: type[RelgymError]) -> int | None:
@@ -85,10 +85,10 @@ def _mode_of(target: Path, path: str | os.PathLike[str], error: type[RelgymError
     except FileNotFoundError:
         return None
     if stat.S_ISDIR(found.st_mode):
-        raise error(f"{os.fspath(path)!r} is a folder: expected the path of a file")
+        raise error(f"{path} is a folder: expected the path of a file")
     if not stat.S_ISREG(found.st_mode):
         raise error(
-            f"{os.fspath(path)!r} is a special file (a pipe, a device or a socket): expected the path of a plain file"
+            f"{path} is a special file (a pipe, a device or a socket): expected the path of a plain file"
         )
     if not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, "the file that is there is write-protected")

@@ -53,7 +53,7 @@ def test_no_space_left_leaves_nothing_half_written(
 
     monkeypatch.setattr(os, failing, full)
     with pytest.raises(
-        StoreError, match=r"no space left .* make room, or choose a path on another disk, and write again"
+        StoreError, match=r"no space left: .* make room, or choose a path on another disk, and write again"
     ):
         write_atomically(path, b"new")
     assert [p.name for p in tmp_path.iterdir()] == ["result.json"]

@@ -191,7 +191,7 @@ def test_other_files_are_no_learned_task(tmp_path: Path) -> None:
         LearnedRewardModel.load(tmp_path / "world.relgym")
     reward_model = LearnedRewardModel(schema, MOVING)
     reward_model.model.save(tmp_path / "half.relgym", history=True, extra={"learned_task": {"ends": []}})
-    with pytest.raises(ModelFileError, match="a part of the learned task is missing or malformed"):
+    with pytest.raises(ModelFileError, match="the learned task isn't as the format says"):
         LearnedRewardModel.load(tmp_path / "half.relgym")
 
 
