@@ -179,7 +179,7 @@ def _learn(
 ) -> None:
     """The process' life: learn what comes; answer every ``None`` with all that was learned so far.
 
-    What makes it fail it says at once, unasked, so that nobody goes on in vain.
+    An error is reported at once, without being asked for.
     """
     trouble = _registered(functions)
     if trouble is not None:

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import iterate
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
+from relgym.envs.model_files import made_how
 from relgym.errors import ConfigError
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.learning import Learning
@@ -92,7 +93,7 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
             window=window,
             background=background,
             bad_observations=bad_observations,
-            metadata={"env": None if env.spec is None else env.spec.id},
+            metadata=made_how(env.spec),
         )
 
     # ------------------------------------------------------------------ the Gymnasium contract

@@ -67,7 +67,7 @@ def test_constants_are_the_weights_other_than_one() -> None:
     assert constants(book) == {"v_n": -0.95, "J_n": -0.2}
 
 
-def test_scenes_of_the_scaling_bar_touch_as_often_as_they_say() -> None:
+def test_scenes_of_the_scaling_benchmark_touch_as_often_as_they_say() -> None:
     for touching, objects in ((2, 12), (8, 12), (2, 60)):
         world, layout, vectors = on_the_floor(touching, objects)
         assert len(layout.bodies) == objects
