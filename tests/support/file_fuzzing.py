@@ -28,6 +28,9 @@ from relgym.wrappers import ModelLearner
 __all__ = ["CORPUS", "Finding", "Fuzzer", "Tally", "worlds"]
 
 CORPUS = Path(__file__).parent.parent / "model" / "files" / "v1"
+"""Files of version 1, of four worlds."""
+SMALL = Path(__file__).parent.parent / "fuzz" / "corpus"
+"""Files of small worlds (`tests/fuzz/make_corpus.py`), with some steps of each beside them."""
 STEPS = 20
 HANG = 5.0
 """Seconds of processor time: the machine may be busy."""
@@ -103,10 +106,11 @@ class Fuzzer:
         Seed of everything random: case k is the same whenever it is drawn.
     """
 
-    def __init__(self, folder: Path, seed: int = 0, corpus: Path = CORPUS) -> None:
+    def __init__(self, folder: Path, seed: int = 0) -> None:
         self.folder, self.seed = folder, seed
-        self.steps = worlds()
-        self.files = {path.stem: read_model(path) for path in sorted(corpus.glob("*.relgym"))}
+        self.steps = worlds() | {path.stem: _kept(path) for path in sorted(SMALL.glob("*.npz"))}
+        paths = [path for corpus in (CORPUS, SMALL) for path in sorted(corpus.glob("*.relgym"))]
+        self.files = {path.stem: read_model(path) for path in paths}
         self._mutators: dict[str, Mutator] = {}
 
     def case(self, number: int) -> tuple[str, dict[str, Any], Arrays | None]:
@@ -202,6 +206,14 @@ class Fuzzer:
                     env.reset()
         except RelgymError as error:  # what the file says of the env isn't the model's
             tally.typed_later[f"dream: {type(error).__name__}"] += 1
+
+
+def _kept(path: Path) -> list[Transition]:
+    """Steps of a small world, as scenes of its file's schema."""
+    schema = WorldModel.load(path.with_suffix(".relgym")).schema
+    with np.load(path) as arrays:
+        pairs = zip(arrays["before"], arrays["after"], strict=True)
+        return [Transition(*(Scene(schema, schema.layout(), v.copy()) for v in pair)) for pair in pairs]
 
 
 def _same(one: Scene, other: Scene) -> bool:
