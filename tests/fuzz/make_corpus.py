@@ -7,6 +7,7 @@ descriptions, masses that share an impulse, spin, and laws with grips. Beside ea
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +83,7 @@ def discs(n: int) -> list[Transition]:
 
 def _steps(schema: SceneSchema, vectors: np.ndarray) -> list[Transition]:
     scenes = [Scene(schema, schema.layout(), v.copy()) for v in vectors]
-    return [Transition(a, b) for a, b in zip(scenes[:-1], scenes[1:], strict=True)]
+    return [Transition(a, b) for a, b in pairwise(scenes)]
 
 
 def main() -> None:
