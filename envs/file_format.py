@@ -201,6 +201,8 @@ class EnvBody(Struct):
 def json_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a model file: of its text, or of the member ``model.json`` of one with history."""
     (body, env), records = msgspec.json.schema_components((Body, EnvBody), ref_template="#/$defs/{name}")
+    for record in records.values():  # parameters are described where they are declared
+        record["description"] = record.get("description", "").split("\n\n")[0]
     records["Body"]["properties"]["extra"] |= {
         "description": f"The caller's data; a learner's: {env['$ref']}"
     }

@@ -69,6 +69,7 @@ ALLOWED_IN = {
         "relgym/baselines/interaction.py",  # blocks of a matrix
         "relgym/experiments/law_",  # blocks stand in the rooms of other worlds
         "tests/experiments/test_law_worlds.py",
+        "tests/fuzz/make_corpus.py",
         "tests/laws/",
         "tests/wrappers/sb3/test_stock.py",
         "tests/scene/geometry/",

@@ -304,7 +304,7 @@ class _TargetCheck:
             _require(existential <= set(range(arity, most)), at, f"expected variables below {most}")
             _require(existential == set(range(arity, arity + len(existential))), at, "a variable is left out")
 
-    # ------------------------------------------------------------------ who plays the roles
+    # ------------------------------------------------------------------ role bindings
     def _check_casting(self, model: PropertyRecord) -> None:
         where = f"{self.where}.casting"
         modes = {mode.id: mode for mode in model.clusterer.modes}
@@ -551,7 +551,7 @@ def _check_pair_law(laws: LearnedLawsRecord, learner: LawLearner) -> None:
 def _check_axis(law: AxisLawRecord, known: Collection[str], bodies: Collection[str]) -> None:
     for a, b in law.kinds:
         _require(a in bodies and b in bodies, "laws.pair.axes", f"there are no bodies {a!r} and {b!r}")
-    for pieces in (law.pieces, *(pieces for _, pieces in law.rivals)):
+    for pieces in (law.pieces, *(pieces for _, pieces in law.alternatives)):
         for terms in pieces:
             _check_terms(terms, known, "laws.pair.axes")
 

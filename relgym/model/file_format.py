@@ -406,6 +406,9 @@ class TableRecord(Record):
 
 
 # ---------------------------------------------------------------------- laws of motion
+_KEY = "rivals"
+"""What alternative laws are called in files: their format is older than the word."""
+
 Pieces: TypeAlias = Annotated[list[Terms], Meta(min_length=1, max_length=16)]
 
 
@@ -425,7 +428,7 @@ class AxisLawRecord(Record):
     pieces: Pieces
     operator: Literal["max", "min"]
     kinds: list[Pair]
-    rivals: list[tuple[Literal["max", "min"], Pieces]]
+    alternatives: list[tuple[Literal["max", "min"], Pieces]] = field(name=_KEY)
     signs: tuple[bool, bool]
     examples: Count
     unexplained: Count

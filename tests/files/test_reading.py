@@ -70,8 +70,8 @@ def zeros(size: int, head: bytes = b"") -> bytes:
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     first = packer.compress(head) + packer.flush(zlib.Z_FULL_FLUSH)
     # After a full flush the same bytes mean the same wherever they stand.
-    block = packer.compress(b"\0" * (1 << 20)) + packer.flush(zlib.Z_FULL_FLUSH)
-    content = first + block * (size >> 20) + packer.flush()
+    chunk = packer.compress(b"\0" * (1 << 20)) + packer.flush(zlib.Z_FULL_FLUSH)
+    content = first + chunk * (size >> 20) + packer.flush()
     return _raw_zip("x.npy", content, len(head) + size, zipfile.ZIP_DEFLATED)
 
 
