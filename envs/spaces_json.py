@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from relgym.envs.agents import AgentsSpace
 from relgym.errors import ConfigError, ModelFileError
 
 __all__ = ["space_from_json", "space_to_json"]
@@ -21,15 +22,17 @@ def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        A space other than Box, Discrete, MultiDiscrete, MultiBinary, Dict and Tuple.
+        A space of somebody's own; all of Gymnasium's can be written.
     """
-    if isinstance(space, spaces.Dict):
+    if isinstance(space, (spaces.Dict, spaces.Tuple, spaces.OneOf, spaces.Sequence, spaces.Graph)):
+        return _of_parts(space)
+    if isinstance(space, spaces.Text):
         return {
-            "kind": "dict",
-            "spaces": [[name, space_to_json(part)] for name, part in space.spaces.items()],
+            "kind": "text",
+            "min_length": space.min_length,
+            "max_length": space.max_length,
+            "charset": space.characters,
         }
-    if isinstance(space, spaces.Tuple):
-        return {"kind": "tuple", "spaces": [space_to_json(part) for part in space.spaces]}
     if isinstance(space, spaces.MultiDiscrete):
         return {"kind": "multi-discrete", "nvec": space.nvec.tolist(), "start": space.start.tolist()}
     if isinstance(space, spaces.MultiBinary):
@@ -44,10 +47,12 @@ def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
             "dtype": str(space.dtype),
         }
     raise ConfigError(
-        f"a model file can hold Box, Discrete, MultiDiscrete, MultiBinary, Dict and Tuple spaces, got {space}"
+        f"a model file can hold the spaces that come with Gymnasium, got {space} ({type(space).__name__}); show "
+        "another one inside the learner (gymnasium.wrappers.TransformObservation, TransformAction)"
     )
 
 
+<<<<<<< HEAD
 def space_from_json(data: Mapping[str, Any]) -> spaces.Space[Any]:
     """Read what `space_to_json` wrote.
 
@@ -64,6 +69,29 @@ def space_from_json(data: Mapping[str, Any]) -> spaces.Space[Any]:
         return _read(data)
     except (TypeError, ValueError, OverflowError, AssertionError) as error:
         raise ModelFileError(f"a space isn't as the format says ({error}); save the model again") from None
+=======
+def _of_parts(space: spaces.Space[Any]) -> dict[str, Any]:
+    if isinstance(space, spaces.Dict):
+        return {
+            "kind": "agents" if isinstance(space, AgentsSpace) else "dict",
+            "spaces": [[name, space_to_json(part)] for name, part in space.spaces.items()],
+        }
+    if isinstance(space, spaces.Sequence):
+        return {"kind": "sequence", "space": space_to_json(space.feature_space), "stack": space.stack}
+    if isinstance(space, spaces.Graph):
+        edges = None if space.edge_space is None else space_to_json(space.edge_space)
+        return {"kind": "graph", "nodes": space_to_json(space.node_space), "edges": edges}
+    kind = "tuple" if isinstance(space, spaces.Tuple) else "one-of"
+    return {"kind": kind, "spaces": [space_to_json(part) for part in getattr(space, "spaces", ())]}
+
+
+def space_from_json(data: dict[str, Any]) -> spaces.Space[Any]:
+    """Read what `space_to_json` wrote."""
+    kind = data["kind"]
+    if kind not in _READERS:
+        raise ModelFileError(f"unknown kind of space {kind!r}; load the model with the relgym that wrote it")
+    return _READERS[kind](data)
+>>>>>>> main
 
 
 def _read(data: Mapping[str, Any]) -> spaces.Space[Any]:
@@ -89,6 +117,7 @@ def _read(data: Mapping[str, Any]) -> spaces.Space[Any]:
     return _box(data)
 
 
+<<<<<<< HEAD
 def _multi_discrete(data: Mapping[str, Any]) -> spaces.MultiDiscrete:
     counts, start = (_numbers(data[name], int).astype(np.int64) for name in ("nvec", "start"))
     if (counts < 1).any() or counts.shape != start.shape or (start > 2**62).any() or (counts > 2**62).any():
@@ -107,6 +136,37 @@ def _box(data: Mapping[str, Any]) -> spaces.Space[Any]:
             raise ValueError(f"expected bounds that {dtype} can hold")
     with np.errstate(over="ignore"):  # beyond the dtype's numbers there is no bound
         return spaces.Box(_cast(low, dtype), _cast(high, dtype), dtype=dtype.type)
+=======
+def _agents(data: dict[str, Any]) -> spaces.Space[Any]:
+    return AgentsSpace({name: space_from_json(part) for name, part in data["spaces"]})
+
+
+def _tuple(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Tuple([space_from_json(part) for part in data["spaces"]])
+
+
+def _one_of(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.OneOf([space_from_json(part) for part in data["spaces"]])
+
+
+def _sequence(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Sequence(space_from_json(data["space"]), stack=bool(data["stack"]))
+
+
+def _graph(data: dict[str, Any]) -> spaces.Space[Any]:
+    edges = None if data["edges"] is None else space_from_json(data["edges"])
+    return spaces.Graph(space_from_json(data["nodes"]), edges)
+
+
+def _text(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Text(
+        int(data["max_length"]), min_length=int(data["min_length"]), charset=str(data["charset"])
+    )
+
+
+def _discrete(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Discrete(int(data["n"]), start=int(data["start"]))
+>>>>>>> main
 
 
 def _cast(bounds: NDArray[np.float64], dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -132,5 +192,27 @@ def _numbers(data: Any, kind: type) -> NDArray[Any]:
     return found
 
 
+<<<<<<< HEAD
 _LARGEST: Final = 10_000_000
 """Most numbers of a space."""
+=======
+def _box(data: dict[str, Any]) -> spaces.Space[Any]:
+    dtype = np.dtype(data["dtype"])
+    low, high = (np.array(data[end], dtype=dtype) for end in ("low", "high"))
+    return spaces.Box(low, high, dtype=dtype.type)
+
+
+_READERS: dict[str, Callable[[dict[str, Any]], spaces.Space[Any]]] = {
+    "agents": _agents,
+    "box": _box,
+    "dict": _dict,
+    "discrete": _discrete,
+    "graph": _graph,
+    "multi-binary": _multi_binary,
+    "multi-discrete": _multi_discrete,
+    "one-of": _one_of,
+    "sequence": _sequence,
+    "text": _text,
+    "tuple": _tuple,
+}
+>>>>>>> main

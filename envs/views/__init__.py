@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from relgym.envs.views.agents import AgentsView
 from relgym.envs.views.base import View
 from relgym.envs.views.function import FunctionView
 from relgym.envs.views.numeric import NumbersView
@@ -17,6 +18,7 @@ from relgym.errors import ModelFileError
 __all__ = [
     "REWARD",
     "TERMINATED",
+    "AgentsView",
     "Angle",
     "FunctionView",
     "NumbersView",
@@ -48,6 +50,7 @@ def view_from_json(data: Mapping[str, Any]) -> View:
     return _read(data)
 
 
+<<<<<<< HEAD
 def _read(data: Mapping[str, Any]) -> View:
     match data["kind"]:
         case "function":
@@ -61,3 +64,11 @@ def _read(data: Mapping[str, Any]) -> View:
         case "table":
             return TableView.from_json(data)
     return SceneView.from_json(data)
+=======
+_READERS: dict[str, Callable[[Mapping[str, Any]], View]] = {
+    "agents": AgentsView.from_json,
+    "flat": NumbersView.from_json,
+    "scene": SceneView.from_json,
+    "table": TableView.from_json,
+}
+>>>>>>> main

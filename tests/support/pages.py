@@ -79,6 +79,7 @@ def run(snippet: Snippet, names: dict[str, object], folder: Path) -> str:
     """
     if snippet.kind == "commands":
         return "".join(_command(line.removeprefix("$ "), folder) for line in _lines(snippet.code))
+    os.environ["MINARI_DATASETS_PATH"] = str(folder / "minari")  # not among the reader's own data sets
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         # Lines of the page, for tracebacks.
