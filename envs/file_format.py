@@ -68,8 +68,52 @@ class TupleSpace(Record, tag_field="kind", tag="tuple"):
     spaces: list[SpaceRecord]
 
 
+class AgentsSpaceRecord(Record, tag_field="kind", tag="agents"):
+    """`relgym.envs.AgentsSpace`: a part for each agent."""
+
+    spaces: list[tuple[str, SpaceRecord]]
+
+
+class OneOfSpace(Record, tag_field="kind", tag="one-of"):
+    """`gymnasium.spaces.OneOf`."""
+
+    spaces: Annotated[list[SpaceRecord], Meta(min_length=1)]
+
+
+class SequenceSpace(Record, tag_field="kind", tag="sequence"):
+    """`gymnasium.spaces.Sequence`."""
+
+    space: SpaceRecord
+    stack: bool
+
+
+class GraphSpace(Record, tag_field="kind", tag="graph"):
+    """`gymnasium.spaces.Graph`; nodes and edges are a Box or Discrete."""
+
+    nodes: BoxSpace | DiscreteSpace
+    edges: BoxSpace | DiscreteSpace | None
+
+
+class TextSpace(Record, tag_field="kind", tag="text"):
+    """`gymnasium.spaces.Text`."""
+
+    min_length: Annotated[int, Meta(ge=0, le=10**6)]
+    max_length: Annotated[int, Meta(ge=0, le=10**6)]
+    charset: Annotated[str, Meta(max_length=10_000)]
+
+
 SpaceRecord: TypeAlias = (
-    BoxSpace | DiscreteSpace | MultiDiscreteSpace | MultiBinarySpace | DictSpace | TupleSpace
+    BoxSpace
+    | DiscreteSpace
+    | MultiDiscreteSpace
+    | MultiBinarySpace
+    | DictSpace
+    | TupleSpace
+    | AgentsSpaceRecord
+    | OneOfSpace
+    | SequenceSpace
+    | GraphSpace
+    | TextSpace
 )
 
 
@@ -157,6 +201,16 @@ class SceneViewRecord(Record, tag_field="kind", tag="scene"):
     action: SpaceRecord
 
 
+class AgentsViewRecord(Record, tag_field="kind", tag="agents"):
+    """`relgym.envs.views.AgentsView`: kind of each agent, and names of what each kind shows and does."""
+
+    observation: SpaceRecord
+    action: SpaceRecord
+    kinds: dict[Name, Name]
+    names: dict[Name, list[Name]]
+    actions: dict[Name, list[Name]]
+
+
 class FunctionViewRecord(Record, tag_field="kind", tag="function"):
     """That there was a function; no file can hold one."""
 
@@ -164,13 +218,18 @@ class FunctionViewRecord(Record, tag_field="kind", tag="function"):
 class TaskViewRecord(Record, tag_field="kind", tag="task"):
     """Another view, whose scenes also say what a step brought (`relgym.envs.views.TaskView`)."""
 
-    view: NumbersViewRecord | TableViewRecord | SceneViewRecord | FunctionViewRecord
+    view: NumbersViewRecord | TableViewRecord | SceneViewRecord | AgentsViewRecord | FunctionViewRecord
     reward: bool
     terminated: bool
 
 
 ViewRecord: TypeAlias = (
-    NumbersViewRecord | TableViewRecord | SceneViewRecord | FunctionViewRecord | TaskViewRecord
+    NumbersViewRecord
+    | TableViewRecord
+    | SceneViewRecord
+    | AgentsViewRecord
+    | FunctionViewRecord
+    | TaskViewRecord
 )
 
 

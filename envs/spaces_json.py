@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -52,7 +52,21 @@ def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
     )
 
 
-<<<<<<< HEAD
+def _of_parts(space: spaces.Space[Any]) -> dict[str, Any]:
+    if isinstance(space, spaces.Dict):
+        return {
+            "kind": "agents" if isinstance(space, AgentsSpace) else "dict",
+            "spaces": [[name, space_to_json(part)] for name, part in space.spaces.items()],
+        }
+    if isinstance(space, spaces.Sequence):
+        return {"kind": "sequence", "space": space_to_json(space.feature_space), "stack": space.stack}
+    if isinstance(space, spaces.Graph):
+        edges = None if space.edge_space is None else space_to_json(space.edge_space)
+        return {"kind": "graph", "nodes": space_to_json(space.node_space), "edges": edges}
+    kind = "tuple" if isinstance(space, spaces.Tuple) else "one-of"
+    return {"kind": kind, "spaces": [space_to_json(part) for part in getattr(space, "spaces", ())]}
+
+
 def space_from_json(data: Mapping[str, Any]) -> spaces.Space[Any]:
     """Read what `space_to_json` wrote.
 
@@ -69,56 +83,55 @@ def space_from_json(data: Mapping[str, Any]) -> spaces.Space[Any]:
         return _read(data)
     except (TypeError, ValueError, OverflowError, AssertionError) as error:
         raise ModelFileError(f"a space isn't as the format says ({error}); save the model again") from None
-=======
-def _of_parts(space: spaces.Space[Any]) -> dict[str, Any]:
-    if isinstance(space, spaces.Dict):
-        return {
-            "kind": "agents" if isinstance(space, AgentsSpace) else "dict",
-            "spaces": [[name, space_to_json(part)] for name, part in space.spaces.items()],
-        }
-    if isinstance(space, spaces.Sequence):
-        return {"kind": "sequence", "space": space_to_json(space.feature_space), "stack": space.stack}
-    if isinstance(space, spaces.Graph):
-        edges = None if space.edge_space is None else space_to_json(space.edge_space)
-        return {"kind": "graph", "nodes": space_to_json(space.node_space), "edges": edges}
-    kind = "tuple" if isinstance(space, spaces.Tuple) else "one-of"
-    return {"kind": kind, "spaces": [space_to_json(part) for part in getattr(space, "spaces", ())]}
-
-
-def space_from_json(data: dict[str, Any]) -> spaces.Space[Any]:
-    """Read what `space_to_json` wrote."""
-    kind = data["kind"]
-    if kind not in _READERS:
-        raise ModelFileError(f"unknown kind of space {kind!r}; load the model with the relgym that wrote it")
-    return _READERS[kind](data)
->>>>>>> main
 
 
 def _read(data: Mapping[str, Any]) -> spaces.Space[Any]:
     """The space that data of the declared format stand for; Gymnasium says what doesn't go together."""
-    match data["kind"]:
-        case "dict":
-            names = [name for name, _ in data["spaces"]]
-            if len(set(names)) < len(names):
-                raise ValueError(f"keys must differ, got {names}")
-            return spaces.Dict({name: _read(part) for name, part in data["spaces"]})
-        case "tuple":
-            return spaces.Tuple([_read(part) for part in data["spaces"]])
-        case "discrete":
-            if data["start"] + data["n"] > 2**63:
-                raise ValueError("choices must be numbers of 64 bits")
-            return spaces.Discrete(data["n"], start=data["start"])
-        case "multi-discrete":
-            return _multi_discrete(data)
-        case "multi-binary":
-            if math.prod(np.atleast_1d(np.array(data["n"], dtype=object))) > _LARGEST:
-                raise ValueError(f"expected at most {_LARGEST:,} numbers")
-            return spaces.MultiBinary(data["n"])
-    return _box(data)
+    return _READERS[data["kind"]](data)
 
 
-<<<<<<< HEAD
-def _multi_discrete(data: Mapping[str, Any]) -> spaces.MultiDiscrete:
+def _dict(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    names = [name for name, _ in data["spaces"]]
+    if len(set(names)) < len(names):
+        raise ValueError(f"keys must differ, got {names}")
+    parts = {name: _read(part) for name, part in data["spaces"]}
+    return AgentsSpace(parts) if data["kind"] == "agents" else spaces.Dict(parts)
+
+
+def _tuple(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    return spaces.Tuple([_read(part) for part in data["spaces"]])
+
+
+def _one_of(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    return spaces.OneOf([_read(part) for part in data["spaces"]])
+
+
+def _sequence(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    return spaces.Sequence(_read(data["space"]), stack=data["stack"])
+
+
+def _graph(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    nodes: Any = _read(data["nodes"])
+    return spaces.Graph(nodes, None if data["edges"] is None else _read(data["edges"]))
+
+
+def _text(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    return spaces.Text(data["max_length"], min_length=data["min_length"], charset=data["charset"])
+
+
+def _discrete(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    if data["start"] + data["n"] > 2**63:
+        raise ValueError("choices must be numbers of 64 bits")
+    return spaces.Discrete(data["n"], start=data["start"])
+
+
+def _multi_binary(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    if math.prod(np.atleast_1d(np.array(data["n"], dtype=object))) > _LARGEST:
+        raise ValueError(f"expected at most {_LARGEST:,} numbers")
+    return spaces.MultiBinary(data["n"])
+
+
+def _multi_discrete(data: Mapping[str, Any]) -> spaces.Space[Any]:
     counts, start = (_numbers(data[name], int).astype(np.int64) for name in ("nvec", "start"))
     if (counts < 1).any() or counts.shape != start.shape or (start > 2**62).any() or (counts > 2**62).any():
         raise ValueError("expected numbers of choices of at least 1, and as many starts")
@@ -136,37 +149,6 @@ def _box(data: Mapping[str, Any]) -> spaces.Space[Any]:
             raise ValueError(f"expected bounds that {dtype} can hold")
     with np.errstate(over="ignore"):  # beyond the dtype's numbers there is no bound
         return spaces.Box(_cast(low, dtype), _cast(high, dtype), dtype=dtype.type)
-=======
-def _agents(data: dict[str, Any]) -> spaces.Space[Any]:
-    return AgentsSpace({name: space_from_json(part) for name, part in data["spaces"]})
-
-
-def _tuple(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Tuple([space_from_json(part) for part in data["spaces"]])
-
-
-def _one_of(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.OneOf([space_from_json(part) for part in data["spaces"]])
-
-
-def _sequence(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Sequence(space_from_json(data["space"]), stack=bool(data["stack"]))
-
-
-def _graph(data: dict[str, Any]) -> spaces.Space[Any]:
-    edges = None if data["edges"] is None else space_from_json(data["edges"])
-    return spaces.Graph(space_from_json(data["nodes"]), edges)
-
-
-def _text(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Text(
-        int(data["max_length"]), min_length=int(data["min_length"]), charset=str(data["charset"])
-    )
-
-
-def _discrete(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Discrete(int(data["n"]), start=int(data["start"]))
->>>>>>> main
 
 
 def _cast(bounds: NDArray[np.float64], dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -192,18 +174,11 @@ def _numbers(data: Any, kind: type) -> NDArray[Any]:
     return found
 
 
-<<<<<<< HEAD
 _LARGEST: Final = 10_000_000
 """Most numbers of a space."""
-=======
-def _box(data: dict[str, Any]) -> spaces.Space[Any]:
-    dtype = np.dtype(data["dtype"])
-    low, high = (np.array(data[end], dtype=dtype) for end in ("low", "high"))
-    return spaces.Box(low, high, dtype=dtype.type)
 
-
-_READERS: dict[str, Callable[[dict[str, Any]], spaces.Space[Any]]] = {
-    "agents": _agents,
+_READERS: dict[str, Callable[[Mapping[str, Any]], spaces.Space[Any]]] = {
+    "agents": _dict,
     "box": _box,
     "dict": _dict,
     "discrete": _discrete,
@@ -215,4 +190,3 @@ _READERS: dict[str, Callable[[dict[str, Any]], spaces.Space[Any]]] = {
     "text": _text,
     "tuple": _tuple,
 }
->>>>>>> main

@@ -57,9 +57,9 @@ ALLOWED = {
         r"|\bbar\.(add_task|advance|tasks|update|reset|start|stop|console|finished|set_label)"
         r"|\bbar: Progress|^    bar$|\b(panel|axes|ax)\.bar(h)?\(|colour ?bar|color ?bar|bars? of progress"
     ),
-    "block": r"with`` block|code block|np\.block|[Bb]locks? the way|SIG_BLOCK|\bblock = packer|\bblock \* |\(\"block\",\)",
+    "block": r"with`` block|code block|np\.block|[Bb]locks? the way|SIG_BLOCK|\(\"block\",\)",
     "issue": r"/issues",
-    "rival": r'^_KEY = "rivals"|\brivals: list\[|\blaw\.rivals\b',  # a key of model files
+    "rival": r'^_KEY = "rivals"',  # a key of model files
 }
 """Lines on which a word has its ordinary sense, by regular expressions."""
 

@@ -50,7 +50,6 @@ def view_from_json(data: Mapping[str, Any]) -> View:
     return _read(data)
 
 
-<<<<<<< HEAD
 def _read(data: Mapping[str, Any]) -> View:
     match data["kind"]:
         case "function":
@@ -59,16 +58,12 @@ def _read(data: Mapping[str, Any]) -> View:
             )
         case "task":
             return TaskView(_read(data["view"]), reward=data["reward"], terminated=data["terminated"])
+        case "agents":
+            return AgentsView.from_json(data)
+        case "agents":
+            return AgentsView.from_json(data)
         case "flat":
             return NumbersView.from_json(data)
         case "table":
             return TableView.from_json(data)
     return SceneView.from_json(data)
-=======
-_READERS: dict[str, Callable[[Mapping[str, Any]], View]] = {
-    "agents": AgentsView.from_json,
-    "flat": NumbersView.from_json,
-    "scene": SceneView.from_json,
-    "table": TableView.from_json,
-}
->>>>>>> main

@@ -29,6 +29,10 @@ SPACES = {
     "multi-discrete": spaces.MultiDiscrete([[2, 3], [4, 5]], start=[[0, 1], [-1, 0]]),
     "multi-binary": spaces.MultiBinary([2, 3]),
     "bits": spaces.MultiBinary(4),
+    "text": spaces.Text(5, min_length=1, charset="abc"),
+    "sequence": spaces.Sequence(spaces.Discrete(3), stack=True),
+    "one-of": spaces.OneOf([spaces.Discrete(2), spaces.MultiBinary(2)]),
+    "graph": spaces.Graph(spaces.Box(0, 1, (2,)), spaces.Discrete(3)),
     "dict": spaces.Dict({"b": spaces.Discrete(2), "a": spaces.Tuple([spaces.MultiBinary(1)])}),
 }
 
@@ -75,7 +79,7 @@ def test_views_come_back(name: str) -> None:
 @pytest.mark.parametrize(
     ("data", "match"),
     [
-        ({"kind": "text"}, "Invalid value 'text'"),
+        ({"kind": "oracle"}, "Invalid value 'oracle'"),
         ({"kind": "discrete", "n": 0, "start": 0}, "Expected `int` >= 1"),
         ({"kind": "discrete", "n": 2**63 - 1, "start": 5}, "64 bits"),
         ({"kind": "box", "low": [0], "high": [1, 2], "dtype": "float32"}, "one shape"),
