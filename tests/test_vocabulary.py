@@ -74,7 +74,6 @@ ALLOWED_IN = {
         "tests/laws/",
         "tests/wrappers/sb3/test_stock.py",
         "tests/scene/geometry/",
-        "tests/test_pages.py",  # fenced code blocks
     ),
 }
 """Files in which a word has its ordinary sense."""

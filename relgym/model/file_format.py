@@ -23,6 +23,7 @@ from relgym.files.records import (
     Spread,
     Weight,
 )
+from relgym.model.advice import Advice
 
 __all__ = [
     "Body",
@@ -486,6 +487,13 @@ class LawsRecord(Record):
 
 
 # ---------------------------------------------------------------------- the whole
+class ReportRecord(Record):
+    """What can't be told without the history: rules as text (`relgym.reporting.parse_rules`), and advice."""
+
+    rules: str = ""
+    advice: list[Advice] = []
+
+
 class Body(Record):
     """All that a model file says, but for the arrays of its history."""
 
@@ -500,3 +508,5 @@ class Body(Record):
     extra: dict[str, Any]
     looks: list[tuple[Name, Name, bool]] = []
     hindsight: dict[str, HindsightRecord] = {}
+    names: dict[str, Name] = {}
+    report: ReportRecord = field(default_factory=ReportRecord)
