@@ -15,7 +15,7 @@ DYNA := $(VENV)/.installed-dyna
 DOCS := $(VENV)/.installed-docs
 
 .DEFAULT_GOAL := help
-.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow slow-sb3 bench coverage lint format types check
+.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow slow-sb3 fuzz bench coverage lint format types check
 .PHONY: wheel docs docs-serve pages animations clean example-highway example-ocatari
 
 help:            ## show this list
@@ -55,6 +55,9 @@ slow: $(DEV)     ## the tests that take minutes
 
 slow-sb3: $(SB3) ## likewise those that need Stable-Baselines3
 	$(PYTEST) -m "slow and sb3"
+
+fuzz: $(DEV)     ## change model files at random for MINUTES (default 10): what is accepted must work
+	$(BIN)/python tests/fuzz/run.py --minutes $(or $(MINUTES),10)
 
 bench: $(DEV)    ## the benchmarks
 	$(PYTEST) tests/bench -m bench --benchmark-enable --benchmark-only

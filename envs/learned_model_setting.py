@@ -124,6 +124,9 @@ class Setting:
         else:
             world = copied(_seen_through(like, recorded(model)) if model.extra else like)
             record = EnvRecord(world.observation_space, world.action_space, metadata=_metadata(world))
+        # Views of the user's own need not have it.
+        if (check := getattr(view, "check_actions", None)) is not None:
+            check(record.action_space)
         shown = ViewShown(view, record.observation_space, record.action_space)
         return cls._made(model, view.schema, record, shown, view, world)
 

@@ -62,18 +62,23 @@ class EnvRecord:
         ModelFileError
             Something is missing or malformed.
         """
-        try:
-            return cls(
-                space_from_json(data["spaces"]["observation"]),
-                space_from_json(data["spaces"]["action"]),
-                tuple(_scene(schema, start) for start in data["starts"]),
-                dict(data["metadata"]),
-            )
-        except (KeyError, TypeError, ValueError, AssertionError) as error:
+        from relgym.envs.file_format import EnvBody
+        from relgym.files.records import checked
+
+        body: EnvBody = checked(data, EnvBody, "what the model's file says of its env")
+        fps = body.metadata.get("render_fps", 50)
+        if type(fps) not in (int, float) or not 0.0 < fps < 1e6:
             raise ModelFileError(
-                f"what the model's file says of its env is missing or malformed ({error!r}); "
-                "save it again, or pass like=env"
+                f"render_fps: expected pictures per second, got {fps!r:.50}; save the model again"
+            )
+        try:
+            starts = tuple(_scene(schema, start.objects, start.vector) for start in body.starts)
+        except ObservationError as error:
+            raise ModelFileError(
+                f"a first scene doesn't fit the schema ({error}); save the model again"
             ) from None
+        seen, acted = (space_from_json(data["spaces"][name]) for name in ("observation", "action"))
+        return cls(seen, acted, starts, dict(body.metadata))
 
 
 def made_how(spec: EnvSpec | None) -> dict[str, Any]:
@@ -201,9 +206,10 @@ def _difference(other: SceneSchema, schema: SceneSchema) -> str:
     return ""
 
 
-def _scene(schema: SceneSchema, data: Mapping[str, Any]) -> Scene:
-    layout = schema.layout(data["objects"])
-    vector = np.array(data["vector"], dtype=np.float64)
-    if vector.shape != (layout.width,) or not np.isfinite(vector).all():
-        raise ObservationError(f"expected {layout.width} finite numbers for {list(layout.names)}")
-    return Scene(schema, layout, vector)
+def _scene(schema: SceneSchema, objects: list[str], numbers: list[float]) -> Scene:
+    layout = schema.layout(objects)
+    if len(numbers) != layout.width:
+        raise ObservationError(
+            f"expected {layout.width} numbers for {list(layout.names)}, got {len(numbers)}"
+        )
+    return Scene(schema, layout, np.array(numbers, dtype=np.float64))

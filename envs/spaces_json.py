@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from relgym.envs.agents import AgentsSpace
 from relgym.errors import ConfigError, ModelFileError
@@ -65,65 +67,118 @@ def _of_parts(space: spaces.Space[Any]) -> dict[str, Any]:
     return {"kind": kind, "spaces": [space_to_json(part) for part in getattr(space, "spaces", ())]}
 
 
-def space_from_json(data: dict[str, Any]) -> spaces.Space[Any]:
-    """Read what `space_to_json` wrote."""
-    kind = data["kind"]
-    if kind not in _READERS:
-        raise ModelFileError(f"unknown kind of space {kind!r}; load the model with the relgym that wrote it")
-    return _READERS[kind](data)
+def space_from_json(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    """Read what `space_to_json` wrote.
+
+    Raises
+    ------
+    ModelFileError
+        It is no such data, or bounds, shapes and dtype don't go together.
+    """
+    from relgym.envs.file_format import SpaceRecord
+    from relgym.files.records import checked
+
+    checked(data, SpaceRecord, "a space")
+    try:
+        return _read(data)
+    except (TypeError, ValueError, OverflowError, AssertionError) as error:
+        raise ModelFileError(f"a space isn't as the format says ({error}); save the model again") from None
 
 
-def _dict(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Dict({name: space_from_json(part) for name, part in data["spaces"]})
+def _read(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    """The space that data of the declared format stand for; Gymnasium says what doesn't go together."""
+    return _READERS[data["kind"]](data)
 
 
-def _agents(data: dict[str, Any]) -> spaces.Space[Any]:
-    return AgentsSpace({name: space_from_json(part) for name, part in data["spaces"]})
+def _dict(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    names = [name for name, _ in data["spaces"]]
+    if len(set(names)) < len(names):
+        raise ValueError(f"keys must differ, got {names}")
+    parts = {name: _read(part) for name, part in data["spaces"]}
+    return AgentsSpace(parts) if data["kind"] == "agents" else spaces.Dict(parts)
 
 
-def _tuple(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Tuple([space_from_json(part) for part in data["spaces"]])
+def _tuple(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    return spaces.Tuple([_read(part) for part in data["spaces"]])
 
 
-def _one_of(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.OneOf([space_from_json(part) for part in data["spaces"]])
+def _one_of(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    return spaces.OneOf([_read(part) for part in data["spaces"]])
 
 
-def _sequence(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Sequence(space_from_json(data["space"]), stack=bool(data["stack"]))
+def _sequence(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    return spaces.Sequence(_read(data["space"]), stack=data["stack"])
 
 
-def _graph(data: dict[str, Any]) -> spaces.Space[Any]:
-    edges = None if data["edges"] is None else space_from_json(data["edges"])
-    return spaces.Graph(space_from_json(data["nodes"]), edges)
+def _graph(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    nodes: Any = _read(data["nodes"])
+    return spaces.Graph(nodes, None if data["edges"] is None else _read(data["edges"]))
 
 
-def _text(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Text(
-        int(data["max_length"]), min_length=int(data["min_length"]), charset=str(data["charset"])
-    )
+def _text(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    return spaces.Text(data["max_length"], min_length=data["min_length"], charset=data["charset"])
 
 
-def _discrete(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.Discrete(int(data["n"]), start=int(data["start"]))
+def _discrete(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    if data["start"] + data["n"] > 2**63:
+        raise ValueError("choices must be numbers of 64 bits")
+    return spaces.Discrete(data["n"], start=data["start"])
 
 
-def _multi_discrete(data: dict[str, Any]) -> spaces.Space[Any]:
-    return spaces.MultiDiscrete(np.array(data["nvec"]), start=np.array(data["start"]))
-
-
-def _multi_binary(data: dict[str, Any]) -> spaces.Space[Any]:
+def _multi_binary(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    if math.prod(np.atleast_1d(np.array(data["n"], dtype=object))) > _LARGEST:
+        raise ValueError(f"expected at most {_LARGEST:,} numbers")
     return spaces.MultiBinary(data["n"])
 
 
-def _box(data: dict[str, Any]) -> spaces.Space[Any]:
-    dtype = np.dtype(data["dtype"])
-    low, high = (np.array(data[end], dtype=dtype) for end in ("low", "high"))
-    return spaces.Box(low, high, dtype=dtype.type)
+def _multi_discrete(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    counts, start = (_numbers(data[name], int).astype(np.int64) for name in ("nvec", "start"))
+    if (counts < 1).any() or counts.shape != start.shape or (start > 2**62).any() or (counts > 2**62).any():
+        raise ValueError("expected numbers of choices of at least 1, and as many starts")
+    return spaces.MultiDiscrete(counts, start=start)
 
 
-_READERS: dict[str, Callable[[dict[str, Any]], spaces.Space[Any]]] = {
-    "agents": _agents,
+def _box(data: Mapping[str, Any]) -> spaces.Space[Any]:
+    dtype: Any = np.dtype(data["dtype"])
+    low, high = (_numbers(data[end], float) for end in ("low", "high"))
+    if low.shape != high.shape or np.isnan(low).any() or np.isnan(high).any() or (low > high).any():
+        raise ValueError("expected low and high of one shape, low at most high")
+    if dtype.kind in "iu":
+        limits = np.iinfo(dtype)
+        if (low < limits.min).any() or (high > limits.max).any():
+            raise ValueError(f"expected bounds that {dtype} can hold")
+    with np.errstate(over="ignore"):  # beyond the dtype's numbers there is no bound
+        return spaces.Box(_cast(low, dtype), _cast(high, dtype), dtype=dtype.type)
+
+
+def _cast(bounds: NDArray[np.float64], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Bounds in a dtype; the greatest whole numbers of 64 bits are none of float64, and round to one too many."""
+    if dtype.kind not in "iu":
+        return bounds.astype(dtype)
+    limits = np.iinfo(dtype)
+    found = np.array([min(int(b), int(limits.max)) for b in bounds.ravel()], dtype=dtype)
+    return found.reshape(bounds.shape)
+
+
+def _numbers(data: Any, kind: type) -> NDArray[Any]:
+    """Nested lists of numbers as an array; `ValueError` where they are none, or lists of several lengths."""
+    kinds = (int,) if kind is int else (int, float)
+    level: list[Any] = [data]
+    while level and isinstance(level[0], list):
+        level = [each for part in level if isinstance(part, list) for each in part]
+    if not all(type(each) in kinds for each in level):
+        raise ValueError("expected numbers in nested lists")
+    found = np.array(data, dtype=np.float64 if kind is float else np.int64)
+    if found.size > _LARGEST:
+        raise ValueError(f"expected at most {_LARGEST:,} numbers")
+    return found
+
+
+_LARGEST: Final = 10_000_000
+"""Most numbers of a space."""
+
+_READERS: dict[str, Callable[[Mapping[str, Any]], spaces.Space[Any]]] = {
+    "agents": _dict,
     "box": _box,
     "dict": _dict,
     "discrete": _discrete,

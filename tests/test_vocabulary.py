@@ -57,12 +57,9 @@ ALLOWED = {
         r"|\bbar\.(add_task|advance|tasks|update|reset|start|stop|console|finished|set_label)"
         r"|\bbar: Progress|^    bar$|\b(panel|axes|ax)\.bar(h)?\(|colour ?bar|color ?bar|bars? of progress"
     ),
-    "block": (
-        r"with`` block|code block|np\.block|[Bb]locks? the way|SIG_BLOCK"
-        r'|\bblock = packer|\bblock \* |\("block",\)'
-    ),
+    "block": r"with`` block|code block|np\.block|[Bb]locks? the way|SIG_BLOCK|\(\"block\",\)",
     "issue": r"/issues",
-    "rival": r'^_KEY = "rivals"|\brivals: list\[|\blaw\.rivals\b',  # a key of model files
+    "rival": r'^_KEY = "rivals"',  # a key of model files
 }
 """Lines on which a word has its ordinary sense, by regular expressions."""
 
@@ -73,6 +70,7 @@ ALLOWED_IN = {
         "relgym/baselines/interaction.py",  # blocks of a matrix
         "relgym/experiments/law_",  # blocks stand in the rooms of other worlds
         "tests/experiments/test_law_worlds.py",
+        "tests/fuzz/make_corpus.py",
         "tests/laws/",
         "tests/wrappers/sb3/test_stock.py",
         "tests/scene/geometry/",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from relgym.envs.views.agents import AgentsView
@@ -39,24 +39,31 @@ def view_from_json(data: Mapping[str, Any]) -> View:
     Raises
     ------
     ModelFileError
-        A kind that this relgym doesn't know, or a view made of functions, which no file can hold.
+        It is no such data, or a view made of functions, which no file can hold.
+    ConfigError
+        Its parts don't fit its spaces.
     """
-    kind = data.get("kind")
-    if kind == "function":
-        raise ModelFileError(
-            "the scenes were made by a function, and a file can't hold one: pass the FunctionView again"
-        )
-    if kind == "task":
-        view = view_from_json(data["view"])
-        return TaskView(view, reward=bool(data["reward"]), terminated=bool(data["terminated"]))
-    if kind not in _READERS:
-        raise ModelFileError(f"unknown kind of view {kind!r}; load the model with the relgym that wrote it")
-    return _READERS[str(kind)](data)
+    from relgym.envs.file_format import ViewRecord
+    from relgym.files.records import checked
+
+    checked(data, ViewRecord, "a view")
+    return _read(data)
 
 
-_READERS: dict[str, Callable[[Mapping[str, Any]], View]] = {
-    "agents": AgentsView.from_json,
-    "flat": NumbersView.from_json,
-    "scene": SceneView.from_json,
-    "table": TableView.from_json,
-}
+def _read(data: Mapping[str, Any]) -> View:
+    match data["kind"]:
+        case "function":
+            raise ModelFileError(
+                "the scenes were made by a function, and a file can't hold one: pass the FunctionView again"
+            )
+        case "task":
+            return TaskView(_read(data["view"]), reward=data["reward"], terminated=data["terminated"])
+        case "agents":
+            return AgentsView.from_json(data)
+        case "agents":
+            return AgentsView.from_json(data)
+        case "flat":
+            return NumbersView.from_json(data)
+        case "table":
+            return TableView.from_json(data)
+    return SceneView.from_json(data)

@@ -20,11 +20,11 @@ from relgym.classification.columns import Column, Columns
 from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabulary, check_example
 from relgym.config import ClassificationConfig
 
-__all__ = ["Exemplars", "dyadic"]
+__all__ = ["COLUMNS", "Exemplars", "dyadic"]
 
 _UNDEFINED: Final = float("nan")
 _MASK64: Final = (1 << 64) - 1
-_COLUMNS: Final = {
+COLUMNS: Final = {
     "table": Column("bool", ("R", "K", "K2")),
     "unary": Column("bool", ("U", "K")),
     "exists": Column("bool", ("K",)),
@@ -41,6 +41,7 @@ _COLUMNS: Final = {
     "values": Column("float64", ("M",), _UNDEFINED),
     "roles": Column("int64", ("P",), -1),
 }
+"""What is kept of every example; see `Exemplars.columns`."""
 
 
 @dataclass(slots=True)
@@ -109,7 +110,7 @@ class Exemplars:
             "A": vocabulary.own,
         }
         sizes = {name: len(names) for name, names in lengths.items()}
-        self.columns = Columns(_COLUMNS, sizes | {"K": 1, "K2": 1, "M": 0, "P": 0})
+        self.columns = Columns(COLUMNS, sizes | {"K": 1, "K2": 1, "M": 0, "P": 0})
         self.version = 0
         self._cells: list[_Cell] = []
         self._index: dict[tuple[int, bytes], int] = {}

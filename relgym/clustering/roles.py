@@ -113,7 +113,7 @@ class Binding:
 
 
 def bind(mode: Mode, signature: SlotSignature) -> Binding | None:
-    """Lay a mode over a signature; None when some role has no object that could play it, or a feature lacks one."""
+    """Lay a mode over a signature; None when some role has no object or column that could play it."""
     by_type = signature.slots_by_type
     if not signature.offers(prop for prop, _ in mode.roles[0].terms):
         return None
@@ -123,7 +123,8 @@ def bind(mode: Mode, signature: SlotSignature) -> Binding | None:
     for role in mode.open_roles:
         slots = by_type.get(role.type, ())
         wanted = sum(r.type == role.type for r in mode.open_roles)
-        if len(slots) < wanted:
+        # Next values of a type are columns only where they were asked for, or where an object is alone of its type.
+        if len(slots) < wanted or not all(signature.has(s, prop) for s in slots for prop, _ in role.terms):
             return None
         if len(slots) == 1:
             forced.append(slots[0])

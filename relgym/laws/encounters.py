@@ -59,6 +59,11 @@ class EncounterStore:
         return len(self._store.rows)
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """Width of a contact's row, and most contacts kept."""
+        return self._store.shape
+
+    @property
     def seen(self) -> int:
         """Number of contacts so far, those no longer kept included."""
         return self._store.seen

@@ -279,6 +279,15 @@ class LawLearner:
         return learner.fit(self.book.tolerance)
 
     # ------------------------------------------------------------------ saving
+    @property
+    def store_shape(self) -> tuple[int, int]:
+        """Width of a stored contact, and most of them that are kept."""
+        return self._store.shape
+
+    def free_shape(self, type_name: str) -> tuple[int, int]:
+        """The same of a type's free examples."""
+        return self._free[type_name].store.shape
+
     def to_json(self, *, history: bool) -> dict[str, Any]:
         """Plain data: the laws; with history all that further learning needs but the examples."""
         data: dict[str, Any] = {

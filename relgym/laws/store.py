@@ -39,6 +39,11 @@ class Store:
         """The rows kept, shape ``(n, width)``."""
         return self._rows[: self._size]
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Width of a row, and most rows kept."""
+        return self._rows.shape[1], self.limit
+
     def add(self, row: NDArray[np.float64], *, cell: int) -> None:
         """Keep a row in a cell."""
         self.seen += 1

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
 
-from relgym.errors import ConfigError, ModelFileError
+from relgym.errors import ConfigError
 
 __all__ = ["ANY", "Clause", "Coverage", "Definition", "Literal"]
 
@@ -99,15 +99,9 @@ class Literal:
 
     @staticmethod
     def from_dict(plain: Mapping[str, Any]) -> Literal:
-        """Inverse of `to_dict`; raises `ModelFileError` if `plain` isn't such a dictionary."""
-        try:
-            args = tuple(int(arg) for arg in plain["args"])
-            negated, threshold = bool(plain.get("negated", False)), float(plain.get("threshold", 0.0))
-            return Literal(str(plain["relation"]), args, negated, plain.get("op"), threshold)
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise ModelFileError(
-                f"Expected a literal as written by Literal.to_dict, got {plain!r}."
-            ) from error
+        """Inverse of `to_dict`."""
+        negated, threshold = plain.get("negated", False), float(plain.get("threshold", 0.0))
+        return Literal(plain["relation"], tuple(plain["args"]), negated, plain.get("op"), threshold)
 
 
 @dataclass(frozen=True)
@@ -196,12 +190,8 @@ class Clause:
 
     @staticmethod
     def from_dict(plain: Mapping[str, Any]) -> Clause:
-        """Inverse of `to_dict`; raises `ModelFileError` if `plain` isn't such a dictionary."""
-        try:
-            literals, arity = plain["literals"], int(plain["arity"])
-            return Clause(tuple(Literal.from_dict(literal) for literal in literals), arity)
-        except (KeyError, TypeError, ConfigError) as error:
-            raise ModelFileError(f"Expected a clause as written by Clause.to_dict, got {plain!r}.") from error
+        """Inverse of `to_dict`."""
+        return Clause(tuple(Literal.from_dict(literal) for literal in plain["literals"]), plain["arity"])
 
 
 def _variables(literals: Iterable[Literal]) -> list[int]:
@@ -313,14 +303,10 @@ class Definition:
 
     @staticmethod
     def from_dict(plain: Mapping[str, Any]) -> Definition:
-        """Inverse of `to_dict`; raises `ModelFileError` if `plain` isn't such a dictionary."""
-        try:
-            arity = int(plain["arity"])
-            clauses = [Clause.from_dict({"arity": arity, "literals": body}) for body in plain["clauses"]]
-            coverage = tuple(Coverage(float(good), float(bad)) for good, bad in plain["coverage"])
-            good, bad = plain["uncovered"]
-            uncovered, bits = Coverage(float(good), float(bad)), float(plain["bits"])
-            return Definition(tuple(clauses), arity, bool(plain["negated"]), coverage, uncovered, bits)
-        except (KeyError, TypeError, ValueError) as error:
-            message = f"Expected a definition as written by Definition.to_dict, got {plain!r}."
-            raise ModelFileError(message) from error
+        """Inverse of `to_dict`."""
+        arity = plain["arity"]
+        clauses = tuple(Clause.from_dict({"arity": arity, "literals": body}) for body in plain["clauses"])
+        coverage = tuple(Coverage(float(good), float(bad)) for good, bad in plain["coverage"])
+        good, bad = plain["uncovered"]
+        uncovered = Coverage(float(good), float(bad))
+        return Definition(clauses, arity, plain["negated"], coverage, uncovered, float(plain["bits"]))

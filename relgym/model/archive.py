@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config import ModelConfig
+from relgym.errors import ModelFileError
+from relgym.files.reading import check_depth
 from relgym.model.parts import Parts
 from relgym.model.storage import schema_from_json, schema_to_json, target_from_json, target_to_json
 
@@ -46,20 +47,39 @@ def parts_to_arrays(parts: Parts) -> _Arrays:
     return arrays
 
 
-def parts_from_json(body: Mapping[str, Any], arrays: Mapping[str, NDArray[np.generic]] | None) -> Parts:
-    """Read what `parts_to_json` and `parts_to_arrays` wrote; without arrays it can only predict."""
-    schema = schema_from_json(body["schema"])
-    targets = [target_from_json(part["target"]) for part in body["targets"]]
-    parts = Parts(schema, ModelConfig.from_json(body["config"]), None if body["open"] else targets)
+def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.generic]] | None) -> Parts:
+    """Read what `parts_to_json` and `parts_to_arrays` wrote; without arrays it can only predict.
+
+    Everything is checked before anything is taken over (`relgym.model.file_format`, `relgym.model.file_checks`).
+
+    Raises
+    ------
+    ModelFileError
+        Something is missing, malformed, out of range, or refers to what isn't there.
+    """
+    # msgspec is loaded with the first file, not with relgym.
+    from relgym.files.records import checked
+    from relgym.model.file_checks import check_body
+    from relgym.model.file_format import Body
+
+    body: Body = checked(data, Body, "the model")
+    try:
+        check_depth(body.extra)
+    except ValueError as error:
+        raise ModelFileError(f"extra: {error}; save the model again with other data") from None
+    schema = schema_from_json(data["schema"])
+    targets = [target_from_json(part["target"]) for part in data["targets"]]
+    parts = Parts(schema, body.config, None if body.open else targets)
     for target in targets if parts.open else ():
         parts.add_target(target)
+    check_body(body, parts, arrays)
     for k, type_name in enumerate(sorted(parts.tables) if arrays is not None else ()):
-        parts.tables[type_name].restore(body["tables"][k], _of(arrays, f"table{k}."), parts.signature_of)
+        parts.tables[type_name].restore(data["tables"][k], _of(arrays, f"table{k}."), parts.signature_of)
     for k, target in enumerate(targets):
-        parts.models[target].restore(body["targets"][k]["model"], _of(arrays, f"target{k}."))
-    parts.looks = [(str(name), str(prop), bool(inert)) for name, prop, inert in body.get("looks", [])]
-    if parts.laws is not None and body["laws"] is not None:
-        parts.laws.restore(body["laws"], _of(arrays, "laws."))
+        parts.models[target].restore(data["targets"][k]["model"], _of(arrays, f"target{k}."))
+    parts.looks = [(name, prop, inert) for name, prop, inert in body.looks]
+    if parts.laws is not None:
+        parts.laws.restore(data["laws"], _of(arrays, "laws."))
     return parts
 
 

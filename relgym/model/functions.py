@@ -104,6 +104,8 @@ class ModeFunctions:
         """
         if mode == NOISE or not self.casting.embodied(self.mode(mode)):
             return np.zeros((len(numbers), 0), dtype=np.int64)
+        if not table.signatures[0].types[0].has_body:  # what has no body stands alone in its examples
+            return np.zeros((len(numbers), 0), dtype=np.int64)
         roles = self.mode(mode).open_roles
         chosen = [k for k, role in enumerate(roles) if role in self.casting.embodied(self.mode(mode))]
         rows, y = self.clusterer.rows[numbers], self.clusterer.y[numbers]

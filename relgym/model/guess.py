@@ -104,7 +104,8 @@ class Guesses:
         """
         (modes, typical_modes), (own, typical) = self.errors.tolist()
         # Squares are compared: so the typical error, itself a square of what is kept, counts to the fourth.
-        gains = own * typical**4 < modes * typical_modes**4
+        # Multiplied, since a power of a number that is too great would be an error, and the product is infinite.
+        gains = own * _fourth(typical) < modes * _fourth(typical_modes)
         return self.best is not None and own < modes and gains
 
     def compare(self, modes: float, own: float) -> None:
@@ -141,10 +142,15 @@ class Guesses:
     def from_json(cls, target: Target, data: dict[str, Any]) -> Guesses:
         """Read what `to_json` wrote."""
         found = cls()
-        if data:
-            found.best, found.beyond = (_read(target, data.get(name)) for name in ("best", "beyond"))
-            found.errors, found._due = np.array(data["errors"], dtype=np.float64), int(data["due"])
+        found.best, found.beyond = (_read(target, data.get(name)) for name in ("best", "beyond"))
+        if "errors" in data:
+            found.errors = np.array(data["errors"], dtype=np.float64)
+        found._due = data.get("due", LEAST)
         return found
+
+
+def _fourth(number: float) -> float:
+    return (number * number) * (number * number)
 
 
 def _read(target: Target, data: list[Any] | None) -> Guess | None:

@@ -121,8 +121,8 @@ class Scope:
         """Read what `to_json` wrote."""
         if not data:
             return EVERYWHERE
-        tree = None if data["tree"] is None else DecisionTree.from_dict(data["tree"])
-        return cls(tree, *(data["reach"] or ()))
+        tree = None if data.get("tree") is None else DecisionTree.from_dict(data["tree"])
+        return cls(tree, *(data.get("reach") or ()))
 
 
 EVERYWHERE: Final = Scope()

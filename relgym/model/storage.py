@@ -1,23 +1,32 @@
-"""Model files: versioned canonical JSON with a checksum, written atomically; with history a zip.
+"""Model files: versioned canonical JSON with a checksum, written whole or not at all; with history a zip.
 
-Nothing is ever unpickled or evaluated.
+Nothing is ever unpickled or evaluated. `relgym.model.file_format` declares what the JSON holds.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import os
-import tempfile
-import zipfile
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ModelFileError
+from relgym.files.reading import (
+    ARCHIVE,
+    FileLimits,
+    check_depth,
+    parse_json,
+    read_arrays,
+    read_bytes,
+    read_members,
+    write_arrays,
+    write_members,
+)
+from relgym.files.writing import write_whole
 from relgym.scene.objects import Kinematics, ObjectType, Target
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
@@ -33,8 +42,11 @@ __all__ = [
     "write_model",
 ]
 
-FORMAT = "relgym-model"
-VERSION = 1
+FORMAT: Final = "relgym-model"
+VERSION: Final = 2
+"""Version 1 had no checksum of the history; its files are still read."""
+
+_TEXT, _HISTORY = "model.json", "history.npz"
 
 _SHAPES: dict[str, type] = {
     "sphere": Sphere,
@@ -46,7 +58,7 @@ _SHAPES: dict[str, type] = {
 
 
 def write_model(
-    path: str | os.PathLike[str], body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None
+    path: str | os.PathLike[str], body: dict[str, Any], arrays: Mapping[str, NDArray[Any]] | None
 ) -> None:
     """Write a model file; a kill at any moment leaves the old or the new file whole.
 
@@ -62,76 +74,84 @@ def write_model(
     Raises
     ------
     ModelFileError
-        There is no such folder, or nothing may be written there.
+        The body isn't plain data, there is no such folder, no space is left, or nothing may be written there.
     """
-    text = _canonical({"format": FORMAT, "version": VERSION, "sha256": _digest(body), "body": body})
-    data = text.encode()
-    if arrays is not None:
-        data = _zipped(data, arrays)
-    target = Path(path)
+    history = None if arrays is None else write_arrays(arrays)
+    digest = None if history is None else hashlib.sha256(history).hexdigest()
     try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    except OSError as error:
+        check_depth(body.get("extra"))
+        whole = {"body": body, "history": digest}
+        text = _canonical({"format": FORMAT, "version": VERSION, "sha256": _digest(whole), **whole}).encode()
+    except (TypeError, ValueError, RecursionError) as error:
         raise ModelFileError(
-            f"{path} can't be written ({error.strerror}): expected a path in a folder that may be written to"
-        ) from error
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())  # a temporary file is its owner's alone; a model need not be
-        if target.is_dir():
-            raise ModelFileError(f"{path} is a folder: expected the path of a file")
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+            f"the model can't be saved: {error}; expected extra to be plain data (numbers, strings, lists, dicts "
+            "with strings as keys) that isn't nested deep"
+        ) from None
+    write_whole(
+        path,
+        text if history is None else write_members({_TEXT: text, _HISTORY: history}),
+        error=ModelFileError,
+    )
 
 
-def read_model(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, NDArray[Any]] | None]:
+def read_model(
+    path: str | os.PathLike[str], limits: FileLimits | None = None
+) -> tuple[dict[str, Any], dict[str, NDArray[Any]] | None]:
     """Read what `write_model` wrote: plain data and arrays (None when saved without history).
+
+    Parameters
+    ----------
+    path
+        The file.
+    limits
+        How much it may ask for; default: those of `FileLimits`.
 
     Raises
     ------
     ModelFileError
-        There is no such file, it isn't a relgym model, is of another version, truncated, or was edited.
+        There is no such file, it isn't a relgym model, is of another version, truncated, too large, or was edited.
     """
+    limits = limits or FileLimits()
+    data = read_bytes(path, limits, error=ModelFileError)
     try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise ModelFileError(
-            f"{path} can't be read ({error.strerror}): expected a file that a model's save has written"
-        ) from error
-    arrays: dict[str, NDArray[Any]] | None = None
-    if data[:2] == b"PK":
-        data, arrays = _unzipped(path, data)
-    try:
-        whole = json.loads(data)
+        history: bytes | None = None
+        if data[:2] == ARCHIVE:
+            members = read_members(data, (_TEXT, _HISTORY))
+            data, history = members[_TEXT], members[_HISTORY]
+        whole = parse_json(data, limits)
     except ValueError as error:
         raise ModelFileError(
-            f"{path}: expected a relgym model (JSON), but it can't be read ({error}); it is truncated or "
-            "another kind of file: save the model again"
+            f"{path}: expected a relgym model, but it can't be read ({error}); it is truncated or another kind of "
+            "file: save the model again"
         ) from None
+    body = _checked(path, whole, history)
+    try:
+        return body, None if history is None else read_arrays(history, limits)
+    except ValueError as error:
+        raise ModelFileError(f"{path}: its history can't be read ({error}); save the model again") from None
+
+
+def _checked(path: str | os.PathLike[str], whole: Any, history: bytes | None) -> dict[str, Any]:
+    """The body of a file of a known version, whose checksum fits."""
     if not isinstance(whole, dict) or whole.get("format") != FORMAT:
         raise ModelFileError(f"{path}: expected a relgym model file, got another kind of JSON")
-    if whole.get("version") != VERSION:
+    version, body = whole.get("version"), whole.get("body")
+    if isinstance(version, bool) or version not in (1, VERSION):
         raise ModelFileError(
-            f"{path}: expected format version {VERSION}, got {whole.get('version')!r}; "
-            "load it with the relgym version that wrote it"
+            f"{path}: expected format version {VERSION} or 1, got {version!r}; load it with the relgym version that "
+            "wrote it"
         )
-    body = whole.get("body")
-    if not isinstance(body, dict) or _digest(body) != whole.get("sha256"):
+    digest = None if history is None else hashlib.sha256(history).hexdigest()
+    content = body if version == 1 else {"body": body, "history": whole.get("history")}
+    try:
+        fits = isinstance(body, dict) and _digest(content) == whole.get("sha256")
+    except (ValueError, RecursionError):
+        fits = False
+    if not isinstance(body, dict) or not fits or (version != 1 and whole.get("history") != digest):
         raise ModelFileError(
             f"{path}: the checksum doesn't match: the file was edited or damaged; save it again"
         )
-    return body, arrays
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    return body
 
 
 def _canonical(data: Any) -> str:
@@ -145,33 +165,11 @@ def _plain(value: Any) -> Any:
     """NumPy's numbers as Python's: users' declarations and records may hold them."""
     if isinstance(value, np.generic):
         return value.item()
-    raise TypeError(f"a model's file can't hold {value!r}: expected plain data")
+    raise TypeError(f"a model's file can't hold {value!r:.200}")
 
 
-def _digest(body: dict[str, Any]) -> str:
-    return hashlib.sha256(_canonical(body).encode()).hexdigest()
-
-
-def _zipped(text: bytes, arrays: dict[str, NDArray[Any]]) -> bytes:
-    buffer, history = io.BytesIO(), io.BytesIO()
-    np.savez_compressed(history, allow_pickle=False, **arrays)
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
-        for name, content in (("model.json", text), ("history.npz", history.getvalue())):
-            archive.writestr(zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0)), content)
-    return buffer.getvalue()
-
-
-def _unzipped(path: str | os.PathLike[str], data: bytes) -> tuple[bytes, dict[str, NDArray[Any]]]:
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            text = archive.read("model.json")
-            with np.load(io.BytesIO(archive.read("history.npz")), allow_pickle=False) as arrays:
-                return text, {name: arrays[name] for name in arrays.files}
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, OSError) as error:
-        raise ModelFileError(
-            f"{path}: expected a relgym model with history, but it can't be read ({error}); "
-            "it is truncated or another kind of zip: save the model again"
-        ) from None
+def _digest(content: Any) -> str:
+    return hashlib.sha256(_canonical(content).encode()).hexdigest()
 
 
 def schema_to_json(schema: SceneSchema) -> dict[str, Any]:

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
-from relgym.errors import ConfigError, ModelFileError, SchemaError
+from relgym.errors import ConfigError, ModelFileError, RelgymError
+from relgym.files.reading import FileLimits
 from relgym.html import html_text
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
@@ -585,38 +586,56 @@ class WorldModel:
 
     def _restore_report(self, data: Mapping[str, Any]) -> None:
         if data:
-            advice = tuple(Advice(**each | {"features": tuple(each["features"])}) for each in data["advice"])
-            self._stored = parse_rules(str(data["rules"])), advice
+            advice = tuple(
+                Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
+            )
+            self._stored = parse_rules(data.get("rules", "")), advice
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
         return parts_to_json(self._parts, history=history) | {"seen": self.seen}
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> WorldModel:
+    def load(cls, path: str | os.PathLike[str], *, limits: FileLimits | None = None) -> WorldModel:
         """Read a model file.
+
+        Parameters
+        ----------
+        path
+            The file.
+        limits
+            How much it may ask for before it is refused; default: those of `FileLimits`. A file is read within them,
+            whoever made it.
 
         Raises
         ------
         ModelFileError
-            Truncated, edited, foreign or of another version.
+            Truncated, edited, foreign, of another version, too large, or inconsistent.
         """
-        return cls.load_with_extra(path)[0]
+        return cls.load_with_extra(path, limits=limits)[0]
 
     @classmethod
-    def load_with_extra(cls, path: str | os.PathLike[str]) -> tuple[WorldModel, dict[str, Any]]:
-        """Read a model file and the caller's data in it."""
-        body, arrays = read_model(path)
+    def load_with_extra(
+        cls, path: str | os.PathLike[str], *, limits: FileLimits | None = None
+    ) -> tuple[WorldModel, dict[str, Any]]:
+        """Read a model file and the caller's data in it; arguments as of `load`."""
+        body, arrays = read_model(path, limits)
+        try:
+            model = cls._restored(body, arrays)
+        except ModelFileError as error:
+            raise ModelFileError(f"{path}: {error}") from None
+        return model, model.extra
+
+    @classmethod
+    def _restored(cls, body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None) -> WorldModel:
+        """The model that a file's body and history stand for; `ModelFileError` unless all of it fits together."""
         try:
             parts = parts_from_json(body, arrays)
-            model = cls(parts.schema, parts.config, targets=())
-            model._parts, model.seen, model.frozen = parts, int(body["seen"]), arrays is None
-            model.extra = dict(body["extra"])
             restore_hindsight(parts, body.get("hindsight", {}))
-            model.condition_names = {str(text): str(name) for text, name in body.get("names", {}).items()}
+            model = cls(parts.schema, parts.config, targets=())
+            model._parts, model.seen, model.frozen = parts, body["seen"], arrays is None
+            model.extra, model.condition_names = body["extra"], dict(body.get("names", {}))
             model._restore_report(body.get("report", {}))
-            return model, model.extra
-        except (KeyError, TypeError, IndexError, ConfigError, SchemaError) as error:
-            raise ModelFileError(
-                f"{path}: a part of the model is missing or malformed ({error!r}); save it again"
-            ) from None
+        except RelgymError as error:
+            raise error if isinstance(error, ModelFileError) else ModelFileError(str(error)) from None
+        return model

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.errors import ConfigError, ModelFileError
+from relgym.errors import ConfigError
 
 __all__ = ["DecisionTree", "learn_tree"]
 
@@ -129,19 +129,8 @@ class DecisionTree:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> DecisionTree:
-        """Tree from `to_dict`; `ModelFileError` when it isn't one."""
-        try:
-            tree = cls(**{name: tuple(data[name]) for name in cls.__slots__})
-        except (KeyError, TypeError) as error:
-            raise ModelFileError(
-                f"a decision tree needs the lists {cls.__slots__}; got {data!r:.200}"
-            ) from error
-        lengths = {len(getattr(tree, name)) for name in cls.__slots__[1:]}
-        if len(lengths) != 1 or any(not -1 <= c < len(tree.columns) for c in tree.column):
-            raise ModelFileError(
-                f"a decision tree's lists must be equally long and name its columns, got {data!r:.200}"
-            )
-        return tree
+        """Tree from `to_dict`."""
+        return cls(**{name: tuple(data[name]) for name in cls.__slots__})
 
 
 def learn_tree(

@@ -57,6 +57,12 @@ def test_the_only_object_of_a_type_is_forced() -> None:
     assert binding.value([3.0, 0.0, 0.25, 1.0]) == 2.5
 
 
+def test_a_role_whose_columns_are_missing_cannot_be_played() -> None:
+    mode = mode_of(("v", 1.0), others=[Role("box", (("friction'", 1.0),))])
+    assert bind(mode, THREE) is None
+    assert bind(mode, SlotSignature((BALL, BOX), given=(("box", "friction"),))) is not None
+
+
 def test_every_object_may_play_an_open_role() -> None:
     binding = bind(mode_of(("v", 1.0), others=[friction(-2.0)]), THREE)
     assert binding is not None

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from logic_worlds import random_clause
 
-from relgym.errors import ConfigError, ModelFileError
+from relgym.errors import ConfigError
 from relgym.logic.clause import ANY, Clause, Coverage, Definition, Literal
 
 
@@ -96,19 +96,3 @@ def test_definitions_survive_json(seed: int, sizes: list[int], negated: bool) ->
     coverage = tuple(Coverage(float(rng.normal()), 0.1) for _ in clauses)
     definition = Definition(clauses, 1, negated, coverage, Coverage(1.0, 2.5), 12.75, work=7)
     assert Definition.from_dict(json.loads(json.dumps(definition.to_dict()))) == definition
-
-
-@pytest.mark.parametrize("plain", [{}, {"relation": "near"}, {"relation": "near", "args": [0, 0]}, None])
-def test_damaged_literals_are_refused(plain: dict[str, object]) -> None:
-    with pytest.raises(ModelFileError, match="literal"):
-        Literal.from_dict(plain)
-
-
-def test_damaged_definitions_are_refused() -> None:
-    plain = Definition((Clause((Literal("red", (0,)),)),)).to_dict()
-    with pytest.raises(ModelFileError, match="definition"):
-        Definition.from_dict({**plain, "uncovered": [1.0]})
-    with pytest.raises(ModelFileError, match="clause"):
-        Clause.from_dict({"literals": []})
-    with pytest.raises(ModelFileError, match="clause"):
-        Clause.from_dict({"arity": 1, "literals": [{"relation": "near", "args": [0, 1], "negated": True}]})

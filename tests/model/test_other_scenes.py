@@ -11,8 +11,9 @@ from relgym.errors import ObservationError
 from relgym.experiments.data import truck_episodes
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ObjectType, Scene
+from relgym.scene.objects import ObjectType, Scene, Target, Transition
 from relgym.scene.schema import SceneSchema
+from relgym.scene.shapes import Box
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +69,21 @@ def test_types_that_differ_are_refused(model: WorldModel) -> None:
     with pytest.raises(ObservationError, match="planar=True instead of"):
         model.predict_one(replace(scene.schema, planar=True).scene(scene.values()))
     assert model.to_json(history=True) == before
+
+
+def test_what_has_no_body_may_read_any_body() -> None:
+    wall, goal = ObjectType("wall", ("px",), Box()), ObjectType("goal", ("ahead",))
+    car = ObjectType("car", ("px", "vx"), Box(), velocity=("vx", None, None))
+    schema = SceneSchema(
+        (wall, car, goal),
+        (("wall", "wall"), ("car", "car"), ("goal", "goal")),
+        targets=(Target("car", "vx"), Target("goal", "ahead", (("car", "vx"),))),
+    )
+    model, rng = WorldModel(schema), np.random.default_rng(0)
+    for v, ahead in rng.normal(size=(40, 2)).tolist():
+        before = schema.scene({"wall": [50.0], "car": [0.0, v], "goal": [ahead]})
+        after = schema.scene({"wall": [50.0], "car": [0.9 * v, 0.9 * v], "goal": [ahead - 0.9 * v]})
+        model.learn_one(Transition(before, after))
+    predicted = model.predict_one(schema.scene({"wall": [50.0], "car": [0.0, 1.0], "goal": [3.0]}))
+    assert predicted.ok
+    assert predicted.scene["goal"]["ahead"] == pytest.approx(2.1)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relgym.errors import ConfigError, ModelFileError
+from relgym.errors import ConfigError
 from relgym.numeric.tree import DecisionTree, learn_tree
 
 NAN = float("nan")
@@ -78,13 +78,6 @@ def test_one_class_gives_a_leaf() -> None:
 def test_unequal_lengths_are_refused() -> None:
     with pytest.raises(ConfigError, match="as many classes and weights as rows"):
         learn_tree(np.zeros((5, 1)), np.ones(4, dtype=bool))
-
-
-@pytest.mark.parametrize("damage", [{"column": [7]}, {"below": [0, 1]}, {"threshold": None}])
-def test_damaged_dictionary_is_refused(damage: dict[str, object]) -> None:
-    data = learn_tree(np.zeros((5, 1)), np.ones(5, dtype=bool)).to_dict()
-    with pytest.raises(ModelFileError, match="decision tree"):
-        DecisionTree.from_dict(data | damage)
 
 
 @settings(max_examples=60, deadline=None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final, Protocol, TypeAlias
 
@@ -13,13 +13,17 @@ from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig, ModelConfig
 from relgym.envs.tasks import RewardFunctions, TaskOutcome
-from relgym.errors import ConfigError, ModelFileError, SchemaError
+from relgym.errors import ConfigError, ModelFileError, RelgymError
+from relgym.files.reading import FileLimits
+from relgym.files.records import checked
 from relgym.model.prediction import BatchPrediction
+from relgym.model.scenes import mismatch
 from relgym.model.storage import schema_from_json, schema_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, ObjectType, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.sb3.acting import acting_all
+from relgym.wrappers.sb3.file_format import RewardModelBody
 
 __all__ = ["Acting", "LearnedRewardModel", "NeuralModel", "NeuralRewardModel", "RewardModel", "check_rewards"]
 
@@ -155,7 +159,13 @@ class LearnedRewardModel(RewardFunctions):
         self.model.save(path, history=True, extra={**self.model.extra, _FILE: data})
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], *, acting: Acting | None = None) -> LearnedRewardModel:
+    def load(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        acting: Acting | None = None,
+        limits: FileLimits | None = None,
+    ) -> LearnedRewardModel:
         """Read what `save` wrote; evaluating and learning go on as if it had never been saved.
 
         Parameters
@@ -164,34 +174,58 @@ class LearnedRewardModel(RewardFunctions):
             The file.
         acting
             As of the class: functions aren't part of the file.
+        limits
+            How much the file may ask for; default: those of `FileLimits`.
 
         Raises
         ------
         ModelFileError
             Not the file of a reward model, a damaged one, or one of another version.
         """
-        model, extra = WorldModel.load_with_extra(path)
+        model, extra = WorldModel.load_with_extra(path, limits=limits)
         if _FILE not in extra:
             raise ModelFileError(
                 f"{path} holds a model but no learned task: expected what LearnedRewardModel.save wrote"
             )
-        data = extra[_FILE]
         try:
-            reward_model = cls(
-                schema_from_json(data["schema"]), {(t, p) for t, p in data["changing"]}, acting=acting
+            reward_model = cls._restored(
+                checked(extra[_FILE], RewardModelBody, "the learned task"), extra[_FILE], model
             )
-            reward_model._ends.extend(map(np.array, data["ends"]))
-            reward_model._latest.extend(map(np.array, data["latest"]))
-            reward_model._earlier.extend(map(np.array, data["earlier"]))
-            reward_model._passed, reward_model._rng.bit_generator.state = int(data["passed"]), data["rng"]
-            reward_model._together = {(int(r), int(e)) for r, e in data["together"]}
-            seen, modes = data["reviewed"]
-            reward_model._reviewed = (int(seen), tuple(modes))
-        except (KeyError, TypeError, ValueError, SchemaError) as error:
-            raise ModelFileError(
-                f"{path}: a part of the learned task is missing or malformed ({error!r}); save it again"
-            ) from None
-        reward_model.model, model.extra = model, {name: part for name, part in extra.items() if name != _FILE}
+        except RelgymError as error:
+            raise ModelFileError(f"{path}: {error}") from None
+        reward_model._acting = acting
+        model.extra = {name: part for name, part in extra.items() if name != _FILE}
+        return reward_model
+
+    @classmethod
+    def _restored(
+        cls, body: RewardModelBody, data: Mapping[str, Any], model: WorldModel
+    ) -> LearnedRewardModel:
+        """What a file holds of it, taken over once all of it is known to fit together."""
+        schema = schema_from_json(data["schema"])
+        for name, prop in body.changing:
+            if prop not in schema.type(name).properties:
+                raise ModelFileError(f"type {name!r} has no property {prop!r} that could change")
+        reward_model = cls(schema, set(body.changing))
+        if (difference := mismatch(reward_model.model.schema, model.schema)) or model.frozen:
+            raise ModelFileError(f"its model is of another world: {difference or 'it has no history'}")
+        width = model.schema.layout().width
+        if model.schema.layout() != reward_model.model.schema.layout() or set(model.targets) != set(
+            reward_model.model.targets
+        ):
+            raise ModelFileError("its model is of another world: other objects or targets")
+        for each in (*body.ends, *body.latest, *body.earlier):
+            if len(each) != width:
+                raise ModelFileError(f"a remembered step has {len(each)} numbers, expected {width}")
+        reward_model._ends.extend(map(np.array, body.ends))
+        reward_model._latest.extend(map(np.array, body.latest))
+        reward_model._earlier.extend(map(np.array, body.earlier))
+        reward_model._passed, reward_model._rng.bit_generator.state = body.passed, data["rng"]
+        reward_model._together, reward_model._reviewed = (
+            set(body.together),
+            (body.reviewed[0], tuple(body.reviewed[1])),
+        )
+        reward_model.model = model
         return reward_model
 
     def _small_schema(self) -> SceneSchema:

@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
-import json
 import os
-import tempfile
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
+
+from msgspec import Meta
 
 from relgym.errors import StoreError
 from relgym.experiments.jobs.task import Task, canonical
+from relgym.files.reading import FileLimits, parse_json, read_bytes
+from relgym.files.records import Amount, Record, checked
+from relgym.files.writing import write_whole
 
 __all__ = ["Result", "ResultStore", "write_atomically"]
 
 _FORMAT: Final = 1
+
+
+class Entry(Record):
+    """The declared format of a kept result: `digest` is that of the first four fields, `task` is for people."""
+
+    format: Literal[1]
+    key: Annotated[str, Meta(min_length=1, max_length=200)]
+    seconds: Amount
+    value: Any
+    digest: Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+    task: Any = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,21 +73,17 @@ class ResultStore:
             The file is damaged, or holds another task's result.
         """
         path = self.path(task)
-        try:
-            text = path.read_text(encoding="utf-8")
-        except FileNotFoundError:
+        if not path.exists():
             return None
-        except (OSError, UnicodeDecodeError) as error:
-            raise _damaged(path, str(error)) from error
         try:
-            entry = json.loads(text)
-            body = {name: entry[name] for name in ("format", "key", "seconds", "value")}
-            digest = entry["digest"]
-        except (ValueError, KeyError, TypeError) as error:
-            raise _damaged(path, f"not an entry of the store ({error})") from error
-        if digest != _digest(body) or body["format"] != _FORMAT or body["key"] != task.key:
+            data = parse_json(read_bytes(path, FileLimits(), error=StoreError), FileLimits())
+            entry: Entry = checked(data, Entry, "the entry", error=StoreError)
+        except (ValueError, StoreError) as error:
+            raise _damaged(path, str(error)) from error
+        body = {name: data[name] for name in ("format", "key", "seconds", "value")}
+        if entry.digest != _digest(body) or entry.key != task.key:
             raise _damaged(path, "its checksum doesn't fit its content")
-        return Result(body["value"], float(body["seconds"]))
+        return Result(entry.value, entry.seconds)
 
     def put(self, task: Task, result: Result) -> None:
         """Keep the result of a task.
@@ -100,28 +108,13 @@ def write_atomically(path: Path, data: bytes) -> None:
     StoreError
         It can't be written: no space left, no permission; the old file, if any, is untouched.
     """
-    temporary = ""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o644)  # a temporary file is its owner's alone; a result need not be
-        os.replace(temporary, path)
     except OSError as error:
-        raise StoreError(_why(path, error)) from error
-    finally:
-        if temporary:
-            with suppress(FileNotFoundError):
-                os.unlink(temporary)
-
-
-def _why(path: Path, error: OSError) -> str:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return f"{path}: no space left to keep a result; free some and run the same command again: it resumes"
-    return f"{path}: can't be written ({error.strerror or error}); choose another folder with --out"
+        raise StoreError(
+            f"{path.parent}: can't be made ({error.strerror or error}); choose another folder with --out"
+        ) from error
+    write_whole(path, data, error=StoreError)
 
 
 def _damaged(path: Path, why: str) -> StoreError:

@@ -93,5 +93,5 @@ def test_files_hold_no_functions() -> None:
         view_from_json(TaskView(view).to_json())
     with pytest.raises(ConfigError, match="pass inverse="):
         seeing({"paddle": [1.0]}).observation(view.scene(None))
-    with pytest.raises(ModelFileError, match="unknown kind of view 'oracle'"):
+    with pytest.raises(ModelFileError, match=r"Invalid value 'oracle' - at `\$\.kind`"):
         view_from_json({"kind": "oracle"})

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
+from file_mutations import Mutator
 from gymnasium import spaces
 
 import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
 from relgym.envs.scripted import ball_home, push_knowing
 from relgym.errors import ConfigError, ModelFileError
+from relgym.model.storage import read_model, write_model
 from relgym.scene.objects import ObjectType, Target, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
@@ -193,8 +196,32 @@ def test_other_files_are_no_learned_task(tmp_path: Path) -> None:
         LearnedRewardModel.load(tmp_path / "world.relgym")
     reward_model = LearnedRewardModel(schema, MOVING)
     reward_model.model.save(tmp_path / "half.relgym", history=True, extra={"learned_task": {"ends": []}})
-    with pytest.raises(ModelFileError, match="a part of the learned task is missing or malformed"):
+    with pytest.raises(ModelFileError, match="the learned task isn't as the format says"):
         LearnedRewardModel.load(tmp_path / "half.relgym")
+
+
+def test_changed_files_are_refused_or_work(rng: np.random.Generator, tmp_path: Path) -> None:
+    """Every change has the checksum that goes with it (`tests/fuzz` does the same to models)."""
+    steps = pushes(80, 0.9, rng)
+    reward_model = LearnedRewardModel(steps[0].start.schema, MOVING)
+    for step in steps[:60]:
+        reward_model.learn_step(step.transition, step.reward, terminated=step.terminated)
+    path = tmp_path / "task.relgym"
+    reward_model.save(path)
+    body, arrays = read_model(path)
+    mutator, accepted, changes = Mutator(body["extra"]["learned_task"], None, random.Random(0)), 0, 150
+    for _ in range(changes):
+        data, _ = mutator.draw()
+        write_model(path, {**body, "extra": {"learned_task": data}}, arrays)
+        try:
+            again = LearnedRewardModel.load(path)
+        except ModelFileError:
+            continue
+        accepted += 1
+        for step in steps[60:]:
+            again.learn_step(step.transition, step.reward, terminated=step.terminated)
+        again.save(path)
+    assert 5 < accepted < changes - 5
 
 
 def test_dreams_are_evaluated_by_what_was_learned(rng: np.random.Generator) -> None:
