@@ -31,6 +31,7 @@ def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
         **({"looks": [list(look) for look in parts.looks]} if history and parts.looks else {}),
         "tables": [parts.tables[name].to_json() for name in sorted(parts.tables)] if history else [],
         "laws": None if parts.laws is None else parts.laws.to_json(history=history),
+        **({"screen": parts.screen.to_json()} if history else {}),
     }
 
 
@@ -58,6 +59,8 @@ def parts_from_json(body: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     for k, target in enumerate(targets):
         parts.models[target].restore(body["targets"][k]["model"], _of(arrays, f"target{k}."))
     parts.looks = [(str(name), str(prop), bool(inert)) for name, prop, inert in body.get("looks", [])]
+    if "screen" in body:
+        parts.screen.restore(body["screen"])
     if parts.laws is not None and body["laws"] is not None:
         parts.laws.restore(body["laws"], _of(arrays, "laws."))
     return parts

@@ -30,10 +30,13 @@ class LearnReport:
         Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice.
     work
         Deterministic units of work spent on re-learning classifiers.
+    set_aside
+        Whether the transition held a gross error and wasn't learned from (`relgym.model.screening`).
     """
 
     parts: dict[tuple[str, str], ClusterReport]
     work: int
+    set_aside: bool = False
 
     @property
     def changed(self) -> bool:

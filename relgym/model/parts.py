@@ -18,8 +18,10 @@ from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch, stays
+from relgym.model.screening import Screen
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
+from relgym.scene.sizes import check_sizes
 
 __all__ = ["Parts"]
 
@@ -52,6 +54,8 @@ class Parts:
         Laws of motion; None with ``frames="world"``.
     looks
         Targets to be looked at for laws with next values, one in a step.
+    screen
+        Tells gross errors in observations, which aren't learned from.
     """
 
     def __init__(self, schema: SceneSchema, config: ModelConfig, targets: Sequence[Target] | None) -> None:
@@ -73,6 +77,7 @@ class Parts:
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}
         self.looks: list[Look] = []
+        self.screen = Screen()
         self.laws: Laws | None = None
         if config.frames == "auto":
             self.laws = Laws(schema, None if targets is None else tuple(targets), config)
@@ -85,7 +90,10 @@ class Parts:
         return self.__dict__ | {"_kin": {}, "_known": {}}  # keyed by identity, which a copy doesn't share
 
     def check(self, scene: Scene) -> None:
-        """Raise `ObservationError` for NaN, infinity, what is no scene, or one of another schema."""
+        """Raise `ObservationError` for NaN, infinity, what is no scene, or one of another schema.
+
+        `ShapeError` where a body can't be: an extent isn't positive, or a sphere isn't round.
+        """
         if not isinstance(scene, Scene):
             raise ObservationError(
                 f"expected a Scene, got {type(scene).__name__}; of an observation and an action a learner's "
@@ -102,6 +110,7 @@ class Parts:
             self._kin[id(schema)] = schema  # kept alive, so that its id stays its own
         if not np.isfinite(scene.vector).all():
             schema.scene(scene.values())  # raises, naming object and property
+        check_sizes(scene)
 
     def checked_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """State vectors as contiguous float64; `ObservationError` for other types or width, NaN or infinity."""

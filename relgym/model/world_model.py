@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -23,12 +24,15 @@ from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
-from relgym.model.scenes import with_action
+from relgym.model.scenes import next_values, with_action
 from relgym.model.storage import read_model, write_model
 from relgym.scene.objects import Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LearnReport", "WorldModel", "with_action"]
+
+_OVERFLOWS = 1e30
+"""Products of several numbers as large as this may be infinite."""
 
 
 class WorldModel:
@@ -128,11 +132,16 @@ class WorldModel:
         ------
         ObservationError
             NaN or infinity somewhere, or another schema; the model is unchanged.
+        ShapeError
+            A body can't be: an extent isn't positive, or a sphere isn't round; the model is unchanged.
         ModelFileError
             The model was loaded without its history and can't go on learning.
 
         Notes
         -----
+        A transition in which a number is far larger than all that is known of its property is set aside, and counted in
+        `set_aside`, not in `seen` (`relgym.model.screening`).
+
         Cost: relations once, then per target O(modes); searches and re-learning when an example is news.
         """
         self._parts.check(transition.before)
@@ -142,9 +151,18 @@ class WorldModel:
                 "this model was loaded without its history and can only predict; "
                 "save it with save(path, history=True) to go on learning"
             )
-        report = learn(self._parts, self._perceive(transition.before), transition)
+        before = transition.before
+        following = next_values(before, transition.after)
+        if not self._parts.screen.admits(before.layout, before.vector, following):
+            return LearnReport({}, 0, set_aside=True)
+        report = learn(self._parts, self._perceive(before), transition)
         self.seen += 1
         return report
+
+    @property
+    def set_aside(self) -> int:
+        """Number of transitions that held a gross error and weren't learned from."""
+        return self._parts.screen.set_aside
 
     def look_back(
         self,
@@ -167,7 +185,11 @@ class WorldModel:
         precision
             Relative precision of what was observed (`View.precision`); of numbers below 1 it is absolute.
         """
-        look_back(self._parts, prediction, residuals, precision)
+        scene = prediction.scene
+        said = {(part.object, part.property): part.value for part in prediction.parts}
+        observed = scene.replace({key: said[key] + off for key, off in residuals.items() if key in said})
+        if all(self._parts.screen.plausible(scene.layout, vector) for vector in (scene.vector, observed.vector)):
+            look_back(self._parts, prediction, residuals, precision)
 
     def merge(self, other: WorldModel) -> None:
         """Take up all that another model of the same world remembers, as if this one had seen it too.
@@ -234,7 +256,13 @@ class WorldModel:
             NaN or infinity somewhere, or another schema.
         """
         self._parts.check(scene)
-        return predict(self._parts, self._perceive(scene), scene)
+        with self._calm(scene.vector):
+            return predict(self._parts, self._perceive(scene), scene)
+
+    def _calm(self, vectors: NDArray[np.float64]) -> AbstractContextManager[None]:
+        """Where numbers are so large that what is worked out from them may overflow, that needs no warning."""
+        largest = float(np.abs(vectors).max(initial=0.0))
+        return nullcontext() if largest < _OVERFLOWS else np.errstate(over="ignore", invalid="ignore")
 
     def predict_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> BatchPrediction:
         """Predict what follows n scenes with the same objects; bit for bit what `predict_one` gives.
@@ -247,8 +275,9 @@ class WorldModel:
             State vectors, shape ``(n, layout.width)``.
         """
         vectors = self._parts.checked_batch(layout, vectors)
-        percept = self._parts.perception.percept(layout, vectors)
-        return predict_many(self._parts, percept, layout, vectors)
+        with self._calm(vectors):
+            percept = self._parts.perception.percept(layout, vectors)
+            return predict_many(self._parts, percept, layout, vectors)
 
     def rollout(
         self, scene: Scene, steps: int, actions: Sequence[Sequence[float]] | NDArray[np.float64] | None = None
@@ -309,7 +338,8 @@ class WorldModel:
         """Why this prediction: mode, function, roles, clause and rival of every target."""
         from relgym.model.explain import explain
 
-        return explain(self, scene)
+        with self._calm(scene.vector):
+            return explain(self, scene)
 
     def percept(self, scene: Scene) -> Percept:
         """What the learners see of a scene."""
