@@ -159,7 +159,7 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
         return action
     try:
         array = np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ActionError(f"expected numbers of shape {space.shape}, got {action!r}") from None
     slack = 1e-6 * np.maximum(1.0, np.abs(space.high))
     if array.shape != space.shape or not np.all((array >= space.low - slack) & (array <= space.high + slack)):
@@ -193,7 +193,7 @@ def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:
         return array
     try:
         array = np.asarray(actions, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ActionError(f"expected numbers of shape {(count, *space.shape)}, got {actions!r}") from None
     if array.shape != (count, *space.shape):
         raise ActionError(f"expected actions of shape {(count, *space.shape)}, got shape {array.shape}")

@@ -175,6 +175,6 @@ def readable(space: spaces.Space[Any], action: Any) -> Any:
             return None
     try:
         array = np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return array if array.shape == space.shape and np.isfinite(array).all() else None

@@ -207,7 +207,7 @@ class TableView:
     def _checked(self, observation: Any) -> Float2D:
         try:
             table = np.asarray(observation, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ObservationError(f"expected a table of numbers, got {observation!r}") from None
         if table.shape != self._space.shape:
             raise ObservationError(

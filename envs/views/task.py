@@ -160,7 +160,7 @@ def _told(targets: Sequence[Target], names: Sequence[str]) -> tuple[Target, ...]
 def _number(reward: Any) -> float:
     try:
         numbers = np.asarray(reward, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = np.empty(0)
     if numbers.size != 1 or not np.isfinite(numbers).all():
         raise ObservationError(

@@ -23,17 +23,22 @@ __all__ = ["Screen"]
 FACTOR = 32.0
 """A number this much larger than what is known of its property is suspicious."""
 
-SUPPORT = 3
-"""So many numbers as large must have come for a magnitude to be known: one outlier never widens the limit."""
+START, GENEROUS = 16, 1e6
+"""In its first scenes little is known of a property: only what is this much larger than all that is known is suspicious,
+or than 1."""
+
+SUPPORT = 5
+"""So many numbers as large must have come for a magnitude to be known: one or two outliers, each of which is seen after
+one step and before the next one, don't widen the limit."""
 
 LATEST, ALIKE, NEAR = 64, 16, 4.0
 """Of so many suspicious numbers of a property so many within this factor of one another are no errors."""
 
-REPEATED = 3
+REPEATED = 5
 """... nor are so many that are exactly equal: rewards, codes."""
 
 RUN = 8
-"""... nor so many in successive scenes: another scale."""
+"""... nor so many in successive transitions: another scale."""
 
 MOST = 1e100
 """Larger numbers are always set aside: their squares may overflow."""
@@ -49,21 +54,22 @@ class Screen:
 
     Notes
     -----
-    Cost O(numbers) a scene. The magnitude of a property is the third largest that came; where a property was zero so
-    far, the median magnitude of all others stands in for it.
+    Cost O(numbers) a scene. The magnitude of a property is the fifth largest that came, at least the median magnitude of
+    all properties; where one was zero so far, the largest magnitude of all others stands in for it.
     """
 
     def __init__(self) -> None:
         self.set_aside = 0
         self._names: dict[tuple[str, str], int] = {}
         self._largest = np.zeros((0, SUPPORT))  # largest magnitudes, ascending
+        self._scenes = np.zeros(0, dtype=np.int64)  # scenes in which a property was seen, up to START
         self._waiting: dict[int, list[float]] = {}  # suspicious numbers, the latest last
-        self._run: dict[int, int] = {}  # successive scenes with a suspicious number
+        self._run: dict[int, int] = {}  # successive transitions with a suspicious number
         self._limits: NDArray[np.float64] | None = None
         self._columns: dict[int, tuple[SceneLayout, NDArray[np.intp]]] = {}
 
     def admits(self, layout: SceneLayout, before: NDArray[np.float64], after: NDArray[np.float64]) -> bool:
-        """Whether to learn from a transition; takes note of its first scene's numbers, and counts what is set aside.
+        """Whether to learn from a transition; takes note of its numbers, and counts what is set aside.
 
         Parameters
         ----------
@@ -73,16 +79,21 @@ class Screen:
             State vectors, shape ``(layout.width,)``.
         """
         places = self._places(layout)
-        now, then = np.abs(before), np.abs(after)
+        sizes = np.maximum(np.abs(before), np.abs(after))
         limits = self._limit()[places]
-        if (now <= limits).all():
+        if (sizes <= limits).all():
             self._run.clear()
         else:
-            self._suspect(places, before, now > limits)
+            self._suspect(places, np.where(np.abs(before) < np.abs(after), after, before), sizes > limits)
             limits = self._limit()[places]
-        fine = now <= limits
-        self._note(places[fine], now[fine])
-        if fine.all() and (then <= limits).all():
+        for vector in (before, after):
+            fine = np.abs(vector) <= limits
+            self._note(places[fine], np.abs(vector[fine]))
+        young = np.unique(places[self._scenes[places] < START])
+        if len(young):
+            self._scenes[young] += 1
+            self._limits = None
+        if (sizes <= limits).all():
             return True
         self.set_aside += 1
         return False
@@ -106,6 +117,7 @@ class Screen:
         missing = len(self._names) - len(self._largest)
         if missing:
             self._largest = np.pad(self._largest, ((0, missing), (0, 0)))
+            self._scenes = np.pad(self._scenes, (0, missing))
             self._limits = None
 
     def _limit(self) -> NDArray[np.float64]:
@@ -113,8 +125,11 @@ class Screen:
             known = self._largest[:, 0]
             some = known[known > 0.0]
             if not len(some):
-                return np.full(len(known), MOST)
-            self._limits = np.minimum(FACTOR * np.maximum(known, np.median(some)), MOST)
+                return np.full(len(known), GENEROUS)
+            most = float(some.max())
+            limits = FACTOR * np.where(known > 0.0, np.maximum(known, np.median(some)), most)
+            limits[self._scenes < START] = GENEROUS * max(most, 1.0)
+            self._limits = np.minimum(limits, MOST)
         return self._limits
 
     def _note(self, places: NDArray[np.intp], sizes: NDArray[np.float64]) -> None:
@@ -141,7 +156,7 @@ class Screen:
             size = abs(value)
             alike = sum(size / NEAR <= abs(other) <= size * NEAR for other in waiting)
             if alike >= ALIKE or waiting.count(value) >= REPEATED or self._run[place] >= RUN:
-                self._largest[place] = size
+                self._largest[place] = size  # known, as if so many had come
                 self._limits = None
                 del self._waiting[place], self._run[place]
 
@@ -152,6 +167,7 @@ class Screen:
             self._widen()
             both = np.concatenate([self._largest[place], other._largest[theirs]])
             self._largest[place] = np.sort(both)[-SUPPORT:]
+            self._scenes[place] = min(START, int(self._scenes[place] + other._scenes[theirs]))
         self._limits = None
         self.set_aside += other.set_aside
 
@@ -164,7 +180,7 @@ class Screen:
         return {
             "set_aside": self.set_aside,
             "properties": [
-                [*pair, self._largest[k].tolist(), self._waiting.get(k, []), self._run.get(k, 0)]
+                [*pair, int(self._scenes[k]), self._largest[k].tolist(), self._waiting.get(k, []), self._run.get(k, 0)]
                 for pair, k in self._names.items()
             ],
         }
@@ -174,7 +190,8 @@ class Screen:
         rows = data["properties"]
         self.set_aside = int(data["set_aside"])
         self._names = {(str(row[0]), str(row[1])): k for k, row in enumerate(rows)}
-        self._largest = np.array([row[2] for row in rows], dtype=np.float64).reshape(len(rows), SUPPORT)
-        self._waiting = {k: [float(v) for v in row[3]] for k, row in enumerate(rows) if row[3]}
-        self._run = {k: int(row[4]) for k, row in enumerate(rows) if row[4]}
+        self._largest = np.array([row[3] for row in rows], dtype=np.float64).reshape(len(rows), SUPPORT)
+        self._scenes = np.array([row[2] for row in rows], dtype=np.int64)
+        self._waiting = {k: [float(v) for v in row[4]] for k, row in enumerate(rows) if row[4]}
+        self._run = {k: int(row[5]) for k, row in enumerate(rows) if row[5]}
         self._limits, self._columns = None, {}

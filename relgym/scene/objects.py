@@ -144,7 +144,7 @@ class Scene:
     def __init__(self, schema: SceneSchema, layout: SceneLayout, vector: Float1D) -> None:
         try:
             vector = np.asarray(vector, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ObservationError(f"expected {layout.width} numbers, got {vector!r}") from None
         if vector.shape != (layout.width,):
             raise ObservationError(

@@ -183,7 +183,7 @@ class SceneSchema:
 def _checked(name: str, t: ObjectType, values: Sequence[float] | Float1D) -> Float1D:
     try:
         array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ObservationError(
             f"object {name!r} of type {t.name!r}: expected {len(t.properties)} numbers {t.properties}, got {values!r}"
         ) from None
@@ -192,7 +192,7 @@ def _checked(name: str, t: ObjectType, values: Sequence[float] | Float1D) -> Flo
             f"object {name!r} of type {t.name!r}: expected {len(t.properties)} properties {t.properties}, "
             f"got an array of shape {array.shape}"
         )
-    if not math.isfinite(array.sum()):
+    if not np.isfinite(array).all():
         for prop, value in zip(t.properties, array, strict=True):
             if not math.isfinite(value):
                 raise ObservationError(
