@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import reprlib
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, TypeAlias
@@ -20,6 +21,7 @@ from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "Coefficient",
+    "action_numbers",
     "check_options",
     "checked_action",
     "checked_actions",
@@ -219,9 +221,21 @@ def checked_mask(mask: Any, count: int) -> NDArray[np.bool_]:
     return mask
 
 
+def action_numbers(action: Any, count: int | None = None) -> Float1D:
+    """An action's numbers, shape ``(count,)``; `ActionError` where they are none, not finite, or not as many."""
+    try:
+        array = np.asarray(action, dtype=np.float64).ravel()
+    except (TypeError, ValueError, OverflowError):
+        raise ActionError(f"expected the numbers of an action, got {reprlib.repr(action)}") from None
+    if (count is not None and len(array) != count) or not np.isfinite(array).all():
+        said = "" if count is None else f"{count} "
+        raise ActionError(f"expected an action of {said}finite numbers, got {reprlib.repr(action)}")
+    return array
+
+
 def physical_action(schema: SceneSchema, action: Any) -> Float1D:
     """Properties of the action object for an action in [-1, 1]: what the schema's affine maps make of it."""
-    array = np.asarray(action, dtype=np.float64).ravel()
+    array = action_numbers(action, len(schema.action_scale))
     return np.array(
         [
             low + (u + 1.0) / 2.0 * (high - low)

@@ -15,14 +15,15 @@ from pathlib import Path
 import pytest
 from source_tree import FOLDERS, ROOT, Import, Module, modules, room_of
 
-FOUNDATION = frozenset({"errors", "config"})
+FOUNDATION = frozenset({"errors", "arguments", "config"})
 ROOMS = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ROOMS | {"clustering", "classification", "laws"}
 CORE = LEARNERS | {"model"}
 
 MAY_IMPORT = {
     "errors": frozenset(),
-    "config": frozenset({"errors"}),
+    "arguments": frozenset({"errors"}),
+    "config": frozenset({"errors", "arguments"}),
     "scene": FOUNDATION,
     "numeric": FOUNDATION,
     "logic": FOUNDATION,

@@ -7,6 +7,8 @@ from typing import Any, SupportsFloat
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
+from relgym.arguments import refusing
+from relgym.errors import ConfigError
 from relgym.envs.arguments import checked_count, refuse_vector_env
 
 __all__ = ["Glimpses"]
@@ -33,6 +35,7 @@ class Glimpses(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     An episode counts from its reset on. Where resets are dear, this isn't for you.
     """
 
+    @refusing(ConfigError)
     def __init__(self, env: gym.Env[Any, Any], steps: int, whole: int = 5) -> None:
         refuse_vector_env(env)
         self.steps = checked_count("steps", steps, 1, 10**9)

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from relgym.arguments import refusing
+from relgym.errors import ConfigError, ObservationError
 from relgym.envs.arguments import checked_count
 from relgym.model.hindsight import WRONG
 from relgym.model.prediction import ScenePrediction
@@ -70,12 +72,14 @@ class Prequential:
     ({('ball', 'vx'): 2}, {('ball', 'vx'): 1}, 0.5)
     """
 
+    @refusing(ConfigError)
     def __init__(self, window: int = 1000) -> None:
         self.steps = 0
         self.predictions: dict[Key, int] = {}
         self.wrong: dict[Key, int] = {}
         self._window: deque[tuple[Key, ...]] = deque(maxlen=checked_count("window", window, 1, 10**9))
 
+    @refusing(ObservationError)
     def count(self, predicted: Iterable[Key], wrong: Iterable[Key]) -> None:
         """Take in one step: what was predicted, and which of that was wrong."""
         self.steps += 1

@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import checked_action
+from relgym.envs.arguments import checked_action, checked_function
 from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
@@ -98,7 +98,10 @@ def chosen_view(
     elif isinstance(given, Mapping):
         view = view_from_json(given)
     else:
-        view = given(observation_space, action_space) if callable(given) else given
+        makes = callable(given) and getattr(given, "__module__", "") != "builtins"
+        if makes:
+            checked_function("view", given, "observation_space", "action_space")
+        view = given(observation_space, action_space) if makes else given
     if not isinstance(view, View):
         raise ConfigError(
             f"view={given!r}: expected a view (NumbersView, TableView, FunctionView, ...), or a function of "

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from relgym.arguments import refusing
 from relgym.envs.views.base import View
 from relgym.envs.views.numeric import NumbersView
 from relgym.errors import ConfigError, ObservationError
@@ -39,6 +40,7 @@ class TaskView:
         The view's scenes have an object `task` already.
     """
 
+    @refusing(ConfigError)
     def __init__(self, view: View, *, reward: bool = True, terminated: bool = True) -> None:
         if TASK in view.schema.order:
             raise ConfigError(

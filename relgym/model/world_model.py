@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing, whole
 from relgym.config import ModelConfig
-from relgym.errors import ConfigError, ModelFileError, SchemaError
+from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, SchemaError
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
@@ -26,7 +27,7 @@ from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.scenes import next_values, with_action
 from relgym.model.storage import read_model, write_model
-from relgym.scene.objects import Scene, SceneLayout, Target, Transition
+from relgym.scene.objects import ACTION, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LearnReport", "WorldModel", "with_action"]
@@ -65,6 +66,7 @@ class WorldModel:
     1.5
     """
 
+    @refusing(ConfigError)
     def __init__(
         self,
         schema: SceneSchema,
@@ -112,14 +114,17 @@ class WorldModel:
         """Number of examples remembered of the type that has most; see `ModelConfig.history`."""
         return max((len(table) for table in self._parts.tables.values()), default=0)
 
+    @refusing(QueryError)
     def property_model(self, type_name: str, prop: str) -> PropertyModel:
         """The model of one target; `QueryError` when there is none."""
         return self._parts.property_model(type_name, prop)
 
+    @refusing(QueryError)
     def modes(self, type_name: str, prop: str) -> tuple[Any, ...]:
         """Modes of one target, by id; `QueryError` when it is none."""
         return self.property_model(type_name, prop).modes
 
+    @refusing(ObservationError)
     def learn_one(self, transition: Transition) -> LearnReport:
         """Take up one transition.
 
@@ -164,6 +169,7 @@ class WorldModel:
         """Number of transitions that held a gross error and weren't learned from."""
         return self._parts.screen.set_aside
 
+    @refusing(ObservationError)
     def look_back(
         self,
         prediction: ScenePrediction,
@@ -191,6 +197,7 @@ class WorldModel:
         if all(self._parts.screen.plausible(scene.layout, vector) for vector in (scene.vector, observed.vector)):
             look_back(self._parts, prediction, residuals, precision)
 
+    @refusing(ConfigError)
     def merge(self, other: WorldModel) -> None:
         """Take up all that another model of the same world remembers, as if this one had seen it too.
 
@@ -237,6 +244,7 @@ class WorldModel:
         """Names of the types whose velocity laws of motion predict at present."""
         return frozenset() if self._parts.laws is None else self._parts.laws.governed
 
+    @refusing(QueryError)
     def governs(self, target: Target) -> bool:
         """Whether laws of motion, not modes, predict a target: they describe its transitions in fewer bits."""
         return self._parts.governs(target)
@@ -247,6 +255,7 @@ class WorldModel:
             self._percept = (scene, self._parts.perception.percept(scene.layout, scene.vector[None]))
         return self._percept[1]
 
+    @refusing(ObservationError)
     def predict_one(self, scene: Scene) -> ScenePrediction:
         """Predict the scene that follows (Figure 1.5, §3.6).
 
@@ -264,6 +273,7 @@ class WorldModel:
         largest = float(np.abs(vectors).max(initial=0.0))
         return nullcontext() if largest < _OVERFLOWS else np.errstate(over="ignore", invalid="ignore")
 
+    @refusing(ObservationError)
     def predict_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> BatchPrediction:
         """Predict what follows n scenes with the same objects; bit for bit what `predict_one` gives.
 
@@ -279,6 +289,7 @@ class WorldModel:
             percept = self._parts.perception.percept(layout, vectors)
             return predict_many(self._parts, percept, layout, vectors)
 
+    @refusing(ObservationError)
     def rollout(
         self, scene: Scene, steps: int, actions: Sequence[Sequence[float]] | NDArray[np.float64] | None = None
     ) -> list[ScenePrediction]:
@@ -300,6 +311,11 @@ class WorldModel:
         """
         if steps < 1:
             raise ConfigError(f"steps must be at least 1, got {steps}")
+        if actions is not None:
+            given = np.asarray(actions, dtype=np.float64)
+            width = len(scene.layout.types[scene.layout.index(ACTION)].properties)
+            if given.ndim != 2 or len(given) < steps or given.shape[1] != width:
+                raise ObservationError(f"actions: expected shape ({steps}, {width}), got {given.shape}")
         predictions: list[ScenePrediction] = []
         for k in range(steps):
             if actions is not None:
@@ -310,6 +326,7 @@ class WorldModel:
             scene = predictions[-1].scene
         return predictions
 
+    @refusing(ConfigError)
     def describe(
         self, *, digits: int = 7, frame: str | None = None, incline: float | Sequence[float] = (0.0, 90.0)
     ) -> str:
@@ -320,10 +337,14 @@ class WorldModel:
         """
         from relgym.model.report import describe
 
+        digits = whole("digits", digits, 1, 18, ConfigError)
         return describe(self, digits=digits, frame=frame, incline=incline)
 
+    @refusing(QueryError)
     def law_lines(self, scene: Scene, index: int, digits: int = 7) -> tuple[str, ...]:
         """What laws of motion say of an object: its free law, then every contact, a line each."""
+        index = whole("index", index, 0, len(scene), QueryError)
+        digits = whole("digits", digits, 1, 18, ConfigError)
         laws = self._parts.laws
         return () if laws is None else laws.lines(self._perceive(scene), index, digits)
 
@@ -334,6 +355,7 @@ class WorldModel:
         """
         return advices(self._parts)
 
+    @refusing(ObservationError)
     def explain(self, scene: Scene) -> str:
         """Why this prediction: mode, function, roles, clause and rival of every target."""
         from relgym.model.explain import explain
@@ -341,14 +363,17 @@ class WorldModel:
         with self._calm(scene.vector):
             return explain(self, scene)
 
+    @refusing(ObservationError)
     def percept(self, scene: Scene) -> Percept:
         """What the learners see of a scene."""
         return self._perceive(scene)
 
+    @refusing(QueryError)
     def situation(self, scene: Scene, index: int) -> Situation:
         """How the object with this index is situated in a scene."""
-        return self._perceive(scene).situation(index)
+        return self._perceive(scene).situation(whole("index", index, 0, len(scene), QueryError))
 
+    @refusing(ConfigError)
     def save(
         self, path: str | os.PathLike[str], *, history: bool = False, extra: dict[str, Any] | None = None
     ) -> None:
@@ -397,6 +422,7 @@ class WorldModel:
         return cls.load_with_extra(path)[0]
 
     @classmethod
+    @refusing(ConfigError)
     def load_with_extra(cls, path: str | os.PathLike[str]) -> tuple[WorldModel, dict[str, Any]]:
         """Read a model file and the caller's data in it."""
         body, arrays = read_model(path)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from relgym.arguments import refusing, refusing_fields
 from relgym.errors import ObservationError, QueryError, SchemaError
 from relgym.scene.objects import Scene, SceneLayout
 from relgym.scene.types import Float1D, Kinematics, ObjectType, Target
@@ -17,6 +18,7 @@ from relgym.scene.types import Float1D, Kinematics, ObjectType, Target
 __all__ = ["SceneSchema"]
 
 
+@refusing_fields(SchemaError)
 @dataclass(frozen=True)
 class SceneSchema:
     """Everything about a family of scenes that never changes while an env lives (design §4).
@@ -121,6 +123,7 @@ class SceneSchema:
         """Object names in the order of the state vector."""
         return tuple(name for name, _ in self.objects)
 
+    @refusing(QueryError)
     def type(self, name: str) -> ObjectType:
         """Return the type of that name; `QueryError` when there is none."""
         try:
@@ -144,6 +147,7 @@ class SceneSchema:
             chain.append(known.parent)
         return tuple(chain)
 
+    @refusing(ObservationError)
     def layout(self, names: Iterable[str] | None = None) -> SceneLayout:
         """Layout of a scene with these objects (default: all), in schema order; cached."""
         given = self.order if names is None else tuple(names)
@@ -160,6 +164,7 @@ class SceneSchema:
         self._layouts[given] = layout
         return layout
 
+    @refusing(ObservationError)
     def scene(self, values: Mapping[str, Any]) -> Scene:
         """Build a scene from ``{object name: property vector}``, checking lengths and finiteness.
 
