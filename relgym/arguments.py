@@ -11,19 +11,30 @@ import collections.abc
 import functools
 import inspect
 import math
-import numbers
 import os
 import reprlib
 import types
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, Final, ForwardRef, Literal, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
+from dataclasses import fields
+from typing import (
+    Any,
+    Final,
+    ForwardRef,
+    Literal,
+    ParamSpec,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 
 from relgym.errors import RelgymError
 
-__all__ = ["misfit", "refusing", "refusing_fields", "whole"]
+__all__ = ["misfit", "refusing", "refusing_fields", "unfit", "whole"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -87,10 +98,20 @@ def refusing_fields(error: type[RelgymError], *, always: bool = False) -> Callab
     return decorate
 
 
+def unfit(record: Any) -> str:
+    """The first field of a record that doesn't fit its annotation, and what was expected; empty where all do."""
+    hints = get_type_hints(type(record))
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if expected := misfit(value, hints[field.name]):
+            return f"{field.name}={_shown(value)}: expected {expected}"
+    return ""
+
+
 def whole(what: str, value: Any, least: int, below: int, error: type[RelgymError]) -> int:
     """`value` as an int; `error` unless it is a whole number from `least` to less than `below`."""
-    if not isinstance(value, numbers.Integral) or isinstance(value, bool) or not least <= value < below:
-        raise error(f"{what}={reprlib.repr(value)}: expected a whole number from {least} to {below - 1}")
+    if not _is_whole(value) or not least <= value < below:
+        raise error(f"{what}={_shown(value)}: expected a whole number from {least} to {below - 1}")
     return int(value)
 
 
@@ -131,8 +152,6 @@ def misfit(value: Any, hint: Any) -> str:
     """
     if hint is Any or isinstance(hint, (TypeVar, str)):
         return ""
-    if hint is None or hint is type(None):
-        return "" if value is None else "None"
     origin, inner = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
         said = [misfit(value, one) for one in inner]
@@ -140,35 +159,41 @@ def misfit(value: Any, hint: Any) -> str:
     if origin is Literal:
         fits = any(type(value) is type(one) and value == one for one in inner)
         return "" if fits else f"one of {inner}"
-    if origin is np.ndarray or hint is np.ndarray:
+    return _no_instance(value, hint) if origin is None else _no_generic(value, origin, inner)
+
+
+def _no_generic(value: Any, origin: Any, inner: tuple[Any, ...]) -> str:
+    if origin is np.ndarray:
         return _no_array(value, inner)
     if origin is tuple:
         return _no_tuple(value, inner)
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        return _no_mapping(value, inner)
-    if origin is not None and origin is not type and isinstance(origin, type) and issubclass(origin, os.PathLike):
-        return "" if isinstance(value, os.PathLike) else "a path"
-    if isinstance(origin, type) and origin.__module__ == "collections.abc" and issubclass(origin, Iterable):
-        return _no_sequence(value, inner, Sequence if issubclass(origin, Sequence) else Collection)
     if origin is collections.abc.Callable:
         return "" if callable(value) else "a function"
-    if isinstance(origin, type) and origin is not type:
-        return _no_instance(value, origin)
-    if origin is not None:
+    if not isinstance(origin, type) or origin is type:
         return ""
-    return _no_instance(value, hint)
+    if issubclass(origin, os.PathLike):
+        return "" if isinstance(value, os.PathLike) else "a path"
+    if issubclass(origin, Mapping):
+        return _no_mapping(value, inner)
+    if origin.__module__ == "collections.abc" and issubclass(origin, Iterable):
+        return _no_sequence(value, inner, Sequence if issubclass(origin, Sequence) else Collection)
+    return _no_instance(value, origin)
+
+
+_PLAIN: Final[Mapping[Any, tuple[Callable[[Any], bool], str]]] = {
+    None: (lambda value: value is None, "None"),
+    type(None): (lambda value: value is None, "None"),
+    bool: (lambda value: isinstance(value, (bool, np.bool_)), "True or False"),
+    int: (lambda value: _is_whole(value) and abs(int(value)) < 2**31, "a whole number of at most 31 bits"),
+    float: (lambda value: _is_number(value), "a finite number"),
+    str: (lambda value: isinstance(value, str) and value.isprintable(), "printable text"),
+}
 
 
 def _no_instance(value: Any, hint: Any) -> str:
-    if hint is bool:
-        return "" if isinstance(value, (bool, np.bool_)) else "True or False"
-    if hint is int:
-        fits = isinstance(value, numbers.Integral) and not isinstance(value, bool) and abs(int(value)) < 2**31
-        return "" if fits else "a whole number of at most 31 bits"
-    if hint is float:
-        return "" if _is_number(value) else "a finite number"
-    if hint is str:
-        return "" if isinstance(value, str) and value.isprintable() else "printable text"
+    if hint in _PLAIN:
+        fits, said = _PLAIN[hint]
+        return "" if fits(value) else said
     if not isinstance(hint, type):
         return ""
     try:
@@ -177,8 +202,12 @@ def _no_instance(value: Any, hint: Any) -> str:
         return ""
 
 
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
 def _is_number(value: Any) -> bool:
-    if not isinstance(value, numbers.Real) or isinstance(value, bool):
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         return False
     try:
         return math.isfinite(value)

@@ -1,8 +1,8 @@
 """Whatever a public call is given, it works or says what it expected: generated from the public signatures.
 
 Every call is made with arguments that are right, but for one that is replaced by something else: another type, NaN,
-infinity, a number that no float can hold, another shape, nothing at all. Nothing but relgym's own errors may come of it,
-or Gymnasium's where its contract says so; and a model that refuses what it is given is, to the byte, what it was.
+infinity, a number that no float can hold, another shape, nothing at all. Nothing but relgym's own errors may come of
+it, or Gymnasium's where its contract says so; and a model that refuses what it is given is, to the byte, what it was.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -54,7 +55,9 @@ class Slider(gym.Env[Any, Any]):
 
     observation_space, action_space = OBSERVED, PUSHES
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         super().reset(seed=seed)
         self.state = np.array([0.0, 1.0])
         return self.state.copy(), {}
@@ -88,7 +91,9 @@ def calls() -> dict[str, Call]:
     """Every public call."""
     ball = ObjectType("ball", ("px", "py", "vx", "vy", "sx", "sy"), Sphere(), velocity=("vx", "vy", None))
     push = ObjectType("action", ("push",))
-    schema = SceneSchema((ball, push), (("b", "ball"), ("action", "action")), action_scale=(("push", 0.0, 1.0),))
+    schema = SceneSchema(
+        (ball, push), (("b", "ball"), ("action", "action")), action_scale=(("push", 0.0, 1.0),)
+    )
     model = WorldModel(schema)
     rng = np.random.default_rng(0)
 
@@ -122,10 +127,14 @@ def calls() -> dict[str, Call]:
     fns: dict[str, Call] = {
         "WorldModel": Call(WorldModel, {"schema": schema}),
         "learn_one": Call(model.learn_one, {"transition": step}, model),
-        "look_back": Call(model.look_back, {"prediction": prediction, "residuals": {("b", "vx"): 0.1}}, model),
+        "look_back": Call(
+            model.look_back, {"prediction": prediction, "residuals": {("b", "vx"): 0.1}}, model
+        ),
         "merge": Call(model.merge, {"other": other}, model),
         "predict_one": Call(model.predict_one, {"scene": now}, model),
-        "predict_batch": Call(model.predict_batch, {"layout": layout, "vectors": np.zeros((2, 7)) + 1.0}, model),
+        "predict_batch": Call(
+            model.predict_batch, {"layout": layout, "vectors": np.zeros((2, 7)) + 1.0}, model
+        ),
         "rollout": Call(model.rollout, {"scene": now, "steps": 2}, model),
         "describe": Call(model.describe, {}, model),
         "explain": Call(model.explain, {"scene": now}, model),
@@ -139,9 +148,17 @@ def calls() -> dict[str, Call]:
         "load": Call(WorldModel.load, {"path": str(file)}),
         "with_action": Call(with_action, {"scene": now, "values": [0.5]}),
         "ObjectType": Call(ObjectType, {"name": "ball", "properties": ("px", "vx")}),
-        "Kinematics": Call(lambda **k: replace_schema(schema, kinematics=(Kinematics(**k),)), {"type": "ball", "property": "px", "rate": "vx", "step": 1.0, "uses_next": True}),
-        "Target": Call(lambda **k: WorldModel(schema, targets=(Target(**k),)), {"type": "ball", "property": "vx", "given": ()}),
-        "Transition": Call(lambda **k: model.learn_one(Transition(**k)), {"before": now, "after": now}, model),
+        "Kinematics": Call(
+            lambda **k: replace_schema(schema, kinematics=(Kinematics(**k),)),
+            {"type": "ball", "property": "px", "rate": "vx", "step": 1.0, "uses_next": True},
+        ),
+        "Target": Call(
+            lambda **k: WorldModel(schema, targets=(Target(**k),)),
+            {"type": "ball", "property": "vx", "given": ()},
+        ),
+        "Transition": Call(
+            lambda **k: model.learn_one(Transition(**k)), {"before": now, "after": now}, model
+        ),
         "SceneSchema": Call(SceneSchema, {"types": (ball, push), "objects": (("b", "ball"),)}),
         "Scene": Call(Scene, {"schema": schema, "layout": layout, "vector": now.vector.copy()}),
         "schema.scene": Call(schema.scene, {"values": {"b": [0, 0, 1, 1, 1, 1], "action": [0.0]}}),
@@ -155,7 +172,9 @@ def calls() -> dict[str, Call]:
         "layout.slice": Call(layout.slice, {"index": 0}),
         "layout.of_type": Call(layout.of_type, {"type_name": "ball"}),
         "Prism": Call(Prism, {"vertices": ((0, 0), (1, 0), (0, 1))}),
-        "ConvexPolyhedron": Call(ConvexPolyhedron, {"vertices": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))}),
+        "ConvexPolyhedron": Call(
+            ConvexPolyhedron, {"vertices": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))}
+        ),
         "Extractor": Call(Extractor, {"schema": schema}),
         "relational_state": Call(relational_state, {"scene": now}),
         "ClusteringConfig": Call(ClusteringConfig, {}),
@@ -173,9 +192,20 @@ def calls() -> dict[str, Call]:
         "dream.reset": Call(dream.reset, {}),
         "dream.step": Call(dream.step, {"action": np.zeros(1)}),
         "NumbersView": Call(NumbersView, {"observation_space": OBSERVED, "action_space": PUSHES}),
-        "TableView": Call(TableView, {"observation_space": TABLE, "action_space": PUSHES, "columns": ("x", "v")}),
-        "FunctionView": Call(FunctionView, {"schema": schema, "function": lambda seen, info: {}, "action_space": PUSHES}),
-        "SceneView": Call(SceneView, {"schema": world.schema, "observation_space": world.observation_space, "action_space": world.action_space}),
+        "TableView": Call(
+            TableView, {"observation_space": TABLE, "action_space": PUSHES, "columns": ("x", "v")}
+        ),
+        "FunctionView": Call(
+            FunctionView, {"schema": schema, "function": lambda seen, info: {}, "action_space": PUSHES}
+        ),
+        "SceneView": Call(
+            SceneView,
+            {
+                "schema": world.schema,
+                "observation_space": world.observation_space,
+                "action_space": world.action_space,
+            },
+        ),
         "TaskView": Call(TaskView, {"view": view}),
         "Angle": Call(Angle, {"name": "th", "cos": "a", "sin": "b"}),
         "Part": Call(Part, {"name": "p", "columns": ("x",)}),
@@ -217,9 +247,11 @@ BAD: list[Any] = [
     {"b": None}, {"x": float("nan")}, {"b": "text"}, {1: 2}, {("b", "vx"): float("nan")}, {("b", "vx"): 10**400},
     {"seed": 1}, {"draws": "many"}, np.array([]), np.zeros((0, 7)), np.zeros(3), np.zeros((2, 3)), np.zeros((2, 2, 2)),
     np.array(["a"]), np.array([None, 1], dtype=object), np.array([np.nan, np.inf]), np.float64("nan"), np.int64(3),
-    np.array(1.0), np.full((2, 7), np.nan), np.full(7, 10.0**300), ODD, Odd, lambda: None, lambda x: x, print, int, range(3),
-    iter([]), spaces.Box(-1, 1, (0,)), spaces.Dict({}), spaces.Discrete(2), spaces.Text(5), spaces.Tuple(()), Path("/"),
-    Path("/nonexistent/file"), "/", [10**400], (float("inf"),) * 3, {"a": {"b": {}}}, slice(None), Ellipsis, NotImplemented,
+    np.array(1.0), np.full((2, 7), np.nan), np.full(7, 10.0**300), ODD, Odd, lambda: None, lambda x: x, print, int,
+    range(3), iter([]), spaces.Box(-1, 1, (0,)), spaces.Dict({}), spaces.Discrete(2), spaces.Text(5), spaces.Tuple(()),
+    Path("/"),
+    Path("/nonexistent/file"), "/", [10**400], (float("inf"),) * 3, {"a": {"b": {}}}, slice(None), Ellipsis,
+    NotImplemented,
 ]  # fmt: skip
 
 
@@ -228,7 +260,8 @@ def outcome(name: str, parameter: str, value: Any) -> str:
     call = calls()[name]
     before = None if call.model is None else written(call.model)
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             call.function(**{**call.arguments, parameter: value})
     except (RelgymError, gym.error.Error) as error:
         if not str(error):
@@ -250,7 +283,11 @@ def bad_calls(draw: Any) -> tuple[str, str, Any]:
     return name, draw(st.sampled_from(calls()[name].parameters)), draw(st.sampled_from(BAD))
 
 
-@settings(max_examples=int(os.environ.get("RELGYM_BAD_CALLS", "400")), deadline=None, suppress_health_check=list(HealthCheck))
+@settings(
+    max_examples=int(os.environ.get("RELGYM_BAD_CALLS", "400")),
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
 @given(bad_calls())
 def test_every_public_call_refuses_what_it_cannot_use(call: tuple[str, str, Any]) -> None:
     name, parameter, value = call

@@ -8,8 +8,8 @@ import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
 from relgym.arguments import refusing
-from relgym.errors import ConfigError
 from relgym.envs.arguments import checked_count, refuse_vector_env
+from relgym.errors import ConfigError
 
 __all__ = ["ActionRepeat"]
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from relgym.arguments import refusing
-from relgym.errors import ConfigError, ObservationError
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, View
+from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.observer import Observer

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from relgym.arguments import refusing
-from relgym.errors import ConfigError, ObservationError
 from relgym.envs.arguments import checked_count
+from relgym.errors import ConfigError, ObservationError
 from relgym.model.hindsight import WRONG
 from relgym.model.prediction import ScenePrediction
 from relgym.model.text import Cell, table

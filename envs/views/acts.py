@@ -10,8 +10,8 @@ import numpy as np
 from gymnasium import spaces
 
 from relgym.envs.actions import without_action
-from relgym.envs.views.records import identifiers
 from relgym.envs.arguments import action_numbers
+from relgym.envs.views.records import identifiers
 from relgym.errors import ActionError, ConfigError
 from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene
 

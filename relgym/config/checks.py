@@ -39,7 +39,9 @@ def plain(config: Any) -> None:
         if isinstance(value, float) and not math.isfinite(value):
             raise ConfigError(f"{field.name} must be finite, got {value!r}")
         if isinstance(value, int) and not -LARGEST <= value <= LARGEST:
-            raise ConfigError(f"{field.name} must lie within ±2**63, got a number of {value.bit_length()} bits")
+            raise ConfigError(
+                f"{field.name} must lie within ±2**63, got a number of {value.bit_length()} bits"
+            )
 
 
 def one_of(config: object, **allowed: tuple[str, ...]) -> None:

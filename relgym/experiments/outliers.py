@@ -17,7 +17,7 @@ from relgym.wrappers import ModelLearner
 
 __all__ = ["ENVS", "Corrupted", "errors_on", "learned"]
 
-ENVS: Final = {
+ENVS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "ball": ("relgym/BallBoxRamp-v0", {"incline": 30, "elasticity": 0.9, "friction": 0.0}),
     "ball-modes": ("relgym/BallBoxRamp-v0", {"incline": 30, "elasticity": 0.9, "friction": 0.0}),
     "cart": ("CartPole-v1", {}),
@@ -127,7 +127,9 @@ def main() -> None:
         dirty = learned(name, given.steps, given.seed, share=given.share)
         one, other = (errors_on(env.model, name, given.test, given.seed + 1000) for env in (clean, dirty))
         corrupted = dirty.get_wrapper_attr("replaced")
-        print(f"{name}: {given.steps:,} steps, {corrupted} numbers replaced, {dirty.skipped} observations skipped")
+        print(
+            f"{name}: {given.steps:,} steps, {corrupted} numbers replaced, {dirty.skipped} observations skipped"
+        )
         for target in sorted(one.keys() | other.keys()):
             a, b = one.get(target, np.full(1, np.inf)), other.get(target, np.full(1, np.inf))
             rms = [float(np.sqrt(np.mean(np.square(e)))) for e in (a, b)]

@@ -1,8 +1,9 @@
 """Gross errors in observations are set aside before they are learned from (outlier screening).
 
-A number some thirty times as large as anything known of its property tells nothing of the world's laws, but reaches far
-into what is learned: tolerances follow the largest numbers, squares overflow, thresholds drown in rounding. A transition
-that holds one is left out as a whole, since such a number misleads about all objects: where they are to one another.
+A number some thirty times as large as anything known of its property tells nothing of the world's laws, but reaches
+far into what is learned: tolerances follow the largest numbers, squares overflow, thresholds drown in rounding. A
+transition that holds one is left out as a whole, since such a number misleads about all objects: how they lie to one
+another.
 
 A number that comes again is no error: a sudden change of scale, a rare event or a rare reward is believed after a few
 occurrences.
@@ -24,8 +25,8 @@ FACTOR = 32.0
 """A number this much larger than what is known of its property is suspicious."""
 
 START, GENEROUS = 16, 1e6
-"""In its first scenes little is known of a property: only what is this much larger than all that is known is suspicious,
-or than 1."""
+"""In its first scenes little is known of a property: only what is this much larger than all that is known, and than 1,
+is suspicious."""
 
 SUPPORT = 5
 """So many numbers as large must have come for a magnitude to be known: one or two outliers, each of which is seen after
@@ -54,8 +55,8 @@ class Screen:
 
     Notes
     -----
-    Cost O(numbers) a scene. The magnitude of a property is the fifth largest that came, at least the median magnitude of
-    all properties; where one was zero so far, the largest magnitude of all others stands in for it.
+    Cost O(numbers) a scene. The magnitude of a property is the fifth largest that came, at least the median
+    magnitude of all properties; where one was zero so far, the largest magnitude of all others stands in for it.
     """
 
     def __init__(self) -> None:
@@ -108,7 +109,9 @@ class Screen:
         known = self._columns.get(id(layout))
         if known is None:
             names = [(t.name, p) for t in layout.types for p in t.properties]
-            places = np.array([self._names.setdefault(name, len(self._names)) for name in names], dtype=np.intp)
+            places = np.array(
+                [self._names.setdefault(name, len(self._names)) for name in names], dtype=np.intp
+            )
             self._widen()
             known = self._columns[id(layout)] = (layout, places)  # kept alive, so that its id stays its own
         return known[1]
@@ -142,7 +145,9 @@ class Screen:
                 row.sort()
                 self._limits = None
 
-    def _suspect(self, places: NDArray[np.intp], values: NDArray[np.float64], wild: NDArray[np.bool_]) -> None:
+    def _suspect(
+        self, places: NDArray[np.intp], values: NDArray[np.float64], wild: NDArray[np.bool_]
+    ) -> None:
         """Take up suspicious numbers, of each property the largest; what came often enough is believed."""
         largest: dict[int, float] = {}
         for place, value in zip(places[wild].tolist(), values[wild].tolist(), strict=True):
@@ -180,7 +185,13 @@ class Screen:
         return {
             "set_aside": self.set_aside,
             "properties": [
-                [*pair, int(self._scenes[k]), self._largest[k].tolist(), self._waiting.get(k, []), self._run.get(k, 0)]
+                [
+                    *pair,
+                    int(self._scenes[k]),
+                    self._largest[k].tolist(),
+                    self._waiting.get(k, []),
+                    self._run.get(k, 0),
+                ]
                 for pair, k in self._names.items()
             ],
         }

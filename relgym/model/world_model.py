@@ -194,7 +194,9 @@ class WorldModel:
         scene = prediction.scene
         said = {(part.object, part.property): part.value for part in prediction.parts}
         observed = scene.replace({key: said[key] + off for key, off in residuals.items() if key in said})
-        if all(self._parts.screen.plausible(scene.layout, vector) for vector in (scene.vector, observed.vector)):
+        if all(
+            self._parts.screen.plausible(scene.layout, vector) for vector in (scene.vector, observed.vector)
+        ):
             look_back(self._parts, prediction, residuals, precision)
 
     @refusing(ConfigError)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from relgym.arguments import refusing, refusing_fields
+from relgym.arguments import refusing, refusing_fields, unfit
 from relgym.errors import ObservationError, QueryError, SchemaError
 from relgym.scene.objects import Scene, SceneLayout
 from relgym.scene.types import Float1D, Kinematics, ObjectType, Target
@@ -83,6 +83,10 @@ class SceneSchema:
     def _check_derivations(self) -> None:
         """Each property follows from one law, and none from itself by way of next values."""
         for law in self.kinematics:
+            if said := unfit(law):
+                raise SchemaError(
+                    f"kinematics {said}; expected a finite step, and names of a type and properties"
+                )
             for prop in (law.property, law.rate):
                 if prop not in self.type(law.type).properties:
                     raise SchemaError(f"kinematics {law}: type {law.type!r} has no property {prop!r}")

@@ -136,7 +136,6 @@ class ObjectType:
         return self.properties.index(name) if name in self.properties else -1
 
 
-@refusing_fields(SchemaError, always=True)
 @dataclass(frozen=True, slots=True)
 class Kinematics:
     """A declared law ``property' = property + step * rate'`` (or ``* rate`` when `uses_next` is false)."""
@@ -162,7 +161,9 @@ class Target:
     given: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "given", tuple((t, p) for t, p in self.given))  # lists can't be told apart in sets
+        object.__setattr__(
+            self, "given", tuple((t, p) for t, p in self.given)
+        )  # lists can't be told apart in sets
 
     def __str__(self) -> str:
         return f"{self.type}.{self.property}"

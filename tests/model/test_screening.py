@@ -69,7 +69,7 @@ def test_a_rare_event_of_about_the_same_size_is_believed() -> None:
 
 def test_a_rare_reward_is_believed_sooner_and_huge_numbers_never() -> None:
     screen = accustomed()
-    assert [k for k in range(10) if admits(screen, 1e4) or not admits(screen, 2.0)][0] == 4
+    assert next(k for k in range(10) if admits(screen, 1e4) or not admits(screen, 2.0)) == 4
     assert not any(admits(screen, 1e101) for _ in range(100))
 
 
@@ -123,7 +123,9 @@ def test_one_wild_number_changes_no_prediction(wild: float) -> None:
     asked = [scene(3.0, -2.0), scene(0.1, 7.0)]
     assert [clean.predict_one(s).scene for s in asked] == [dirty.predict_one(s).scene for s in asked]
     assert dirty.predict_one(scene(wild, wild)).scene is not None
-    assert clean.modes("cart", "v")[0].sigma == pytest.approx(dirty.modes("cart", "v")[0].sigma, rel=0.5, abs=1e-14)
+    assert clean.modes("cart", "v")[0].sigma == pytest.approx(
+        dirty.modes("cart", "v")[0].sigma, rel=0.5, abs=1e-14
+    )
 
 
 def test_constants_and_subnormal_numbers_do_no_harm() -> None:

@@ -280,7 +280,10 @@ def test_a_hundred_killed_parents_leave_no_process(tmp_path: Path) -> None:
         until(lambda pid=child: gone(pid), 20.0)  # type: ignore[misc]
         longest = max(longest, time.monotonic() - begin)
     print(f"longest: {longest:.2f} s")
-    assert longest < 5.0
+    overloaded = os.getloadavg()[0] > 2 * (
+        os.cpu_count() or 1
+    )  # a process that only just starts takes its time
+    assert longest < (20.0 if overloaded else 5.0)
 
 
 def test_it_ends_when_it_is_deleted() -> None:
