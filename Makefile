@@ -27,7 +27,7 @@ dyna: $(DYNA)    ## agents that train in what they have learned, beside SAC (ins
 	$(BIN)/relgym dyna
 
 dyna-full: $(SB3) ## all that dreaming is worth, hours; resumes where it was stopped, writes docs/results/dream.md
-	$(BIN)/python -m relgym.experiments.dyna_bars --jobs 2 --page docs/results/dream.md
+	$(BIN)/python -m relgym.experiments.dyna_benchmarks --jobs 2 --page docs/results/dream.md
 
 reproduce: $(DEV) ## the thesis' tables and figures again, the fast way; writes docs/results.md
 	$(BIN)/relgym reproduce all --batches 2 --fast --page docs/results.md

@@ -21,7 +21,7 @@ _HOMES = {
     "Task": "relgym.envs.tasks",
     "TruckPushEnv": "relgym.envs.truck_push",
     "drawn_from": "relgym.envs.learned_model_starts",
-    "in_batches": "relgym.envs.learned_model_judges",
+    "in_batches": "relgym.envs.learned_model_rewards",
     "render_scene": "relgym.envs.rendering",
 }
 """Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""

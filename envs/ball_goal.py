@@ -15,7 +15,7 @@ from relgym.envs.ball_course import course_options, draw_course, rest_places
 from relgym.envs.ball_env import BallEnv, body_values
 from relgym.envs.flat import FlatSpec
 from relgym.envs.physics import TIME_STEP
-from relgym.envs.tasks import Judgement, Region, Task, column_of
+from relgym.envs.tasks import Region, Task, TaskOutcome, column_of
 from relgym.errors import ConfigError
 from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene, SceneLayout, Target
 
@@ -61,11 +61,11 @@ class GoalTask(Task):
         inside = (np.abs(dx) <= self.half_width) & (np.abs(dy) <= self.half_height)
         return np.where(inside, held + 1.0, 0.0)
 
-    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
-        """Judge n steps; see `Task.judge`."""
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
+        """Evaluate n steps; see `Task.evaluate`."""
         far, near = (_distance(layout, vectors) for vectors in (before, after))
         succeeded = column_of(layout, "goal", "held", after) >= self.hold
-        return Judgement(far - near - 0.004 + 2.0 * succeeded, succeeded, succeeded)
+        return TaskOutcome(far - near - 0.004 + 2.0 * succeeded, succeeded, succeeded)
 
     def regions(self, scene: Scene) -> tuple[Region, ...]:
         """Where the ball's centre is to be."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.arguments import checked_action, checked_options
 from relgym.envs.flat import FlatSpec
-from relgym.envs.tasks import Judgement, Task
+from relgym.envs.tasks import Task, TaskOutcome
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import ACTION, POSE, Float1D, Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
@@ -88,7 +88,7 @@ class SceneEnv(gym.Env[Observation, Any]):
     schema : SceneSchema
         Constant for the env's life; wrapped envs give it with ``env.get_wrapper_attr("schema")``.
     task : Task or None
-        Reward and termination as pure functions, by which dreams can be judged too.
+        Reward and termination as pure functions, by which dreams can be evaluated too.
     flat_spec : FlatSpec
         What flat views of the env show unless told otherwise.
     """
@@ -154,8 +154,8 @@ class SceneEnv(gym.Env[Observation, Any]):
             self.render()
         if self.task is None:
             return self._observation(), 0.0, False, self._late(), self._info()
-        verdict = self.task.judge(self._layout, before[None], np.asarray(checked)[None], after[None])
-        return self._judged(verdict)
+        verdict = self.task.evaluate(self._layout, before[None], np.asarray(checked)[None], after[None])
+        return self._evaluated(verdict)
 
     def render(self) -> Any:
         """Draw the scene: as an array of shape (height, width, 3), or in a window for ``"human"``."""
@@ -267,7 +267,7 @@ class SceneEnv(gym.Env[Observation, Any]):
 
     # --- helpers --------------------------------------------------------------------------------------------
 
-    def _judged(self, verdict: Judgement) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def _evaluated(self, verdict: TaskOutcome) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         success = bool(verdict.succeeded[0])
         info = {**self._info(), "is_success": success}  # the name that SB3's evaluation looks for
         terminated = bool(verdict.terminated[0])

@@ -21,7 +21,13 @@ from relgym.envs.arguments import (
     checked_options,
 )
 from relgym.envs.learned_model_ends import Cause, explained, horizon_reached, parts_of
-from relgym.envs.learned_model_judges import Judge, Judges, TaskFunctions, check_judges, marked
+from relgym.envs.learned_model_rewards import (
+    SceneFunction,
+    StepEvaluator,
+    TaskFunctions,
+    check_reward_functions,
+    marked,
+)
 from relgym.envs.learned_model_setting import Setting, check_knowledge
 from relgym.envs.learned_model_starts import Start
 from relgym.envs.views import View
@@ -31,7 +37,7 @@ from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Scene
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["Judge", "LearnedModelEnv"]
+__all__ = ["LearnedModelEnv", "SceneFunction"]
 
 
 class LearnedModelEnv(gym.Env[Any, Any]):
@@ -43,7 +49,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
     for the next scene. Where it has no answer the episode is truncated and ``info["reason"]`` says why: a dream never
     goes on by guessing. Exogenous properties keep their values.
 
-    The model is used as it is, live: what it learns later changes the dream; who judges is settled anew at each
+    The model is used as it is, live: what it learns later changes the dream; what steps are worth is settled anew at each
     reset. With ``snapshot=True`` the dream has a copy of its own, and stays as it was.
 
     Thousands of dreams at once: `LearnedModelVectorEnv`, which ``gym.make_vec`` makes of the same id.
@@ -98,14 +104,14 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         ``task.terminated``. None: see above.
     task
         An object with functions `reward` and `terminated`: the ``task`` of another env, say, or a
-        `relgym.wrappers.sb3.LearnedTask`. Default: that of `like`; a file holds none.
+        `relgym.wrappers.sb3.LearnedRewardModel`. Default: that of `like`; a file holds none.
     start
         Function of a random generator that returns a start scene.
     horizon
         Longest episode in steps, >= 1; none: no limit.
     min_margin
-        Predictions that lead their rivals by less, in log-odds, aren't followed. Default 0: all are. Raising it
-        makes dreams shorter and truer where modes are voted on; laws have no rivals.
+        Predictions that lead the runners-up by less, in log-odds, aren't followed. Default 0: all are. Raising it
+        makes dreams shorter and truer where modes are voted on; laws have no runners-up.
     snapshot
         Whether to dream of a copy of the model as it is now.
     render_mode
@@ -136,8 +142,8 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         like: gym.Env[Any, Any] | Scene | None = None,
         *,
         view: View | None = None,
-        reward: Judge | Literal["learned"] | None = None,
-        terminated: Judge | Literal["learned"] | None = None,
+        reward: SceneFunction | Literal["learned"] | None = None,
+        terminated: SceneFunction | Literal["learned"] | None = None,
         task: TaskFunctions | None = None,
         start: Start | None = None,
         horizon: int | None = None,
@@ -157,9 +163,9 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         self.metadata = {**self.metadata, "render_fps": place.render_fps}
         self.task = place.task if task is None else task
         self.flat_spec = place.flat_spec
-        check_judges(reward, terminated, self.task, place.model, batched=False, at_once=snapshot)
+        check_reward_functions(reward, terminated, self.task, place.model, batched=False, at_once=snapshot)
         self._given = reward, terminated
-        self._judges = Judges(None, None)  # settled when a dream begins
+        self._evaluator = StepEvaluator(None, None)  # settled when a dream begins
         self._start = checked_function("start", start, "random generator")
         self._horizon = None if horizon is None else checked_count("horizon", horizon, 1, 10**9)
         self._min_margin = checked_least("min_margin", min_margin, 0.0)
@@ -185,9 +191,9 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         """
         super().reset(seed=seed)
         check_knowledge(self.model)
-        judges = Judges.of(*self._given, self.task, self.model)
+        evaluator = StepEvaluator.of(*self._given, self.task, self.model)
         self._scene = self._first(seed, checked_options(options))
-        self._judges = judges
+        self._evaluator = evaluator
         self._steps, self._camera = 0, None
         if self.render_mode == "human":
             self.render()
@@ -211,7 +217,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         if (end := self._end(prediction, after)) is not None:
             self._steps += 1
             return self._observation(), 0.0, False, True, {**info, **_told(*end)}
-        reward, ended = self._judges(before, taken, after)
+        reward, ended = self._evaluator(before, taken, after)
         if math.isnan(reward):
             self._steps += 1
             return (
@@ -219,7 +225,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
                 0.0,
                 False,
                 True,
-                {**info, **_told(Cause.UNJUDGED, Cause.UNJUDGED.value)},
+                {**info, **_told(Cause.NO_REWARD, Cause.NO_REWARD.value)},
             )
         if self.task is not None and hasattr(self.task, "succeeded"):
             info["is_success"] = bool(self.task.succeeded(before, taken, after))
@@ -275,7 +281,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
 
     def _end(self, prediction: ScenePrediction, after: Scene) -> tuple[Cause, str] | None:
         """Why a prediction can't be followed; None if it can."""
-        if (told := explained(parts_of(prediction), self._min_margin, self._judges.overruled)) is not None:
+        if (told := explained(parts_of(prediction), self._min_margin, self._evaluator.overruled)) is not None:
             return told
         left = self._setting.shown.outside(after)
         return (Cause.LEFT, left) if left else None

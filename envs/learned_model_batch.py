@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.envs.learned_model_ends import CAUSES, Cause, causes, explained, horizon_reached, parts_of_row
-from relgym.envs.learned_model_judges import BatchJudges, TaskFunctions
+from relgym.envs.learned_model_rewards import BatchStepEvaluator, TaskFunctions
 from relgym.envs.learned_model_setting import Setting
 from relgym.envs.learned_model_shown import Deeds
 from relgym.model.prediction import BatchPrediction
@@ -17,7 +17,7 @@ from relgym.scene.objects import Float1D, Float2D, Scene
 
 __all__ = ["DreamStep", "Stepped"]
 
-_HORIZON, _UNJUDGED = CAUSES.index(Cause.HORIZON), CAUSES.index(Cause.UNJUDGED)
+_HORIZON, _NO_REWARD = CAUSES.index(Cause.HORIZON), CAUSES.index(Cause.NO_REWARD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +56,8 @@ class DreamStep:
 
     Attributes
     ----------
-    setting, judges, task
-        Where it takes place, and who judges.
+    setting, evaluator, task
+        Where it takes place, and what steps are worth.
     actions
         Puts actions into scenes.
     horizon
@@ -67,7 +67,7 @@ class DreamStep:
     """
 
     setting: Setting
-    judges: BatchJudges
+    evaluator: BatchStepEvaluator
     task: TaskFunctions | None
     actions: Deeds
     horizon: int | None
@@ -93,10 +93,10 @@ class DreamStep:
         acting = self.actions.joined(before, actions)
         prediction = self.setting.model.predict_batch(self.actions.layout, acting)
         after = self.actions.parted(prediction.vectors)
-        why = causes(prediction, self.setting.shown.inside(after), self.min_margin, self.judges.overruled)
-        rewards, ended, success = self._judged(before, actions, after, why < 0)
+        why = causes(prediction, self.setting.shown.inside(after), self.min_margin, self.evaluator.overruled)
+        rewards, ended, success = self._evaluated(before, actions, after, why < 0)
         if (doubted := np.isnan(rewards)).any():
-            why[doubted], rewards[doubted], ended[doubted] = _UNJUDGED, 0.0, False
+            why[doubted], rewards[doubted], ended[doubted] = _NO_REWARD, 0.0, False
         if self.horizon is not None:
             why[(why < 0) & (steps >= self.horizon)] = _HORIZON
         lost = (why >= 0) & (why != _HORIZON)
@@ -104,24 +104,24 @@ class DreamStep:
         followed[:, self.setting.brought] = 0.0  # what the next step will bring isn't known
         return Stepped(followed, rewards, ended, why >= 0, why, success, after, prediction)
 
-    def _judged(
+    def _evaluated(
         self, before: Float2D, actions: Any, after: Float2D, good: NDArray[np.bool_]
     ) -> tuple[Float1D, NDArray[np.bool_], NDArray[np.bool_] | None]:
         """Rewards, ends and successes; a step that can't be followed has none of them."""
         tells = getattr(self.task, "successes", None)
         layout = self.setting.layout
-        # Single dreams are frozen: a function that changes what it judges would change the dream.
+        # Single dreams are frozen: a function that changes what it evaluates would change the dream.
         before, after = _read_only(before), _read_only(after)
         if good.all():
             success = (
                 None if tells is None else np.asarray(tells(layout, before, actions, after), dtype=np.bool_)
             )
-            return (*self.judges(before, actions, after), success)
+            return (*self.evaluator(before, actions, after), success)
         rewards, ended = np.zeros(len(before)), np.zeros(len(before), dtype=np.bool_)
         success = None if tells is None else ended.copy()
         if good.any():
             steps = _read_only(before[good]), actions[good], _read_only(after[good])
-            rewards[good], ended[good] = self.judges(*steps)
+            rewards[good], ended[good] = self.evaluator(*steps)
             if tells is not None and success is not None:
                 success[good] = tells(layout, *steps)
         return rewards, ended, success
@@ -130,9 +130,9 @@ class DreamStep:
         """Why a dream was truncated, in a sentence that names objects and properties."""
         if stepped.causes[row] == _HORIZON:
             return horizon_reached(self.horizon)
-        if stepped.causes[row] == _UNJUDGED:
-            return Cause.UNJUDGED.value
-        told = explained(parts_of_row(stepped.prediction, row), self.min_margin, self.judges.overruled)
+        if stepped.causes[row] == _NO_REWARD:
+            return Cause.NO_REWARD.value
+        told = explained(parts_of_row(stepped.prediction, row), self.min_margin, self.evaluator.overruled)
         if told is not None:
             return told[1]
         return self.setting.shown.outside(

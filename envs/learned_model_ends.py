@@ -17,7 +17,7 @@ class Cause(enum.Enum):
     """What ended a dream; the value is the sentence for people, the name is ``info["cause"]`` in lower case.
 
     All but `HORIZON` say that the prediction was not followed: the dream stays in the last scene that is known.
-    `UNJUDGED` comes of tasks that are learned (`LearnedTask`).
+    `NO_REWARD` comes of tasks that are learned (`LearnedRewardModel`).
     """
 
     NO_MODE = Outcome.NO_MODE.value
@@ -25,10 +25,10 @@ class Cause(enum.Enum):
     NO_ROLES = Outcome.NO_ROLES.value
     OUTSIDE = Outcome.OUTSIDE.value
     DEPENDS = Outcome.DEPENDS.value
-    LOW_MARGIN = "the winning mode leads its rival by too little"
+    LOW_MARGIN = "the winning mode leads its runner-up by too little"
     LEFT = "left the observation space"
     HORIZON = "the horizon is reached"
-    UNJUDGED = "nothing that was learned of the task says what this step is worth"
+    NO_REWARD = "nothing that was learned of the task says what this step is worth"
 
 
 CAUSES = tuple(Cause)
@@ -72,10 +72,10 @@ def causes(
         margins, outcomes = margins[:, heeded], outcomes[:, heeded]
     if margins.shape[1] and min_margin > 0.0:
         found[(margins < min_margin).any(axis=1)] = CAUSES.index(Cause.LOW_MARGIN)
-    silent = outcomes != _FOLLOWED
-    some = silent.any(axis=1)
+    abstained = outcomes != _FOLLOWED
+    some = abstained.any(axis=1)
     if some.any():
-        first = outcomes[np.arange(n), silent.argmax(axis=1)]
+        first = outcomes[np.arange(n), abstained.argmax(axis=1)]
         found[some] = _OF_OUTCOME[first[some]]
     return found
 
@@ -97,10 +97,12 @@ def explained(
         As for `causes`.
     """
     parts = tuple(part for part in parts if part[:2] not in overruled)
-    silent = [(name, prop, outcome) for name, prop, outcome, _ in parts if outcome is not Outcome.PREDICTED]
-    if silent:
-        told = "; ".join(f"{name}.{prop}: {outcome.value}" for name, prop, outcome in silent)
-        return Cause[silent[0][2].name], told
+    abstained = [
+        (name, prop, outcome) for name, prop, outcome, _ in parts if outcome is not Outcome.PREDICTED
+    ]
+    if abstained:
+        told = "; ".join(f"{name}.{prop}: {outcome.value}" for name, prop, outcome in abstained)
+        return Cause[abstained[0][2].name], told
     unsure = [(name, prop, margin) for name, prop, _, margin in parts if margin < min_margin]
     if unsure:
         told = "; ".join(

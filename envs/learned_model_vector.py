@@ -25,11 +25,11 @@ from relgym.envs.arguments import (
 )
 from relgym.envs.learned_model_batch import DreamStep, Stepped
 from relgym.envs.learned_model_infos import masked, told_of
-from relgym.envs.learned_model_judges import (
-    BatchJudge,
-    BatchJudges,
+from relgym.envs.learned_model_rewards import (
+    BatchSceneFunction,
+    BatchStepEvaluator,
     TaskFunctions,
-    check_judges,
+    check_reward_functions,
     marked,
 )
 from relgym.envs.learned_model_setting import Setting, check_knowledge
@@ -125,8 +125,8 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         like: gym.Env[Any, Any] | Scene | None = None,
         *,
         view: View | None = None,
-        reward: BatchJudge | Literal["learned"] | None = None,
-        terminated: BatchJudge | Literal["learned"] | None = None,
+        reward: BatchSceneFunction | Literal["learned"] | None = None,
+        terminated: BatchSceneFunction | Literal["learned"] | None = None,
         task: TaskFunctions | None = None,
         start: BatchStart | None = None,
         horizon: int | None = None,
@@ -154,11 +154,11 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             "autoreset_mode": self._mode,
         }
         self.task = place.task if task is None else task
-        check_judges(reward, terminated, self.task, place.model, batched=True, at_once=snapshot)
+        check_reward_functions(reward, terminated, self.task, place.model, batched=True, at_once=snapshot)
         self._given = reward, terminated
         self._step = DreamStep(
             place,
-            BatchJudges(place.layout, None, None),  # settled when dreams begin
+            BatchStepEvaluator(place.layout, None, None),  # settled when dreams begin
             self.task,
             place.shown.deeds(),
             _shorter(horizon, max_episode_steps),
@@ -192,7 +192,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         """
         super().reset(seed=seed)
         check_knowledge(self.model)
-        judges = BatchJudges.of(*self._given, self.task, self.model, self._setting.layout)
+        evaluator = BatchStepEvaluator.of(*self._given, self.task, self.model, self._setting.layout)
         rest = dict(checked_options(options))
         mask = checked_mask(rest.pop("reset_mask", None), self.num_envs)
         if self._vectors is None and not mask.all():
@@ -202,7 +202,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if self._vectors is None:
             self._vectors = np.empty((self.num_envs, self._setting.layout.width))
         self._begin(rows, first)
-        self._step = replace(self._step, judges=judges)
+        self._step = replace(self._step, evaluator=evaluator)
         return self._setting.shown.observations(self._vectors), {}
 
     def step(self, actions: Any) -> tuple[Any, Float1D, _Bools, _Bools, dict[str, Any]]:

@@ -126,7 +126,7 @@ def schema_like(other: SceneSchema | None, schema: SceneSchema, what: str) -> Sc
             f"{sorted(t.name for t in schema.types)}), but {difference}; make it with the arguments that the model's "
             "env had (only numbers and names of objects may differ)"
         )
-    # No env shows what a step brings; a model that learned it foretells it wherever it dreams.
+    # No env shows what a step brings; a model that learned it predicts it wherever it dreams.
     objects = (*other.objects, *(own for own in schema.objects if own[0] == TASK and TASK not in other.order))
     return schema if objects == schema.objects else replace(schema, objects=objects)
 

@@ -1,6 +1,6 @@
 """Tasks: what an agent is asked to do, as pure functions of (scene, action, next scene).
 
-Reward and termination of an env live here and not in the env, so that a dream can be judged by the very same
+Reward and termination of an env live here and not in the env, so that a dream can be evaluated by the very same
 functions as the world: one scene at a time, or thousands at once.
 """
 
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from relgym.envs.actions import without_action
 from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
 
-__all__ = ["Judgement", "Judging", "Region", "Task", "column_of"]
+__all__ = ["Region", "RewardFunctions", "Task", "TaskOutcome", "column_of"]
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class TaskOutcome:
     """What a task says of n steps.
 
     Attributes
@@ -48,10 +48,10 @@ class Region:
     height: float
 
 
-class Judging(ABC):
+class RewardFunctions(ABC):
     """Says what steps are worth, and which of them are the last.
 
-    A subclass supplies `judge`. The functions of single scenes and those of arrays go through it, so that they
+    A subclass supplies `evaluate`. The functions of single scenes and those of arrays go through it, so that they
     agree to the last bit.
 
     Notes
@@ -61,8 +61,8 @@ class Judging(ABC):
     """
 
     @abstractmethod
-    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
-        """Judge n steps.
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
+        """Evaluate n steps.
 
         Parameters
         ----------
@@ -75,14 +75,14 @@ class Judging(ABC):
         """
 
     def rewards(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float1D:
-        """Rewards of n steps, shape ``(n,)``; see `judge`."""
-        return self.judge(layout, before, actions, after).rewards
+        """Rewards of n steps, shape ``(n,)``; see `evaluate`."""
+        return self.evaluate(layout, before, actions, after).rewards
 
     def terminations(
         self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
     ) -> NDArray[np.bool_]:
-        """Which of n steps end their episodes, shape ``(n,)``; see `judge`."""
-        return self.judge(layout, before, actions, after).terminated
+        """Which of n steps end their episodes, shape ``(n,)``; see `evaluate`."""
+        return self.evaluate(layout, before, actions, after).terminated
 
     def reward(self, before: Scene, action: Any, after: Scene) -> float:
         """Reward of one step; the scenes may hold an action object or not."""
@@ -92,13 +92,13 @@ class Judging(ABC):
         """Whether a step ends the episode."""
         return bool(self._one(before, action, after).terminated[0])
 
-    def _one(self, before: Scene, action: Any, after: Scene) -> Judgement:
+    def _one(self, before: Scene, action: Any, after: Scene) -> TaskOutcome:
         # A scene with what is done in it is wider than the one that follows.
         first, last = without_action(before), without_action(after)
-        return self.judge(first.layout, first.vector[None], np.asarray(action)[None], last.vector[None])
+        return self.evaluate(first.layout, first.vector[None], np.asarray(action)[None], last.vector[None])
 
 
-class Task(Judging):
+class Task(RewardFunctions):
     """What an agent is asked to do. Immutable; its methods depend on nothing but their arguments."""
 
     @abstractmethod
@@ -108,8 +108,8 @@ class Task(Judging):
     def successes(
         self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
     ) -> NDArray[np.bool_]:
-        """Which of n steps reach the aim, shape ``(n,)``; see `judge`."""
-        return self.judge(layout, before, actions, after).succeeded
+        """Which of n steps reach the aim, shape ``(n,)``; see `evaluate`."""
+        return self.evaluate(layout, before, actions, after).succeeded
 
     def succeeded(self, before: Scene, action: Any, after: Scene) -> bool:
         """Whether a step reaches the aim."""

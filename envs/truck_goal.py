@@ -10,7 +10,7 @@ import numpy as np
 
 from relgym.envs.draws import Draws, Range
 from relgym.envs.flat import FlatSpec
-from relgym.envs.tasks import Judgement, Region, Task, column_of
+from relgym.envs.tasks import Region, Task, TaskOutcome, column_of
 from relgym.scene.objects import Float2D, ObjectType, Scene, SceneLayout, Target
 
 __all__ = [
@@ -72,13 +72,13 @@ class PushTask(Task):
 
     half_width: float = 1.0
 
-    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
-        """Judge n steps; see `Task.judge`."""
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
+        """Evaluate n steps; see `Task.evaluate`."""
         d, d_next = (column_of(layout, "goal", "ahead", vectors) for vectors in (before, after))
         v, v_next = (column_of(layout, "truck", "vx", vectors) for vectors in (before, after))
         succeeded = (v_next == 0.0) & (np.abs(d_next) <= self.half_width)
         stopped, over = (v > 0.0) & (v_next == 0.0), d_next < -self.half_width
-        return Judgement(
+        return TaskOutcome(
             0.1 * (np.abs(d) - np.abs(d_next)) - 0.02 + 2.0 * succeeded, stopped | over, succeeded
         )
 

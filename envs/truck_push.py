@@ -48,7 +48,7 @@ _BOUNDS = {
 }
 
 _TASKS = ("auto", "push", None)
-"""What an agent may be asked to do; ``"auto"``: push, unless frictions are redrawn while it does."""
+"""What an agent may be asked to do; ``"auto"``: push, unless frictions are resampled while it does."""
 
 _WATCHED_FORCES, _WATCHED_FRICTIONS = (0.0, 500.0), (0.05, 0.5)
 
@@ -130,8 +130,8 @@ class TruckPushEnv(SceneEnv):
     ---------
     n_boxes
         Number of boxes to push (1 to 12).
-    redraw
-        When the frictions are drawn: ``"block"`` at reset, ``"step"`` before every step; then the schema
+    resample
+        When the frictions are drawn: ``"episode"`` at reset, ``"step"`` before every step; then the schema
         declares them exogenous, and nobody could plan: there is no task.
     friction_range
         From where the frictions of all boxes are drawn; default: 0.05 to 0.5, but with ``push`` those of pushed
@@ -142,7 +142,7 @@ class TruckPushEnv(SceneEnv):
         How many boxes stand beside the track.
     task
         ``"push"``: bring the stacks to the goal and stop there. ``None``: the thesis' world, where one watches
-        what pushing does. ``"auto"``: ``None`` with ``redraw="step"``, else ``"push"``.
+        what pushing does. ``"auto"``: ``None`` with ``resample="step"``, else ``"push"``.
     gravity
         G, at least 0.
 
@@ -155,7 +155,7 @@ class TruckPushEnv(SceneEnv):
     def __init__(
         self,
         n_boxes: int = 3,
-        redraw: str = "block",
+        resample: str = "episode",
         friction_range: tuple[float, float] | None = None,
         force_range: tuple[float, float] | None = None,
         bystanders: int = 0,
@@ -163,19 +163,19 @@ class TruckPushEnv(SceneEnv):
         render_mode: str | None = None,
         gravity: float = GRAVITY,
     ) -> None:
-        task = _checked_task(task, redraw)
+        task = _checked_task(task, resample)
         self._boxes = tuple(f"box{k + 1}" for k in range(checked_count("n_boxes", n_boxes, 1, 12)))
         count = checked_count("bystanders", bystanders, 0, 100)
         self._bystanders = tuple(f"bystander{k + 1}" for k in range(count))
         self._banded = task is not None and friction_range is None
         frictions = _WATCHED_FRICTIONS if friction_range is None else friction_range
         self._frictions = Range(*checked_range("friction_range", frictions), 0.0, 1e3)
-        self._redraw = redraw
+        self._resample = resample
         self._gravity = checked_least("gravity", gravity, 0.0)
         names = (*self._boxes, *self._bystanders)
         usual = FORCES if task else _WATCHED_FORCES
         forces = checked_range("force_range", usual if force_range is None else force_range)
-        schema = truck_schema(names, forces, exogenous=redraw == "step", goal=task is not None)
+        schema = truck_schema(names, forces, exogenous=resample == "step", goal=task is not None)
         super().__init__(
             schema,
             spaces.Box(-1.0, 1.0, (1,), np.float32),
@@ -230,7 +230,7 @@ class TruckPushEnv(SceneEnv):
         self._push(after)
         if self.task is not None:
             after[self._columns["goal"]] = state[self._columns["goal"]] - velocity
-        if self._redraw == "step":
+        if self._resample == "step":
             after[self._friction_columns] = self.np_random.uniform(
                 self._frictions.low, self._frictions.high, len(self._friction_columns)
             )
@@ -278,16 +278,16 @@ class TruckPushEnv(SceneEnv):
         self._stacks = stacks_of(self._scene_of(vector)) if hidden is None else hidden
 
 
-def _checked_task(task: str | None, redraw: str) -> str | None:
-    """The task that is meant; `ConfigError` where it is none, or can't go with `redraw`."""
-    if redraw not in ("block", "step"):
-        raise ConfigError(f"redraw={redraw!r}: expected 'block' or 'step'")
+def _checked_task(task: str | None, resample: str) -> str | None:
+    """The task that is meant; `ConfigError` where it is none, or can't go with `resample`."""
+    if resample not in ("episode", "step"):
+        raise ConfigError(f"resample={resample!r}: expected 'episode' or 'step'")
     if task not in _TASKS:
         raise ConfigError(f"task={task!r}: expected one of {list(_TASKS)}")
     if task == "auto":
-        return "push" if redraw == "block" else None
-    if task is not None and redraw != "block":
+        return "push" if resample == "episode" else None
+    if task is not None and resample != "episode":
         raise ConfigError(
-            f"task={task!r} with redraw={redraw!r}: nobody can plan for frictions yet to be drawn; pass task=None"
+            f"task={task!r} with resample={resample!r}: nobody can plan for frictions yet to be drawn; pass task=None"
         )
     return task

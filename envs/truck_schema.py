@@ -25,7 +25,7 @@ def truck_schema(
     force_range
         Forces that -1 and 1 stand for.
     exogenous
-        Whether frictions are redrawn from outside.
+        Whether frictions are resampled from outside.
     goal
         Whether there is a goal.
     """

@@ -15,8 +15,8 @@ import gymnasium as gym
 import relgym
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.flat import FlatView
-from relgym.wrappers.glimpses import Glimpses
 from relgym.wrappers.sb3 import Dyna, DynaConfig, TransitionRecorder, replay_options
+from relgym.wrappers.truncated_episodes import TruncatedEpisodes
 
 
 @dataclass(frozen=True)
@@ -28,18 +28,18 @@ class Args:
     warm_up: int = 250
     """of them random, at first"""
     updates: int = 40
-    """gradient steps per decision, once the model is trusted"""
+    """gradient steps per decision, once the model is accepted"""
     episodes: int = 20
     """test episodes"""
     seed: int = 0
     """seed of everything random"""
 
 
-def make_env(*, glimpses: bool = False) -> gym.Env[Any, Any]:
+def make_env(*, truncated: bool = False) -> gym.Env[Any, Any]:
     """Scenes for the model, decisions and short vectors for the agent."""
     env: gym.Env[Any, Any] = gym.make("relgym/BallGoal-v0")
-    if glimpses:  # four episodes of five last 10 decisions: what follows can be dreamed, other rooms can't
-        env = Glimpses(env, 50)
+    if truncated:  # four episodes of five last 10 decisions: what follows can be dreamed, other rooms can't
+        env = TruncatedEpisodes(env, 50)
     return FlatView(ActionRepeat(TransitionRecorder(env), 5))
 
 
@@ -48,7 +48,7 @@ def main(args: Args) -> None:
     from stable_baselines3 import SAC
     from stable_baselines3.common.logger import Logger
 
-    env = make_env(glimpses=True)
+    env = make_env(truncated=True)
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
     # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals and walls stay where they are;
@@ -57,8 +57,8 @@ def main(args: Args) -> None:
         horizon=30,
         capacity=40_000,
         from_start=0.3,
-        kick=0.5,
-        redraw=False,
+        perturb_velocity=0.5,
+        resample=False,
         permute=False,
         updates=args.updates,
         seed=args.seed,
@@ -78,8 +78,10 @@ def main(args: Args) -> None:
     )
     agent.set_logger(Logger(None, []))  # nothing is logged, and no folder left behind
     agent.learn(args.decisions, callback=dyna)
-    gate = dyna.apprentice.gate
-    print(f"prequential error {gate.error:.3f}, trusted: {gate.open}, imagined: {dyna.imagined:,} decisions")
+    acceptance = dyna.trainer.acceptance
+    print(
+        f"prequential error {acceptance.error:.3f}, accepted: {acceptance.accepted}, imagined: {dyna.imagined:,} decisions"
+    )
 
     tests = make_env()
     good = sum(play(agent, tests, seed=10_000 + k) for k in range(args.episodes))

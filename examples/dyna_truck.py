@@ -26,9 +26,9 @@ class Args:
     warm_up: int = 250
     """of them random, at first"""
     updates: int = 40
-    """gradient steps per real step, once the model is trusted"""
-    burst: int = 10_000
-    """gradient steps at once, when the model is first trusted"""
+    """gradient steps per real step, once the model is accepted"""
+    catch_up: int = 10_000
+    """gradient steps at once, when the model is first accepted"""
     episodes: int = 50
     """test episodes"""
     seed: int = 0
@@ -48,7 +48,7 @@ def main(args: Args) -> None:
     env = make_env()
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
-    dyna = Dyna(model, DynaConfig(updates=args.updates, burst=args.burst, seed=args.seed))
+    dyna = Dyna(model, DynaConfig(updates=args.updates, catch_up=args.catch_up, seed=args.seed))
     agent = SAC(
         "MlpPolicy",
         env,
@@ -62,9 +62,9 @@ def main(args: Args) -> None:
     )
     agent.set_logger(Logger(None, []))  # nothing is logged, and no folder left behind
     agent.learn(args.steps, callback=dyna)
-    gate = dyna.apprentice.gate
+    acceptance = dyna.trainer.acceptance
     print(
-        f"prequential error {gate.error:.3f}, trusted: {gate.open}, imagined: {dyna.imagined:,} transitions"
+        f"prequential error {acceptance.error:.3f}, accepted: {acceptance.accepted}, imagined: {dyna.imagined:,} transitions"
     )
 
     tests = make_env()

@@ -1,6 +1,6 @@
 """How long does a learned model stay true when it feeds on its own predictions? Dream beside the real env.
 
-Run: python examples/live_in_a_dream.py --blocks 24
+Run: python examples/live_in_a_dream.py --episodes 24
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import relgym
 class Args:
     """Settings; each is a command-line option."""
 
-    blocks: int = 24
+    episodes: int = 24
     """episodes of 40 steps to learn from"""
     trials: int = 5
     """episodes to dream"""
@@ -28,10 +28,10 @@ class Args:
 
 def main(args: Args) -> None:
     """Learn truck-push with random pushes, then push real and dreamed trucks alike."""
-    env = relgym.wrappers.ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=2, redraw="step"))
+    env = relgym.wrappers.ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=2, resample="step"))
     env.action_space.seed(args.seed)
-    for block in range(args.blocks):
-        env.reset(seed=args.seed + block)
+    for episode in range(args.episodes):
+        env.reset(seed=args.seed + episode)
         truncated = False
         while not truncated:
             _, _, _, truncated, _ = env.step(np.clip(env.action_space.sample(), 0.2, 1.0))

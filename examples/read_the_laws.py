@@ -38,7 +38,7 @@ def main(args: Args) -> None:
             env.reset()
     model = env.get_wrapper_attr("model")
     print(model.describe())
-    print(f"\nWrong or silent, before learning from the step:\n{env.prequential}")
+    print(f"\nWrong or abstained, before learning from the step:\n{env.prequential}")
     if args.file:
         env.save(args.file)
         print(f"Saved as {args.file}; read it again with: relgym rules {args.file}")

@@ -61,7 +61,7 @@ World = Annotated[str, typer.Option("--world", help="Whose test scenes: truck or
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for models and pictures.")] = Path("out/demo"),
     seed: Seed = 0,
-    quick: Annotated[bool, typer.Option(help="Learn from a few blocks only.")] = False,
+    quick: Annotated[bool, typer.Option(help="Learn from a few episodes only.")] = False,
     as_json: Json = False,
 ) -> None:
     """Learn the laws of two small worlds from scratch, online; print, measure and draw them."""
@@ -279,12 +279,12 @@ def _demonstrate(shown: Demonstration, out: Path, seed: int) -> tuple[DemoOutcom
 
     env, curve = shown.make(), []
     with _progress() as bar:
-        task = bar.add_task(shown.name, total=shown.blocks)
-        for block in learn_online(env, shown, seed=seed):
-            curve.append(block)
+        task = bar.add_task(shown.name, total=shown.episodes)
+        for episode in learn_online(env, shown, seed=seed):
+            curve.append(episode)
             bar.advance(task)
         seconds = round(bar.tasks[task].elapsed or 0.0, 2)
-    file, steps = out / f"{shown.name}.json", sum(block.steps for block in curve)
+    file, steps = out / f"{shown.name}.json", sum(episode.steps for episode in curve)
     env.save(file)
     figures = measure(env.model, shown, seed=seed + _FRESH)
     outcome = DemoOutcome(shown.title, steps, seconds, _report(env.model), figures, tuple(curve), str(file))

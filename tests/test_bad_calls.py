@@ -216,7 +216,7 @@ def calls() -> dict[str, Call]:
         "ModelLearner": Call(wrappers.ModelLearner, {"env": Slider()}),
         "learner.step": Call(learner.step, {"action": np.zeros(1)}),
         "learner.reset": Call(learner.reset, {}),
-        "learner.foretell": Call(learner.foretell, {"observation": seen, "action": np.zeros(1)}),
+        "learner.predict": Call(learner.predict, {"observation": seen, "action": np.zeros(1)}),
         "learner.save": Call(learner.save, {"path": str(file)}),
         "VectorModelLearner": Call(wrappers.VectorModelLearner, {"env": gym.vector.SyncVectorEnv([Slider])}),
         "FlatView": Call(wrappers.FlatView, {"env": envs.BallBoxRampEnv()}),

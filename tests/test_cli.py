@@ -84,7 +84,7 @@ def test_explain_goes_by_the_models_own_view_and_stays_in_the_episode(folder: Pa
 
 
 def test_explain_an_action(folder: Path) -> None:
-    text = run("explain", folder / "truck.json", "relgym/TruckPush-v0", "--arg", "redraw=step")
+    text = run("explain", folder / "truck.json", "relgym/TruckPush-v0", "--arg", "resample=step")
     assert "truck.vx: 0" in text
 
 
@@ -101,7 +101,9 @@ def test_eval_and_rollout(folder: Path) -> None:
 
 def test_learn_writes_a_model(tmp_path: Path) -> None:
     file = tmp_path / "truck.json"
-    run("learn", "relgym/TruckPush-v0", "-a", "redraw=step", "-a", "n_boxes=2", "--steps", 60, "--out", file)
+    run(
+        "learn", "relgym/TruckPush-v0", "-a", "resample=step", "-a", "n_boxes=2", "--steps", 60, "--out", file
+    )
     model = WorldModel.load(file)
     assert model.seen == 60
     assert [name for name, kind in model.schema.objects if kind == "box"] == ["box1", "box2"]

@@ -43,7 +43,7 @@ class Learning:
         return self._observer.study.model
 
     @refusing(ObservationError)
-    def foretell(
+    def predict(
         self, observation: Any, action: Any, info: Mapping[str, Any] | None = None
     ) -> ScenePrediction:
         """What the model says would follow an observation and an action.

@@ -77,7 +77,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
     Examples
     --------
     >>> import gymnasium as gym, relgym
-    >>> env = ModelLearner(gym.make("relgym/TruckPush-v0", redraw="step"), targets=["truck.vx"])
+    >>> env = ModelLearner(gym.make("relgym/TruckPush-v0", resample="step"), targets=["truck.vx"])
     >>> _ = env.reset(seed=0)
     >>> _, _, _, _, info = env.step(env.action_space.sample())
     >>> info["relgym"].wrong  # nothing learned yet

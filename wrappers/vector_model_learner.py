@@ -50,7 +50,7 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
     Examples
     --------
     >>> import gymnasium as gym, relgym
-    >>> envs = VectorModelLearner(gym.make_vec("relgym/TruckPush-v0", 4, redraw="step"), targets=["truck.vx"])
+    >>> envs = VectorModelLearner(gym.make_vec("relgym/TruckPush-v0", 4, resample="step"), targets=["truck.vx"])
     >>> _ = envs.reset(seed=0)
     >>> *_, info = envs.step(envs.action_space.sample())
     >>> envs.model

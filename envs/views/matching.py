@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 __all__ = ["matched"]
 
 
-def matched(rows: NDArray[np.float64], expected: NDArray[np.float64], gate: float) -> NDArray[np.intp]:
+def matched(rows: NDArray[np.float64], expected: NDArray[np.float64], farthest: float) -> NDArray[np.intp]:
     """The assignment of rows to expected objects with the smallest sum of squared distances (Kuhn 1955).
 
     Parameters
@@ -17,7 +17,7 @@ def matched(rows: NDArray[np.float64], expected: NDArray[np.float64], gate: floa
         What is there, shape ``(n, d)``, in units in which 1 is far.
     expected
         What was expected, shape ``(m, d)``.
-    gate
+    farthest
         A row farther than this from every free object is news.
 
     Returns
@@ -35,9 +35,9 @@ def matched(rows: NDArray[np.float64], expected: NDArray[np.float64], gate: floa
     from scipy.optimize import linear_sum_assignment
 
     squares = ((rows[:, None, :] - expected[None, :, :]) ** 2).sum(axis=2)
-    # A pair beyond the gate costs what leaving both alone costs: it is never worth displacing a good pair.
-    costs = np.minimum(squares, gate * gate)
+    # A pair farther apart costs what leaving both alone costs: it is never worth displacing a good pair.
+    costs = np.minimum(squares, farthest * farthest)
     for row, column in zip(*linear_sum_assignment(costs), strict=True):
-        if squares[row, column] <= gate * gate:
+        if squares[row, column] <= farthest * farthest:
             chosen[row] = column
     return chosen

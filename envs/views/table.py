@@ -201,7 +201,9 @@ class TableView:
         places = [self._properties.index(name) for name in self._match]
         wanted = np.array([expected[name].values[places] for name in known if expected is not None])
         pairs = matched(
-            rows[:, columns] / self._scales, wanted.reshape(len(known), len(places)) / self._scales, gate=1.0
+            rows[:, columns] / self._scales,
+            wanted.reshape(len(known), len(places)) / self._scales,
+            farthest=1.0,
         )
         # A name that was there a step ago would make a leap of two different objects.
         free = iter(name for name in names if name not in known and (last is None or name not in last))

@@ -127,7 +127,7 @@ def tracking(table: Any, rng: np.random.Generator) -> int:
 
 
 def kind_of(before: Any, after: Any) -> str:
-    """What happened to the ball, by its displacements; judged after the fact, for the table of errors only."""
+    """What happened to the ball, by its displacements; evaluated after the fact, for the table of errors only."""
     if before["dx"] * after["dx"] < 0:
         return "paddle"
     if before["dy"] * after["dy"] < 0:

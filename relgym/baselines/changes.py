@@ -23,7 +23,16 @@ from relgym.baselines.rls import RecursiveLeastSquares
 from relgym.baselines.streaming import StreamingRegressor
 from relgym.errors import ConfigError
 
-__all__ = ["CHANGES", "ONLINE", "LastChange", "NoChange", "along", "fitted_once", "rivals", "titles"]
+__all__ = [
+    "CHANGES",
+    "ONLINE",
+    "LastChange",
+    "NoChange",
+    "along",
+    "fitted_once",
+    "predicted_changes",
+    "titles",
+]
 
 
 class NoChange:
@@ -128,7 +137,7 @@ ONLINE: Final = ("persistence", "constant-velocity", "rls", "hoeffding", "amrule
 """Those that learn from every transition as it comes; the others are fitted once."""
 
 
-def rivals(
+def predicted_changes(
     x: Float2D, change: Float2D, *, once: bool, seed: int = 0, last: Float2D | None = None
 ) -> dict[str, Float2D]:
     """What every learner whose package is installed says of a stream, before it is shown what came.
@@ -156,7 +165,7 @@ def rivals(
     """
     if len(x) < 2:
         raise ConfigError(
-            f"a stream of {len(x)} rows: expected at least two, one to learn from and one to foretell"
+            f"a stream of {len(x)} rows: expected at least two, one to learn from and one to predict"
         )
     found = {}
     for name in installed(CHANGES):

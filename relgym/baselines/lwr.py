@@ -1,4 +1,4 @@
-"""Locally weighted regression, the thesis' rival (§2.1.1, §4.7.1)."""
+"""Locally weighted regression, the thesis' baseline (§2.1.1, §4.7.1)."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _PREDICTED, _NOTHING = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome
 
 
 class NeuralWorldModel:
-    """Foretells scenes, rewards and ends of episodes with an `MLPEnsemble`.
+    """Predicts scenes, rewards and ends of episodes with an `MLPEnsemble`.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class NeuralWorldModel:
 
     # ------------------------------------------------------------------ prediction
     def predict_one(self, scene: Scene) -> ScenePrediction:
-        """Foretell what follows a scene with an action in it."""
+        """Predict what follows a scene with an action in it."""
         found = self.predict_batch(scene.layout, scene.vector[None])
         ok = bool(found.ok[0])
         parts = tuple(
@@ -101,7 +101,7 @@ class NeuralWorldModel:
         return ScenePrediction(Scene(scene.schema, scene.layout, found.vectors[0]), parts)
 
     def predict_batch(self, layout: SceneLayout, vectors: Float2D) -> BatchPrediction:
-        """Foretell what follows n scenes with the same objects and actions in them."""
+        """Predict what follows n scenes with the same objects and actions in them."""
         following, n = vectors.copy(), len(vectors)
         columns, parts = self._columns(layout), self._parts(layout)
         outcome = _NOTHING
@@ -120,7 +120,7 @@ class NeuralWorldModel:
             np.zeros((n, len(parts))),
         )
 
-    def judge_all(
+    def predict_rewards(
         self, layout: SceneLayout, vectors: Float2D
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Rewards and ends of episodes for n scenes with actions in them, each of shape ``(n,)``."""

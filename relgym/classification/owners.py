@@ -62,8 +62,8 @@ class Owners:
         found, fits = np.zeros(len(exemplars), dtype=np.bool_), exemplars.columns["fits"]
         for mode in exemplars.modes:
             own = np.flatnonzero(exemplars.assigned == mode)
-            rivals = [m != mode and (mode, m) not in self.covered for m in exemplars.modes]
-            found[own] = fits[own][:, rivals].any(axis=1)
+            alternatives = [m != mode and (mode, m) not in self.covered for m in exemplars.modes]
+            found[own] = fits[own][:, alternatives].any(axis=1)
         return found
 
     def count(self, assigned: int, key: bytes, explaining: Iterable[int]) -> None:

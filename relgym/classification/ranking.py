@@ -20,18 +20,18 @@ class Verdict:
 
     Parameters
     ----------
-    winner, rival
+    winner, runner_up
         Mode ids.
     clause
         The clause that fired; none: no clause did.
     tree
         The tests of the decision tree that had the last word, if one had.
     correct, incorrect
-        Training examples that went the same way, of the winner and of the rival.
+        Training examples that went the same way, of the winner and of the runner-up.
     """
 
     winner: int
-    rival: int
+    runner_up: int
     clause: Clause | None
     tree: str
     correct: float
@@ -50,9 +50,9 @@ def verdict(classifier: BinaryClassifier, outcome: int) -> Verdict:
     clause = clauses[taken.stage] if taken.stage < len(clauses) else None
     tree = (*classifier.clause_trees, classifier.fall_through_tree)[taken.stage]
     text = "" if tree is None else tree.path(taken.leaf)
-    winner, rival = (classifier.i, classifier.j) if for_i else (classifier.j, classifier.i)
+    winner, runner_up = (classifier.i, classifier.j) if for_i else (classifier.j, classifier.i)
     counts = classifier.counts[outcome]
-    return Verdict(winner, rival, clause, text, counts[1 - for_i], counts[for_i])
+    return Verdict(winner, runner_up, clause, text, counts[1 - for_i], counts[for_i])
 
 
 @dataclass(frozen=True, slots=True)

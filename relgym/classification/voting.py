@@ -138,8 +138,8 @@ class Voting:
         found = {}
         for classifier, outcome in zip(self._classifiers, self.outcomes(example, values), strict=True):
             if ranked[0] in (classifier.i, classifier.j):
-                rival = classifier.j if ranked[0] == classifier.i else classifier.i
-                found[rival] = verdict(classifier, outcome)
+                runner_up = classifier.j if ranked[0] == classifier.i else classifier.i
+                found[runner_up] = verdict(classifier, outcome)
         return [found[mode] for mode in ranked[1:]]
 
     def _by_tie(self, counts: Mapping[int, float]) -> list[int]:

@@ -3,7 +3,7 @@
 Where no function is exact, because the true law isn't among the features offered, the best sparse function may still
 be very good. It is taken if it leaves little of what changes, and its residuals then count as the target's noise. Where
 what it leaves is noise, because rows that lie close together have residuals that are not alike, it may be more: an
-engine that fires as it likes can't be foretold any better.
+engine that fires as it likes can't be predicted any better.
 
 A few rows that follow no law at all, a lander's touches, carry most of the squares, and squares are what selects
 terms. So a term that serves few rows must be their law, or it goes and they count no longer. And a second search sees

@@ -1,4 +1,4 @@
-"""Finding a new mode among the noise (§3.2.2), and judging whether data identify a function."""
+"""Finding a new mode among the noise (§3.2.2), and evaluating whether data identify a function."""
 
 from __future__ import annotations
 

@@ -90,8 +90,8 @@ def _pairwise(known: Known, state: _Widened) -> _Widened:
 
 def _with_one(known: Known, state: _Widened) -> _Widened | None:
     """Unify with the largest mode possible."""
-    rivals = [i for i in known.clusters if i not in state.absorbed]
-    for i in sorted(rivals, key=lambda k: (-len(known.members(k)), k)):
+    alternatives = [i for i in known.clusters if i not in state.absorbed]
+    for i in sorted(alternatives, key=lambda k: (-len(known.members(k)), k)):
         theirs = known.members(i)
         if covering(
             state.cluster, known.table, known.rows[theirs], known.y[theirs], known.scale, known.config

@@ -250,5 +250,5 @@ class Population:
             self.labels[example] = self._choose(table, example, self._errors_of(table, example))
 
 
-def _simpler(mode: Mode, rival: Mode) -> bool:
-    return mode.parameters < rival.parameters
+def _simpler(mode: Mode, other: Mode) -> bool:
+    return mode.parameters < other.parameters

@@ -130,7 +130,7 @@ def unified_family(
 ) -> tuple[int, LinearFit, list[int]] | None:
     """A function that explains several over-specific modes at once: (signature, fit, which of them), or None.
 
-    Where something is constant while a block lasts, each block teaches a mode of its own that differs from
+    Where something is constant while an episode lasts, each episode teaches a mode of its own that differs from
     the others in its constant only. No two of them determine how the constant depends on what; many do. Each
     mode counts as one example here, and consensus is sought among them.
 

@@ -94,8 +94,8 @@ class ClassificationConfig:
     exemplars_alone
         The same where objects have no bodies, and so there is but one relational state; at most a twentieth of the
         history (`ModelConfig.history`), which they are part of. Default 3000, range >= 1. Few examples of a mode leave
-        thresholds blunt there, and where rare events can't be foretold they seem to be, in corners of which no other
-        example is left: of 43 touches of a LunarLander's leg that were foretold among 300, 38 were none.
+        thresholds blunt there, and where rare events can't be predicted they seem to be, in corners of which no other
+        example is left: of 43 touches of a LunarLander's leg that were predicted among 300, 38 were none.
     noise_per_state
         The same for noise, whose examples may still become a rare mode. Default 200, range >= 1.
     max_exemplars

@@ -1,1 +1,1 @@
-"""The thesis' experiments as data: blocks of transitions with their ground truth, and the analytic modes."""
+"""The thesis' experiments as data: episodes of transitions with their ground truth, and the analytic modes."""

@@ -1,6 +1,6 @@
 """One-step errors, learned modes and roll-outs in the ball experiments: training seeds x test seeds (§4.3-§4.5).
 
-``python -m relgym.experiments.bars 1 2 3 4`` prints them against their bars.
+``python -m relgym.experiments.thesis_benchmarks 1 2 3 4`` prints them against their bars.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.experiments.analytic import AnalyticMode, AnalyticModes, Case
-from relgym.experiments.bar import Measure, measured
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import Evaluation, evaluate, mode_labels
 from relgym.experiments.online import learned
 from relgym.experiments.rollouts import RolloutErrors, rollouts
 from relgym.model.world_model import WorldModel
 
-__all__ = ["AXES", "Outcome", "TargetOutcome", "accuracy", "ball_bars", "matched"]
+__all__ = ["AXES", "Outcome", "TargetOutcome", "accuracy", "ball_measures", "matched"]
 
 AXES: Final = {"x": "ball.vx", "y": "ball.vy"}
 
@@ -104,8 +104,8 @@ def accuracy(
     training: Iterable[int],
     tests: Sequence[int],
     config: ModelConfig | None = None,
-    blocks: int | None = None,
-    test_blocks: int | None = None,
+    episodes: int | None = None,
+    test_episodes: int | None = None,
     trials: int = 80,
 ) -> Iterator[Outcome]:
     """Train on each training seed, test on each test seed; outcomes as they come.
@@ -118,18 +118,18 @@ def accuracy(
         Seeds.
     config
         Free parameters of the model.
-    blocks, test_blocks
-        How many blocks to train and to test on; default: as many as in the thesis.
+    episodes, test_episodes
+        How many episodes to train and to test on; default: as many as in the thesis.
     trials
-        How many blocks of a test set are rolled out; 0: none.
+        How many episodes of a test set are rolled out; 0: none.
     """
     laws = BALL_EXPERIMENTS[experiment].modes()
     for seed in training:
-        taught = list(ball_blocks(experiment, seed=seed, blocks=blocks))
+        taught = list(ball_episodes(experiment, seed=seed, episodes=episodes))
         model = learned(taught, config=config)
         evaluations, rolled = {}, {}
         for test in tests:
-            fresh = list(ball_blocks(experiment, seed=test, blocks=test_blocks, test=True))
+            fresh = list(ball_episodes(experiment, seed=test, episodes=test_episodes, test=True))
             evaluations[test] = evaluate(model, fresh, laws)
             if trials:
                 rolled[test] = rollouts(model, fresh[:trials])
@@ -148,7 +148,7 @@ def matched(mode: Mode, laws: Sequence[AnalyticMode]) -> int | None:
     return best if off[best] <= _SAME else None
 
 
-def ball_bars(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
+def ball_measures(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
     """The figures of one ball experiment against their bars, over all pairs of seeds."""
     laws = BALL_EXPERIMENTS[experiment].modes()
     evaluations = [e for outcome in outcomes for e in outcome.evaluations.values()]
@@ -159,7 +159,7 @@ def ball_bars(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
     for name, axis, kind, limit in _CLASSES[experiment]:
         rates = [_rate(e, axis, laws, kind) for e in evaluations]
         found.append(measured(f"wrong, {name}, {axis}", limit, rates))
-    found += _mode_bars(experiment, outcomes)
+    found += _mode_measures(experiment, outcomes)
     rolled = [r for outcome in outcomes for r in outcome.rolled.values()]
     if rolled and experiment in _FAILED:
         failed = [r.failed_without_corner for r in rolled]
@@ -167,7 +167,7 @@ def ball_bars(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
     return found
 
 
-def _mode_bars(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
+def _mode_measures(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
     targets = {axis: [outcome.targets[axis] for outcome in outcomes] for axis in AXES}
     if experiment == 2:
         sliding = _sliding(BALL_EXPERIMENTS[2].modes().x)
@@ -201,13 +201,13 @@ def _of(laws: AnalyticModes, axis: str) -> tuple[AnalyticMode, ...]:
 
 
 def _target_outcome(
-    model: WorldModel, axis: str, laws: Sequence[AnalyticMode], blocks: Sequence[Block]
+    model: WorldModel, axis: str, laws: Sequence[AnalyticMode], episodes: Sequence[Episode]
 ) -> TargetOutcome:
     part = model.property_model(*AXES[axis].split("."))
     found = {mode: matched(mode, laws) for mode in part.modes}
     stated = tuple(sorted({k for k in found.values() if k is not None}))
-    true = np.concatenate([block.truth.mode[AXES[axis]] for block in blocks])
-    missing = _missing(stated, laws, true, _velocities(blocks))
+    true = np.concatenate([episode.truth.mode[AXES[axis]] for episode in episodes])
+    missing = _missing(stated, laws, true, _velocities(episodes))
     spurious = tuple(mode.formula() for mode, k in found.items() if k is None)
     return TargetOutcome(stated, spurious, missing, part.clusterer.noise_examples / model.seen)
 
@@ -226,5 +226,5 @@ def _missing(
     return tuple(names)
 
 
-def _velocities(blocks: Sequence[Block]) -> NDArray[np.float64]:
-    return np.concatenate([block.columns("ball", "vx", "vy")[:-1] for block in blocks])
+def _velocities(episodes: Sequence[Episode]) -> NDArray[np.float64]:
+    return np.concatenate([episode.columns("ball", "vx", "vy")[:-1] for episode in episodes])

@@ -2,7 +2,7 @@
 
 Every env is learned twice from the same transitions: with the default configuration, and with the features that the
 default's own advice recommends. Errors are *nRMSE-d*: root mean square error of one step over the standard deviation of
-the change, per property, on fresh episodes, where rows at a limit (a wall, a clip) are judged apart: an error over
+the change, per property, on fresh episodes, where rows at a limit (a wall, a clip) are evaluated apart: an error over
 everything would measure the rare kind only.
 """
 
@@ -36,14 +36,14 @@ from relgym.experiments.any_env_fleet import fleet
 from relgym.experiments.any_env_flight import flight
 from relgym.experiments.any_env_memory import LIVES, memory
 from relgym.experiments.any_env_stream import prequential
-from relgym.experiments.bar import Measure, measured, report
+from relgym.experiments.criterion import Measure, measured, report
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.model.world_model import WorldModel
 
 __all__ = ["ROWS", "Setting", "main", "weight"]
 
 TEST: Final = 4_000
-"""Transitions judged on."""
+"""Transitions evaluated on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Setting:
         Name of the env.
     train
         Transitions learned from.
-    bar
+    limit
         Largest nRMSE-d.
     policy
         Who acts; default: anything.
@@ -68,7 +68,7 @@ class Setting:
 
     study: str
     train: int
-    bar: float
+    limit: float
     policy: Policy = at_random
     features: tuple[str, ...] = ()
     constants: tuple[tuple[str, float], ...] = ()
@@ -103,15 +103,15 @@ def _one_step(setting: Setting, seeds: Pairs, *, quick: bool) -> list[Measure]:
         )
         fresh = collect(study, 1_000 if quick else TEST, 2_000 + test, setting.policy)
         model = _model(study, setting, lesson, verbose=not number)
-        for what, value in _judged(study, model, fresh).items():
-            found.setdefault((what, setting.bar), []).append(value)
+        for what, value in _evaluated(study, model, fresh).items():
+            found.setdefault((what, setting.limit), []).append(value)
         for prop, value in setting.constants:
             held = min((abs(c - value) for c in _constants(model, prop)), default=np.inf)
             found.setdefault((f"{prop}: a mode for being held at {value:g}, off by", 1e-7), []).append(held)
         for prop, term, value in study.weights if setting.policy is at_random else ():
             off = abs(weight(model, prop, term) / value - 1.0)
             found.setdefault((f"{prop}: {value:g} {term}, off by", 0.01), []).append(off)
-    return [measured(what, bar, values) for (what, bar), values in found.items()]
+    return [measured(what, limit, values) for (what, limit), values in found.items()]
 
 
 def _model(study: Study, setting: Setting, lesson: Lesson, *, verbose: bool) -> WorldModel:
@@ -131,7 +131,7 @@ def _model(study: Study, setting: Setting, lesson: Lesson, *, verbose: bool) -> 
     return model
 
 
-def _judged(study: Study, model: WorldModel, fresh: Lesson) -> dict[str, float]:
+def _evaluated(study: Study, model: WorldModel, fresh: Lesson) -> dict[str, float]:
     usual = regular(study, fresh)
     found = {f"{p}, regular": e for p, e in nrmse_d(model, fresh, usual).items()}
     if not usual.all():

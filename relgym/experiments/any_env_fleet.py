@@ -22,7 +22,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from relgym.config import ModelConfig
 from relgym.envs.views import NumbersView
 from relgym.experiments.any_env_data import STUDIES, Study, made, pumping, view_of
-from relgym.experiments.bar import Measure, measured
+from relgym.experiments.criterion import Measure, measured
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 from relgym.wrappers import VectorModelLearner
@@ -80,7 +80,9 @@ def fleet(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Meas
             for training, _ in seeds:
                 for key, value in taught(name, mode, training, 60 if quick else STEPS).items():
                     found.setdefault(key, []).append(value)
-    measures = [measured(what, bar, v, ">=" if least else "<=") for (what, bar, least), v in found.items()]
+    measures = [
+        measured(what, limit, v, ">=" if least else "<=") for (what, limit, least), v in found.items()
+    ]
     if find_spec("stable_baselines3") is not None and not quick:
         measures += policy_speed(POLICY_STEPS, REPEATS)
     return measures

@@ -7,8 +7,8 @@ transitions.
 
 A leg that was pushed in swings back when it has left the ground, and turns the lander by twenty to sixty standard
 deviations in a step in which no leg touches: its hinge isn't observed, so that no function of the observation
-foretells it. A handful of such steps in ten thousand decides the error of w. Hence two more figures: what least
-squares leave that were fitted, in hindsight, to the very transitions judged on; and w in *settled* flight, from the
+predicts it. A handful of such steps in ten thousand decides the error of w. Hence two more figures: what least
+squares leave that were fitted, in hindsight, to the very transitions evaluated on; and w in *settled* flight, from the
 second step after the last touch on.
 """
 
@@ -24,19 +24,19 @@ from numpy.typing import NDArray
 from relgym.baselines.base import Regressor
 from relgym.config import ModelConfig
 from relgym.experiments.any_env_data import STUDIES, Lesson, collect, errors, learned, recommended
-from relgym.experiments.bar import Measure, measured
+from relgym.experiments.criterion import Measure, measured
 from relgym.model.world_model import WorldModel
 
 __all__ = ["agreement", "flight", "flying", "settled"]
 
 TRAIN, TEST = 5_000, 10_000
-"""Transitions learned from and judged on."""
+"""Transitions learned from and evaluated on."""
 
 FLOOR: Final = {"vx": 0.37, "vy": 0.32}
-"""What least squares leaves of vx and vy (one seed), of which the bar is 10 % more."""
+"""What least squares leaves of vx and vy (one seed), of which the limit is 10 % more."""
 
 SPIN: Final = 0.3
-"""Bar of w."""
+"""Criterion of w."""
 
 
 def flying(lesson: Lesson) -> NDArray[np.bool_]:
@@ -65,7 +65,7 @@ def flight(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Mea
         model = _model(lesson, verbose=not number, quick=quick)
         for key, value in _compared(model, lesson, fresh, nets=not quick).items():
             found.setdefault(key, []).append(value)
-    return [measured(what, bar, v, ">=" if least else "<=") for (what, bar, least), v in found.items()]
+    return [measured(what, limit, v, ">=" if least else "<=") for (what, limit, least), v in found.items()]
 
 
 def _model(lesson: Lesson, *, verbose: bool, quick: bool) -> WorldModel:
@@ -93,7 +93,7 @@ def _compared(
 
     missed = errors(model, fresh)
     own, floor = size(missed), size(_least_squares(lesson, fresh) - fresh.change)
-    found = {(f"{p}, flight", 1.1 * bar, False): own[p] for p, bar in FLOOR.items()}
+    found = {(f"{p}, flight", 1.1 * limit, False): own[p] for p, limit in FLOOR.items()}
     found[("w, flight", SPIN, False)] = own["w"]
     hindsight = size(_least_squares(fresh, fresh) - fresh.change)["w"]
     found[("w, what least squares fitted in hindsight leave in flight", SPIN, False)] = hindsight
@@ -101,9 +101,9 @@ def _compared(
     for p in (*FLOOR, "w"):
         found[(f"{p}, over least squares on the law's features", 1.1, False)] = own[p] / floor[p]
     if nets and find_spec("torch") is not None:
-        rival = size(_nets(lesson, fresh) - fresh.change)
+        baseline = size(_nets(lesson, fresh) - fresh.change)
         for p in ("px", "py", "vx", "vy", "th", "w"):
-            found[(f"{p}, over an MLP ensemble", 1.0, False)] = own[p] / rival[p]
+            found[(f"{p}, over an MLP ensemble", 1.0, False)] = own[p] / baseline[p]
     found[("vx: law or not, agreement with the leg flags", 0.95, True)] = agreement(model, lesson)
     return found
 

@@ -17,8 +17,8 @@ import numpy as np
 from relgym.config import ModelConfig
 from relgym.experiments.accuracy import AXES
 from relgym.experiments.any_env_data import STUDIES, collect, nrmse_d, stream, view_of
-from relgym.experiments.bar import Measure, measured
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.evaluate import evaluate
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
@@ -31,8 +31,8 @@ STEPS, BOUND = 1_000_000, 200_000
 EARLY, WINDOW = 10_000, 2_000
 """Costs at the end are compared with those of as many steps before this one."""
 
-EXPERIMENT, BLOCKS, TEST_BLOCKS = 1, 400, 40
-"""The ball's world; blocks of it that are drawn at a time, each time from another seed; and blocks judged on."""
+EXPERIMENT, EPISODES, TEST_EPISODES = 1, 400, 40
+"""The ball's world; episodes of it that are drawn at a time, each time from another seed; and episodes evaluated on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +43,14 @@ class Life:
     ----------
     transitions
         Fresh ones without end, of a seed.
-    judged
+    evaluated
         Whether a model is still right: bars and figures, on fresh transitions of a test seed.
     frames
         As in `ModelConfig`: while laws of motion do, modes rest, and a life costs little.
     """
 
     transitions: Callable[[int], Iterator[Transition]]
-    judged: Callable[[WorldModel, int], list[Measure]]
+    evaluated: Callable[[WorldModel, int], list[Measure]]
     frames: Literal["auto", "world"] = "auto"
 
 
@@ -59,27 +59,27 @@ def _carts(seed: int) -> Iterator[Transition]:
     return (step.transition for step in stream(study, view_of(study), seed))
 
 
-def _cart_judged(model: WorldModel, test: int) -> list[Measure]:
+def _cart_evaluated(model: WorldModel, test: int) -> list[Measure]:
     error = nrmse_d(model, collect(STUDIES["cart"], 1_000, 2_000 + test))
     return [measured(f"{prop}, still right", 1e-3, [error[prop]]) for prop in ("x", "th")]
 
 
 def _balls(seed: int) -> Iterator[Transition]:
     for batch in count():
-        for block in ball_blocks(EXPERIMENT, seed=1_000 * seed + batch, blocks=BLOCKS):
-            yield from block.transitions()
+        for episode in ball_episodes(EXPERIMENT, seed=1_000 * seed + batch, episodes=EPISODES):
+            yield from episode.transitions()
 
 
-def _ball_judged(model: WorldModel, test: int) -> list[Measure]:
-    fresh = list(ball_blocks(EXPERIMENT, seed=test, blocks=TEST_BLOCKS, test=True))
+def _ball_evaluated(model: WorldModel, test: int) -> list[Measure]:
+    fresh = list(ball_episodes(EXPERIMENT, seed=test, episodes=TEST_EPISODES, test=True))
     found = evaluate(model, fresh, BALL_EXPERIMENTS[EXPERIMENT].modes())
     return [measured(f"{axis}, wrong predictions", 0.001, [found[t].total.rate]) for axis, t in AXES.items()]
 
 
 LIVES: Final = {
-    "memory": Life(_carts, _cart_judged),
-    "memory-ball": Life(_balls, _ball_judged),
-    "memory-ball-modes": Life(_balls, _ball_judged, frames="world"),
+    "memory": Life(_carts, _cart_evaluated),
+    "memory-ball": Life(_balls, _ball_evaluated),
+    "memory-ball-modes": Life(_balls, _ball_evaluated, frames="world"),
 }
 """Row 10, by the name of its row."""
 
@@ -125,7 +125,7 @@ def memory(
         measured("median cost of a step at the end, over that at 10,000", 1.2, [late / early]),
         measured("most rows kept, over the bound", 1.3, [max(rows) / bound]),
         measured("peak memory at the end, over that at 1.5 bounds", 1.05, [peaks[-1] / peaks[0]]),
-        *life.judged(old.model, test),
+        *life.evaluated(old.model, test),
     ]
 
 

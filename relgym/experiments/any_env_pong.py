@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.experiments.any_env_rows import live, stream
-from relgym.experiments.bar import Measure, measured
+from relgym.experiments.any_env_recorded import live, stream
+from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.recording import Recording
 from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
@@ -58,8 +58,8 @@ def pong(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Meas
         _, tested = live(fresh, (), model=model, learn=False)
         if not number:
             print(f"{len(lesson):,} steps", model.describe(digits=4), sep="\n", flush=True)
-        for what, bar, share in _shares(tested["ball"].columns(), verbose=not number):
-            found.setdefault((what, bar), []).append(share)
+        for what, limit, share in _shares(tested["ball"].columns(), verbose=not number):
+            found.setdefault((what, limit), []).append(share)
         for kind in ("paddle", "wall"):
             named = any(names(model, target, kind) for target in _TARGETS)
             found.setdefault((f"a clause names the {kind}", 1.0), []).append(float(named))
@@ -67,8 +67,8 @@ def pong(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Meas
         for what, ratio in stream("ball", early, verbose=not number, batch=batch):
             found.setdefault((what, -1.0), []).append(ratio)
     return [
-        measured(what, bar, values, ">=") if bar > 0.0 else measured(what, -bar, values)
-        for (what, bar), values in found.items()
+        measured(what, limit, values, ">=") if limit > 0.0 else measured(what, -limit, values)
+        for (what, limit), values in found.items()
     ]
 
 
@@ -77,7 +77,7 @@ def kinds_of(
 ) -> NDArray[np.intp]:
     """What happened, as places in `KINDS`, from displacements before and after, ``(n, 2)`` each, and heights, ``(n,)``.
 
-    Judged after the fact, to tell errors apart: what turns the ball round is a paddle, what throws it back at a wall is
+    Evaluated after the fact, to tell errors apart: what turns the ball round is a paddle, what throws it back at a wall is
     the wall. The frame after that, serves and goals are other changes.
     """
     turned, same = before * after < 0.0, (before == after).all(axis=1)

@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.baselines.changes import ONLINE, rivals, titles
+from relgym.baselines.changes import ONLINE, predicted_changes, titles
 from relgym.config import ModelConfig
 from relgym.experiments.any_env_data import STUDIES, Lesson, collect, recommended
-from relgym.experiments.bar import Measure, measured
+from relgym.experiments.criterion import Measure, measured
 from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
 
@@ -61,12 +61,12 @@ def _sizes(lesson: Lesson, *, quick: bool) -> dict[str, NDArray[np.float64]]:
     features = recommended(model)
     found["relgym"] = size(ahead(lesson, features)[0]) if features else found["default"]
     print(f"{len(x):,} transitions; recommended: {features or 'nothing'}")
-    told = rivals(x, change, once=not quick)
+    told = predicted_changes(x, change, once=not quick)
     return found | {name: size(guess) for name, guess in told.items()}
 
 
 def ahead(lesson: Lesson, features: tuple[str, ...] = ()) -> tuple[NDArray[np.float64], WorldModel]:
-    """Changes that the model foretold, shape ``(n, d)``, and the model."""
+    """Changes that the model predicted, shape ``(n, d)``, and the model."""
     model = WorldModel(lesson.view.schema, ModelConfig(features=features))
     found = np.zeros_like(lesson.change)
     kind = lesson.view.schema.type_of("self")

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from relgym.config import ModelConfig
 from relgym.experiments.any_env_data import recommended
 from relgym.experiments.any_env_pong import pong
-from relgym.experiments.any_env_rows import Rows, live, size, stream
-from relgym.experiments.bar import Measure, measured, report
+from relgym.experiments.any_env_recorded import Rows, live, size, stream
+from relgym.experiments.criterion import Measure, measured, report
 from relgym.experiments.recording import Recording
 from relgym.experiments.seeds import TRAINING_SEEDS, TUNING_SEEDS
 from relgym.model.world_model import WorldModel
@@ -38,7 +38,7 @@ _Columns = dict[str, NDArray[np.float64]]
 def highway(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Measure]:
     """Row 7: where cars will be, and row 8's part for it: the stream as it comes, beside other learners.
 
-    Steps that end an episode are crashes, which push the cars apart; they are judged apart, and in the stream with all.
+    Steps that end an episode are crashes, which push the cars apart; they are evaluated apart, and in the stream with all.
     """
     targets = [Target(name, "x") for name in LIMITS]
     found: dict[tuple[str, float], list[float]] = {}
@@ -56,7 +56,7 @@ def highway(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[M
                 found.setdefault((f"{name}: {STEP} vx, off by", 0.01), []).append(_off(model, name))
             for what, ratio in stream(name, rows[name], verbose=not number, batch=batch):
                 found.setdefault((what, 1.0), []).append(ratio)
-    return [measured(what, bar, values) for (what, bar), values in found.items()]
+    return [measured(what, limit, values) for (what, limit), values in found.items()]
 
 
 def _advised(
@@ -86,7 +86,7 @@ def _advised(
 
 
 def _off(model: WorldModel, name: str) -> float:
-    """By what share the weight of vx is off in what foretells x."""
+    """By what share the weight of vx is off in what predicts x."""
     part = model.property_model(name, "x")
     best = max(part.modes, key=lambda m: m.examples, default=None)
     mode = part.guess.mode if part.guess is not None else best

@@ -12,14 +12,14 @@ import numpy as np
 
 import relgym  # noqa: F401 - registers the envs
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
-from relgym.experiments.bar import Measure, measured
-from relgym.experiments.blocks import Block
+from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment
+from relgym.experiments.episodes import Episode
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float1D, Scene
 from relgym.wrappers import ModelLearner
 
-__all__ = ["QueryCost", "StepCost", "query_bars", "query_cost", "step_bars", "step_cost"]
+__all__ = ["QueryCost", "StepCost", "query_cost", "query_measures", "step_cost", "step_measures"]
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,12 @@ class StepCost:
         return float(self.steps.sum()) + self.resets
 
 
-def step_cost(blocks: Iterable[Block], setting: BallExperiment = BALL_EXPERIMENTS[1]) -> StepCost:
-    """Run the learner through the scenes of some blocks, and the bare engine beside it, block by block.
+def step_cost(episodes: Iterable[Episode], setting: BallExperiment = BALL_EXPERIMENTS[1]) -> StepCost:
+    """Run the learner through the scenes of some episodes, and the bare engine beside it, episode by episode.
 
     Parameters
     ----------
-    blocks
+    episodes
         Where episodes begin; what then happens is the env's own.
     setting
         Parameters of the world.
@@ -67,16 +67,16 @@ def step_cost(blocks: Iterable[Block], setting: BallExperiment = BALL_EXPERIMENT
     env = ModelLearner(gym.make("relgym/BallBoxRamp-v0", **given), config={"frames": "world"})
     bare = BallBoxRampEnv(*arguments)
     steps, resets, engine, begin = [], 0.0, 0.0, perf_counter()
-    for block in blocks:
-        options = dict(block.configuration)
+    for episode in episodes:
+        options = dict(episode.configuration)
         resets += _timed(env.reset, options=options)
-        steps += [_timed(env.step, 0) for _ in range(len(block))]
+        steps += [_timed(env.step, 0) for _ in range(len(episode))]
         bare.reset(options=options)
-        engine += sum(_timed(bare._engine.step) for _ in range(len(block)))
+        engine += sum(_timed(bare._engine.step) for _ in range(len(episode)))
     return StepCost(env.model, np.array(steps), resets, engine, perf_counter() - begin)
 
 
-def step_bars(costs: Iterable[StepCost]) -> list[Measure]:
+def step_measures(costs: Iterable[StepCost]) -> list[Measure]:
     """Row 7: totals and quantiles, one figure per run."""
     runs = list(costs)
     ms = [1000.0 * run.steps for run in runs]
@@ -107,21 +107,21 @@ class QueryCost:
     equal: bool
 
 
-def query_cost(model: WorldModel, blocks: Iterable[Block], *, singles: int = 2000) -> QueryCost:
-    """Ask a model for every scene of some blocks: all at once, and some one by one.
+def query_cost(model: WorldModel, episodes: Iterable[Episode], *, singles: int = 2000) -> QueryCost:
+    """Ask a model for every scene of some episodes: all at once, and some one by one.
 
     Parameters
     ----------
     model
         The model; unchanged.
-    blocks
-        Blocks with the same objects.
+    episodes
+        Episodes with the same objects.
     singles
         How many scenes, evenly spread, are asked for one by one.
     """
-    parts = list(blocks)
+    parts = list(episodes)
     layout, schema = parts[0].layout, parts[0].schema
-    vectors = np.concatenate([block.vectors[:-1] for block in parts])
+    vectors = np.concatenate([episode.vectors[:-1] for episode in parts])
     model.predict_batch(layout, vectors[:10])
     start = process_time()
     batch = model.predict_batch(layout, vectors)
@@ -136,7 +136,7 @@ def query_cost(model: WorldModel, blocks: Iterable[Block], *, singles: int = 200
     return QueryCost(float(np.median(times)), per_scene, equal)
 
 
-def query_bars(costs: Iterable[QueryCost]) -> list[Measure]:
+def query_measures(costs: Iterable[QueryCost]) -> list[Measure]:
     """Row 8, one figure per run."""
     runs = list(costs)
     return [

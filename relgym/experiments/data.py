@@ -1,4 +1,4 @@
-"""The thesis' data sets: blocks of consecutive transitions with ground truth from the envs' own contact logs.
+"""The thesis' data sets: episodes of consecutive transitions with ground truth from the envs' own contact logs.
 
 Nothing in the truth owes anything to a learner: it comes from what the physics engine touched, or from the
 layout that the truck env drew.
@@ -29,11 +29,11 @@ from relgym.experiments.analytic import (
     surface_normals,
     truck_modes,
 )
-from relgym.experiments.blocks import Block, Truth
+from relgym.experiments.episodes import Episode, Truth
 from relgym.scene.objects import Float1D, Float2D, SceneLayout
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["BALL_EXPERIMENTS", "BallExperiment", "Block", "Truth", "ball_blocks", "truck_blocks"]
+__all__ = ["BALL_EXPERIMENTS", "BallExperiment", "Episode", "Truth", "ball_episodes", "truck_episodes"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class BallExperiment:
     incline: float
     elasticity: float
     frictions: tuple[float, ...]
-    blocks: int
+    episodes: int
     type_names: str = "shape"
     objects: tuple[str, ...] = ("box", "ramp")
 
@@ -59,34 +59,34 @@ BALL_EXPERIMENTS: Mapping[int, BallExperiment] = {
 }
 """The thesis' three experiments: 16,000, 32,000 and 96,000 examples."""
 
-TEST_BLOCKS = 120
-"""Blocks of a test set: 24,000 examples (§4.2)."""
+TEST_EPISODES = 120
+"""Episodes of a test set: 24,000 examples (§4.2)."""
 
-BLOCK_STEPS = 200
+EPISODE_STEPS = 200
 
 
-def ball_blocks(
+def ball_episodes(
     experiment: int | BallExperiment,
     *,
     seed: int,
-    blocks: int | None = None,
+    episodes: int | None = None,
     order: int | None = 0,
     test: bool = False,
-) -> Iterator[Block]:
-    """Blocks of a ball experiment, one after the other.
+) -> Iterator[Episode]:
+    """Episodes of a ball experiment, one after the other.
 
-    Block k shows configuration k mod 40 (of each friction in turn), so 80 blocks show each one twice.
+    Episode k shows configuration k mod 40 (of each friction in turn), so 80 episodes show each one twice.
 
     Parameters
     ----------
     experiment
         1, 2 or 3, or parameters of your own.
     seed
-        Determines sizes, positions and speeds of every block.
-    blocks
+        Determines sizes, positions and speeds of every episode.
+    episodes
         How many; default: as many as in the thesis, 120 for a test set.
     order
-        Determines in which order the blocks come, without changing them; ``None``: unshuffled.
+        Determines in which order the episodes come, without changing them; ``None``: unshuffled.
     test
         Whether to draw a test set, whose scenes differ from those of all training sets.
 
@@ -95,7 +95,7 @@ def ball_blocks(
     Cost: about 25 microseconds a transition.
     """
     setting = _experiment(experiment)
-    count = blocks if blocks is not None else (TEST_BLOCKS if test else setting.blocks)
+    count = episodes if episodes is not None else (TEST_EPISODES if test else setting.episodes)
     worlds = _worlds(setting)
     modes, cases = setting.modes(), _cases(setting)
     numbers = np.arange(count)
@@ -104,13 +104,13 @@ def ball_blocks(
     for k in numbers.tolist():
         world = worlds[k % len(worlds)]
         options = cases[k // len(worlds) % len(cases)]
-        block_seed = int(np.random.SeedSequence([seed, int(test), k]).generate_state(1)[0])
-        yield _ball_block(world, options, block_seed, setting, modes)
+        episode_seed = int(np.random.SeedSequence([seed, int(test), k]).generate_state(1)[0])
+        yield _ball_episode(world, options, episode_seed, setting, modes)
 
 
 @dataclass(frozen=True)
 class _World:
-    """A room with one friction, and the schema and layout that its blocks have."""
+    """A room with one friction, and the schema and layout that its episodes have."""
 
     env: BallBoxRampEnv
     friction: float
@@ -168,14 +168,14 @@ def _joint_schema(schemas: list[SceneSchema]) -> tuple[SceneSchema, list[list[st
     return replace(schemas[0], types=tuple(types.values()), objects=tuple(objects.items())), names
 
 
-def _ball_block(
+def _ball_episode(
     world: _World, options: Mapping[str, Any], seed: int, setting: BallExperiment, modes: AnalyticModes
-) -> Block:
+) -> Episode:
     env = world.env
     _, info = env.reset(seed=seed, options=dict(options))
     configuration = info["configuration"]
     rows, log = [env.vector], [info["contacts"]]
-    for _ in range(BLOCK_STEPS):
+    for _ in range(EPISODE_STEPS):
         *_, info = env.step(0)
         rows.append(env.vector)
         log.append(info["contacts"])
@@ -184,7 +184,7 @@ def _ball_block(
     ball = env.schema.layout().index("ball")
     columns = [env.schema.layout().column(ball, prop) for prop in ("vx", "vy")]
     truth = _ball_truth(log[:-1], vectors[:-1, columns], world.friction, setting, modes)
-    return Block(world.schema, world.layout, vectors, truth, configuration)
+    return Episode(world.schema, world.layout, vectors, truth, configuration)
 
 
 def _ball_truth(
@@ -231,11 +231,11 @@ def _case(contacts: list[Contact], v: list[float], friction: float, incline: flo
     return Case(surface, "forward" if tangential > 0 else "backward", friction, sliding)
 
 
-TRUCK_BLOCK_STEPS = 40
+TRUCK_EPISODE_STEPS = 40
 
 
-def truck_blocks(
-    redraw: str = "step",
+def truck_episodes(
+    resample: str = "step",
     *,
     seed: int,
     n_boxes: int = 3,
@@ -245,17 +245,17 @@ def truck_blocks(
     order: int | None = 0,
     bystanders: int = 0,
     test: bool = False,
-) -> Iterator[Block]:
-    """Blocks of the box pushing domain (§3.1): layouts x permutations of the boxes x repeats, 48 of 40 steps.
+) -> Iterator[Episode]:
+    """Episodes of the box pushing domain (§3.1): layouts x permutations of the boxes x repeats, 48 of 40 steps.
 
     With the default ranges the truck never stops.
 
     Parameters
     ----------
-    redraw
-        ``"step"``: force and frictions are drawn at every step; ``"block"``: once a block.
+    resample
+        ``"step"``: force and frictions are drawn at every step; ``"episode"``: once an episode.
     seed
-        Determines sizes, positions, frictions and forces of every block.
+        Determines sizes, positions, frictions and forces of every episode.
     n_boxes
         Number of boxes.
     repeats
@@ -263,7 +263,7 @@ def truck_blocks(
     force_range, friction_range
         From where pushing force and frictions are drawn.
     order
-        Determines in which order the blocks come, without changing them; ``None``: unshuffled.
+        Determines in which order the episodes come, without changing them; ``None``: unshuffled.
     bystanders
         How many boxes stand beside the track.
     test
@@ -273,7 +273,7 @@ def truck_blocks(
     -----
     Cost: about 30 microseconds a transition.
     """
-    env = TruckPushEnv(n_boxes, redraw, friction_range, (0.0, 500.0), bystanders, task=None)
+    env = TruckPushEnv(n_boxes, resample, friction_range, (0.0, 500.0), bystanders, task=None)
     boxes = tuple(f"box{k + 1}" for k in range(n_boxes))
     cases = list(product(range(repeats), range(1, len(layouts(n_boxes)) + 1), permutations(boxes)))
     numbers = np.arange(len(cases))
@@ -282,12 +282,12 @@ def truck_blocks(
     for k in numbers.tolist():
         _, layout, names = cases[k]
         rng = np.random.default_rng([seed, int(test), k])
-        forces = rng.uniform(*force_range, TRUCK_BLOCK_STEPS if redraw == "step" else 1)
-        forces = np.broadcast_to(forces, TRUCK_BLOCK_STEPS)
-        yield _truck_block(env, {"layout": layout, "order": names}, int(rng.integers(2**31)), forces)
+        forces = rng.uniform(*force_range, TRUCK_EPISODE_STEPS if resample == "step" else 1)
+        forces = np.broadcast_to(forces, TRUCK_EPISODE_STEPS)
+        yield _truck_episode(env, {"layout": layout, "order": names}, int(rng.integers(2**31)), forces)
 
 
-def _truck_block(env: TruckPushEnv, options: Mapping[str, Any], seed: int, forces: Float1D) -> Block:
+def _truck_episode(env: TruckPushEnv, options: Mapping[str, Any], seed: int, forces: Float1D) -> Episode:
     _, info = env.reset(seed=seed, options=dict(options))
     ((_, low, high),) = env.schema.action_scale
     rows, actions = [env.vector], []
@@ -307,4 +307,4 @@ def _truck_block(env: TruckPushEnv, options: Mapping[str, Any], seed: int, force
         active=np.zeros(len(forces), dtype=np.int64),
         corner=np.zeros(len(forces), dtype=np.bool_),
     )
-    return Block(env.schema, env.schema.layout(), vectors, truth, info["configuration"])
+    return Episode(env.schema, env.schema.layout(), vectors, truth, info["configuration"])

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 import relgym  # noqa: F401 - registers the envs
 from relgym.experiments.analytic import AnalyticModes
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks, truck_blocks
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes, truck_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import Evaluation, evaluate, explicable
 from relgym.experiments.plots import Trajectory, draw_curves, draw_trajectories
 from relgym.experiments.rollouts import RolloutErrors, imagined, rollouts
@@ -26,9 +26,9 @@ from relgym.scene.objects import ACTION
 from relgym.wrappers import ModelLearner, StepReport
 
 __all__ = [
-    "BlockErrors",
     "DemoOutcome",
     "Demonstration",
+    "EpisodeErrors",
     "Figures",
     "demonstrations",
     "draw",
@@ -52,10 +52,10 @@ class Demonstration:
         What to hand to ``gym.make``.
     config
         What differs from the learner's default parameters.
-    blocks, test_blocks
-        How many blocks to learn from, and to test on.
+    episodes, test_episodes
+        How many episodes to learn from, and to test on.
     training, testing
-        From a seed to those blocks.
+        From a seed to those episodes.
     mover
         Name of the object whose path is drawn.
     drawn
@@ -69,10 +69,10 @@ class Demonstration:
     env_id: str
     arguments: Mapping[str, Any]
     config: Mapping[str, Any]
-    blocks: int
-    test_blocks: int
-    training: Callable[[int], Iterable[Block]]
-    testing: Callable[[int], Iterable[Block]]
+    episodes: int
+    test_episodes: int
+    training: Callable[[int], Iterable[Episode]]
+    testing: Callable[[int], Iterable[Episode]]
     mover: str
     drawn: int
     laws: AnalyticModes | None = None
@@ -83,8 +83,8 @@ class Demonstration:
 
 
 @dataclass(frozen=True, slots=True)
-class BlockErrors:
-    """Predictions made during one block, each before the model learned from its outcome.
+class EpisodeErrors:
+    """Predictions made during one episode, each before the model learned from its outcome.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class BlockErrors:
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What was measured of a model on blocks it hasn't learned from."""
+    """What was measured of a model on episodes it hasn't learned from."""
 
     seed: int
     evaluation: Evaluation
@@ -128,7 +128,7 @@ class DemoOutcome:
     figures
         How good it is.
     curve
-        Errors of each block, made before learning from it.
+        Errors of each episode, made before learning from it.
     file
         Where the model was saved.
     """
@@ -138,7 +138,7 @@ class DemoOutcome:
     seconds: float
     report: ModelReport
     figures: Figures
-    curve: tuple[BlockErrors, ...]
+    curve: tuple[EpisodeErrors, ...]
     file: str
 
     def __str__(self) -> str:
@@ -150,28 +150,28 @@ class DemoOutcome:
 
 
 def demonstrations(*, quick: bool = False) -> tuple[Demonstration, ...]:
-    """Truck-push with frictions redrawn at every step (§3.1), and ball-box-ramp, experiment 1 (§4.3).
+    """Truck-push with frictions resampled at every step (§3.1), and ball-box-ramp, experiment 1 (§4.3).
 
     Parameters
     ----------
     quick
-        A tenth of the blocks: for a first look, and for tests.
+        A tenth of the episodes: for a first look, and for tests.
     """
     return _truck(quick), _ball(quick)
 
 
 def _truck(quick: bool) -> Demonstration:
-    blocks = 8 if quick else 48
+    episodes = 8 if quick else 48
     return Demonstration(
         name="truck",
         title="truck-push: a truck pushes stacks of boxes",
         env_id="relgym/TruckPush-v0",
-        arguments={"redraw": "step", "task": None},
+        arguments={"resample": "step", "task": None},
         config={},
-        blocks=blocks,
-        test_blocks=blocks,
-        training=lambda seed: islice(truck_blocks(seed=seed), blocks),
-        testing=lambda seed: islice(truck_blocks(seed=seed, test=True), blocks),
+        episodes=episodes,
+        test_episodes=episodes,
+        training=lambda seed: islice(truck_episodes(seed=seed), episodes),
+        testing=lambda seed: islice(truck_episodes(seed=seed, test=True), episodes),
         mover="truck",
         drawn=1,
     )
@@ -179,7 +179,7 @@ def _truck(quick: bool) -> Demonstration:
 
 def _ball(quick: bool) -> Demonstration:
     setting = BALL_EXPERIMENTS[1]
-    blocks, test_blocks = (8, 12) if quick else (setting.blocks, 120)
+    episodes, test_episodes = (8, 12) if quick else (setting.episodes, 120)
     friction = setting.frictions[0]
     return Demonstration(
         name="ball",
@@ -187,18 +187,18 @@ def _ball(quick: bool) -> Demonstration:
         env_id="relgym/BallBoxRamp-v0",
         arguments={"incline": setting.incline, "elasticity": setting.elasticity, "friction": friction},
         config={"frames": "world"},  # the thesis' tables; without it, three contact laws
-        blocks=blocks,
-        test_blocks=test_blocks,
-        training=lambda seed: islice(ball_blocks(1, seed=seed), blocks),
-        testing=lambda seed: islice(ball_blocks(1, seed=seed, test=True), test_blocks),
+        episodes=episodes,
+        test_episodes=test_episodes,
+        training=lambda seed: islice(ball_episodes(1, seed=seed), episodes),
+        testing=lambda seed: islice(ball_episodes(1, seed=seed, test=True), test_episodes),
         mover="ball",
         drawn=3,
         laws=setting.modes(),
     )
 
 
-def learn_online(env: ModelLearner, shown: Demonstration, *, seed: int) -> Iterator[BlockErrors]:
-    """Run the env through the world's blocks; its wrapper predicts, steps and learns, one transition each.
+def learn_online(env: ModelLearner, shown: Demonstration, *, seed: int) -> Iterator[EpisodeErrors]:
+    """Run the env through the world's episodes; its wrapper predicts, steps and learns, one transition each.
 
     Parameters
     ----------
@@ -211,19 +211,19 @@ def learn_online(env: ModelLearner, shown: Demonstration, *, seed: int) -> Itera
 
     Yields
     ------
-    The errors of each block, as soon as it is over.
+    The errors of each episode, as soon as it is over.
     """
-    for block in shown.training(seed):
-        # The block says where to begin and what to do; what then happens is the env's own.
-        env.reset(seed=seed, options=dict(block.configuration))
-        counted = explicable(block, shown.laws)
+    for episode in shown.training(seed):
+        # The episode says where to begin and what to do; what then happens is the env's own.
+        env.reset(seed=seed, options=dict(episode.configuration))
+        counted = explicable(episode, shown.laws)
         wrong: dict[str, list[bool]] = {}
-        for k, action in enumerate(_actions(block)):
+        for k, action in enumerate(_actions(episode)):
             *_, info = env.step(action)
-            for target, is_wrong in _verdicts(info["relgym"], block):
+            for target, is_wrong in _verdicts(info["relgym"], episode):
                 if target not in counted or counted[target][k]:
                     wrong.setdefault(target, []).append(is_wrong)
-        yield BlockErrors(len(block), {target: float(np.mean(found)) for target, found in wrong.items()})
+        yield EpisodeErrors(len(episode), {target: float(np.mean(found)) for target, found in wrong.items()})
 
 
 def measure(model: WorldModel, shown: Demonstration, *, seed: int) -> Figures:
@@ -238,18 +238,18 @@ def measure(model: WorldModel, shown: Demonstration, *, seed: int) -> Figures:
     seed
         Of the test scenes.
     """
-    blocks = list(shown.testing(seed))
-    truck = check_truck(model, blocks, every=4) if shown.name == "truck" else None
-    return Figures(seed, evaluate(model, blocks, shown.laws), rollouts(model, blocks[:80]), truck)
+    episodes = list(shown.testing(seed))
+    truck = check_truck(model, episodes, every=4) if shown.name == "truck" else None
+    return Figures(seed, evaluate(model, episodes, shown.laws), rollouts(model, episodes[:80]), truck)
 
 
 def trajectories(model: WorldModel, shown: Demonstration, *, seed: int) -> list[Trajectory]:
     """The first episodes of a test set, real and imagined; not a selection."""
     found = []
-    for block in islice(shown.testing(seed), shown.drawn):
-        dream, steps = imagined(model, block.vectors, block.layout)
-        title = f"{shown.name}, which hits a corner" if block.truth.corner.any() else shown.name
-        found.append(Trajectory(title, block.scene(0), shown.mover, block.vectors, dream, steps))
+    for episode in islice(shown.testing(seed), shown.drawn):
+        dream, steps = imagined(model, episode.vectors, episode.layout)
+        title = f"{shown.name}, which hits a corner" if episode.truth.corner.any() else shown.name
+        found.append(Trajectory(title, episode.scene(0), shown.mover, episode.vectors, dream, steps))
     return found
 
 
@@ -271,18 +271,18 @@ def draw(folder: Path, outcomes: Iterable[DemoOutcome], paths: Sequence[Trajecto
     }
 
 
-def _actions(block: Block) -> Iterator[Any]:
-    """The block's actions in the units of the env's action space."""
-    scale = block.schema.action_scale
+def _actions(episode: Episode) -> Iterator[Any]:
+    """The episode's actions in the units of the env's action space."""
+    scale = episode.schema.action_scale
     if not scale:
-        return (0 for _ in range(len(block)))
-    physical = block.columns(ACTION, *(prop for prop, _, _ in scale))[:-1]
+        return (0 for _ in range(len(episode)))
+    physical = episode.columns(ACTION, *(prop for prop, _, _ in scale))[:-1]
     low, high = np.array([[a, b] for _, a, b in scale]).T
     normalised: NDArray[np.float32] = (2.0 * (physical - low) / (high - low) - 1.0).astype(np.float32)
     return iter(normalised)
 
 
-def _verdicts(told: StepReport, block: Block) -> Iterator[tuple[str, bool]]:
+def _verdicts(told: StepReport, episode: Episode) -> Iterator[tuple[str, bool]]:
     """(target, whether its prediction was wrong) for every object of one step."""
     for name, prop in told.residuals:
-        yield f"{block.layout.types[block.layout.index(name)].name}.{prop}", (name, prop) in told.wrong
+        yield f"{episode.layout.types[episode.layout.index(name)].name}.{prop}", (name, prop) in told.wrong

@@ -45,9 +45,9 @@ class Run:
     seconds
         Processor time of one core, evaluations included: what else a machine does doesn't count.
     learning_seconds, dreaming_seconds
-        Wall time that the model took to foretell and learn, and to dream.
-    trusted
-        Share of the real steps at which the model was trusted.
+        Wall time that the model took to predict and learn, and to dream.
+    accepted
+        Share of the real steps at which the model was accepted.
     laws
         What was learned, as text; empty where nothing readable was.
     """
@@ -61,7 +61,7 @@ class Run:
     seconds: float
     learning_seconds: float = 0.0
     dreaming_seconds: float = 0.0
-    trusted: float = 0.0
+    accepted: float = 0.0
     laws: str = ""
 
     @property
@@ -163,12 +163,12 @@ def run(
     tests = testing or Examination(course)
     later = tests if change is None else Examination(course, **change.arguments)
     curve: list[tuple[int, int]] = []
-    trusted = 0
+    accepted = 0
 
     class Check(BaseCallback):  # type: ignore[misc]
         def _on_step(self) -> bool:
-            nonlocal trusted
-            trusted += int(getattr(self.model.replay_buffer, "trusted", False))
+            nonlocal accepted
+            accepted += int(getattr(self.model.replay_buffer, "accepted", False))
             if self.num_timesteps % CHECK_EVERY:
                 return True
             exam = tests if change is None or self.num_timesteps <= change.after else later
@@ -183,7 +183,7 @@ def run(
     if met is not None:
         met(algorithm, getattr(own, "world", None))
     learning, dreaming, laws = _costs(own)
-    share = trusted / max(1, algorithm.num_timesteps)
+    share = accepted / max(1, algorithm.num_timesteps)
     solved = solved_at(curve)
     return Run(
         course.name, arm.name, seed, steps, tuple(curve), solved, seconds, learning, dreaming, share, laws
@@ -197,8 +197,8 @@ def solved_at(curve: Sequence[tuple[int, int]]) -> int | None:
 
 
 def _costs(own: Any) -> tuple[float, float, str]:
-    if own is None or not hasattr(own, "apprentice"):
+    if own is None or not hasattr(own, "trainer"):
         return 0.0, 0.0, ""
-    parts = [own.world, getattr(own.apprentice.judge, "model", None)]
+    parts = [own.world, getattr(own.trainer.reward_model, "model", None)]
     laws = [part.describe() for part in dict.fromkeys(parts) if hasattr(part, "describe")]
-    return own.apprentice.seconds, own.dreaming_seconds, "\n\n".join(laws)
+    return own.trainer.seconds, own.dreaming_seconds, "\n\n".join(laws)

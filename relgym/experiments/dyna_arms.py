@@ -16,9 +16,9 @@ from relgym.envs.flat import FlatSpec
 from relgym.errors import ConfigError
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.flat import FlatView
-from relgym.wrappers.glimpses import Glimpses
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.truncated_episodes import TruncatedEpisodes
 
 if TYPE_CHECKING:
     from relgym.wrappers.sb3.dyna import Dyna
@@ -72,8 +72,8 @@ class Course:
         How to dream there, where it isn't as by default: parameters of `DynaConfig`.
     agent
         Parameters of `AGENT` that differ here for agents that dream.
-    glimpse
-        Decisions after which most real episodes are cut short for agents that dream (`Glimpses`); 0: never.
+    truncate_after
+        Decisions after which most real episodes are cut short for agents that dream (`TruncatedEpisodes`); 0: never.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Course:
     horizon: int = 20
     dreams: Mapping[str, Any] = field(default_factory=dict)
     agent: Mapping[str, Any] = field(default_factory=dict)
-    glimpse: int = 0
+    truncate_after: int = 0
 
 
 @dataclass(frozen=True)
@@ -115,24 +115,24 @@ class Arm:
     model
         What is dreamed in.
     updates
-        Gradient steps per real step; with a model, while it is trusted.
-    burst
-        Gradient steps at once when the model is first trusted.
+        Gradient steps per real step; with a model, while it is accepted.
+    catch_up
+        Gradient steps at once when the model is first accepted.
     learned
         Whether reward and termination are learned too, or given.
     varied
-        Whether objects of one type are exchanged and distances redrawn: in dreams, or without a model in the
+        Whether objects of one type are exchanged and distances resampled: in dreams, or without a model in the
         replay buffer (objects only).
     doubted
-        Whether the model must earn its trust (`TrustGate`), or is trusted as soon as it speaks, as in MBPO: nets that
-        are never exact would hardly ever be trusted, and that arm would be SAC.
+        Whether the model must earn its trust (`ModelAcceptance`), or is accepted as soon as it speaks, as in MBPO: nets that
+        are never exact would hardly ever be accepted, and that arm would be SAC.
     """
 
     name: str
     title: str
     model: Literal["none", "neural", "relational"]
     updates: int = 1
-    burst: int = 0
+    catch_up: int = 0
     learned: bool = False
     varied: bool = False
     doubted: bool = True
@@ -149,16 +149,16 @@ _BALL_DREAMS: Final[Mapping[str, Any]] = {
     "every": 10,
     "capacity": 40_000,
     "from_start": 0.3,
-    "redraw": False,
+    "resample": False,
     "permute": False,
-    "kick": 0.5,
+    "perturb_velocity": 0.5,
     "updates": 40,
-    "burst": 0,
+    "catch_up": 0,
 }
 """Episodes are long and their steps short, so dreams branch off anywhere. Goals in mid-air would teach nothing, nor
 would a left wall on the right; other speeds do, for a ball gets over a box or a ramp only after many bounces that pay
 nothing. At first only a few rooms were seen, and a policy trained long in these knows no others: hence
-`Course.glimpse`."""
+`Course.truncate_after`."""
 
 _BALL_AGENT: Final[Mapping[str, Any]] = {"ent_coef": "auto_0.01"}
 """What a decision pays is a few hundredths, and the weight of entropy settles at some thousandths. Begun at 1, it left
@@ -178,12 +178,12 @@ COURSES: Final = {
             horizon=100,
             dreams=_BALL_DREAMS,
             agent=_BALL_AGENT,
-            glimpse=10,
+            truncate_after=10,
         ),
     )
 }
 
-_DYNA: Final[Mapping[str, Any]] = {"updates": 40, "burst": 10_000}
+_DYNA: Final[Mapping[str, Any]] = {"updates": 40, "catch_up": 10_000}
 """Of all arms with a model: 10,000 and 40 per real step make 36 for each of the first 1,000 real steps."""
 
 ARMS: Final = {
@@ -249,7 +249,7 @@ def make_env(
     change
         How the world changes, if it does.
     arm
-        Who is to train in it; default: it is for tests. Most episodes of some are cut short (`Course.glimpse`).
+        Who is to train in it; default: it is for tests. Most episodes of some are cut short (`Course.truncate_after`).
     spec
         What the flat view shows, where it isn't what the env declares.
     arguments
@@ -262,8 +262,8 @@ def make_env(
     env = made()
     if change is not None:
         env = ChangingWorld(env, made(**change.arguments), change.after)
-    if course.glimpse and arm is not None and arm.dreams:
-        env = Glimpses(env, course.glimpse * course.repeat)
+    if course.truncate_after and arm is not None and arm.dreams:
+        env = TruncatedEpisodes(env, course.truncate_after * course.repeat)
     env = TransitionRecorder(env)
     return FlatView(ActionRepeat(env, course.repeat) if course.repeat > 1 else env, spec)
 
@@ -287,7 +287,7 @@ def make_agent(arm: Arm, env: gym.Env[Any, Any], *, seed: int, **changes: Any) -
         ) from None
     mixing = replay_options(env.observation_space, gamma=AGENT["gamma"])
     env.action_space.seed(seed)
-    updates = 1 if arm.dreams else arm.updates  # until the model is trusted
+    updates = 1 if arm.dreams else arm.updates  # until the model is accepted
     agent = SAC("MlpPolicy", env, seed=seed, gradient_steps=updates, **{**AGENT, **mixing, **changes})
     agent.set_logger(Logger(None, []))  # one of Stable-Baselines3's own leaves an empty folder behind
     return agent
@@ -316,19 +316,19 @@ def _dyna(arm: Arm, course: Course, model: Any, *, seed: int, **changes: Any) ->
     settings: dict[str, Any] = {
         "horizon": course.horizon,
         "updates": arm.updates,
-        "burst": arm.burst,
+        "catch_up": arm.catch_up,
         "permute": arm.varied,
-        "redraw": arm.varied,
+        "resample": arm.varied,
         "seed": seed,
     }
     if not arm.doubted:
-        settings |= {"open_at": 1.0, "shut_at": 1.0}
+        settings |= {"accept_at": 1.0, "reject_at": 1.0}
     if (
         arm.model == "neural"
     ):  # nets draw their batches from all they have seen: waiting would only withhold steps
         settings["shuffle"] = 0
     chosen = DynaConfig(**{**settings, **course.dreams, **changes})
-    return Dyna(model, chosen, judge="learned" if arm.learned else None)
+    return Dyna(model, chosen, reward_model="learned" if arm.learned else None)
 
 
 def _model(arm: Arm, env: gym.Env[Any, Any], seed: int) -> Any:

@@ -15,8 +15,8 @@ from relgym.envs.flat import FlatSpec
 from relgym.experiments.dyna import Examination
 from relgym.experiments.dyna_arms import AGENT, COURSES, Course, make_env
 from relgym.wrappers.flat import VectorFlatView
-from relgym.wrappers.sb3.apprentice import Apprentice
 from relgym.wrappers.sb3.config import DynaConfig
+from relgym.wrappers.sb3.trainer import ModelTrainer
 
 __all__ = ["among", "asleep", "trained_among", "trained_asleep"]
 
@@ -87,8 +87,8 @@ def trained_asleep(course: Course, *, seed: int, real: int, updates: int) -> Any
 
     env = make_env(course)
     config = DynaConfig(horizon=course.horizon, seed=seed)
-    apprentice = _watched(env, config, real=real, seed=seed)
-    dreams = DreamVecEnv(apprentice, env, num_envs=DREAMS, config=config)
+    trainer = _watched(env, config, real=real, seed=seed)
+    dreams = DreamVecEnv(trainer, env, num_envs=DREAMS, config=config)
     agent = _agent(dreams, seed)
     agent.learn(DREAMS * (updates // UPDATES))
     return agent
@@ -135,14 +135,14 @@ def trained_among(
     return agent, spec
 
 
-def _watched(env: gym.Env[Any, Any], config: DynaConfig, *, real: int, seed: int) -> Apprentice:
+def _watched(env: gym.Env[Any, Any], config: DynaConfig, *, real: int, seed: int) -> ModelTrainer:
     """A model that has watched random actions."""
     from relgym.wrappers.sb3.dreaming import explore
 
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
-    apprentice = Apprentice(model, env.get_wrapper_attr("task"), config)
-    explore(apprentice, env, real, seed=seed)
-    return apprentice
+    trainer = ModelTrainer(model, env.get_wrapper_attr("task"), config)
+    explore(trainer, env, real, seed=seed)
+    return trainer
 
 
 def _agent(dreams: Any, seed: int) -> Any:

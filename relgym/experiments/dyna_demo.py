@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DynaDemo", "demonstrate", "episodes"]
 
-_QUICK: Final[dict[str, Any]] = {"updates": 20, "burst": 5_000}
+_QUICK: Final[dict[str, Any]] = {"updates": 20, "catch_up": 5_000}
 """Of Dyna, half of what the comparison takes: on the tuning seeds 100 to 103 as good, in half the time."""
 
 _SHOWN: Final = 3
@@ -115,7 +115,7 @@ def episodes(agent: Any, model: WorldModel, course: Course, *, count: int = _SHO
     agent
         Acts at its best.
     model
-        Foretells.
+        Predicts.
     course
         Where.
     count

@@ -12,7 +12,7 @@ from gymnasium.vector import SyncVectorEnv
 
 from relgym.config import ModelConfig
 from relgym.envs import LearnedModelVectorEnv, drawn_from
-from relgym.experiments.data import ball_blocks
+from relgym.experiments.data import ball_episodes
 from relgym.experiments.seeds import TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.model.world_model import WorldModel
 from relgym.wrappers import ModelLearner
@@ -67,7 +67,7 @@ def speed(*, world: str) -> dict[str, float]:
 @cache
 def _truck_model() -> WorldModel:
     """A truck with three boxes, pushed 1,200 times."""
-    env = ModelLearner(gym.make(_TRUCK[0], redraw="step"))
+    env = ModelLearner(gym.make(_TRUCK[0], resample="step"))
     env.action_space.seed(TUNING_SEEDS[0])
     for episode in range(60):
         env.reset(seed=TUNING_SEEDS[0] + episode)
@@ -81,10 +81,10 @@ def _truck_model() -> WorldModel:
 @cache
 def _ball_model(frames: str) -> WorldModel:
     """A ball among six bodies, watched for 12,000 steps."""
-    blocks = list(ball_blocks(1, seed=TUNING_SEEDS[0], blocks=60))
-    model = WorldModel(blocks[0].schema, ModelConfig(frames=frames))  # type: ignore[arg-type]
-    for block in blocks:
-        for transition in block.transitions():
+    episodes = list(ball_episodes(1, seed=TUNING_SEEDS[0], episodes=60))
+    model = WorldModel(episodes[0].schema, ModelConfig(frames=frames))  # type: ignore[arg-type]
+    for episode in episodes:
+        for transition in episode.transitions():
             model.learn_one(transition)
     model.finish()
     return model
@@ -106,7 +106,7 @@ def _truck_dreams() -> LearnedModelVectorEnv:
 
 def _ball_dreams(frames: str) -> LearnedModelVectorEnv:
     """Balls anywhere on their ways through 40 rooms."""
-    blocks = ball_blocks(1, seed=TUNING_TEST_SEED, blocks=40, test=True)
-    start = drawn_from(np.concatenate([block.vectors[:-1] for block in blocks]))
+    episodes = ball_episodes(1, seed=TUNING_TEST_SEED, episodes=40, test=True)
+    start = drawn_from(np.concatenate([episode.vectors[:-1] for episode in episodes]))
     like = gym.make(_BALL[0])
     return LearnedModelVectorEnv(_ball_model(frames), COUNT, like=like, start=start, horizon=200)

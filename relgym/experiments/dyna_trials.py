@@ -62,7 +62,7 @@ def misled(*, course: str, arm: str, seed: int, steps: int, arguments: Mapping[s
 
     Returns
     -------
-    The `Run`, and the share of steps that the model foretells to within 1e-6 in its own world.
+    The `Run`, and the share of steps that the model predicts to within 1e-6 in its own world.
     """
     place = COURSES[course]
     model, right = _of_another_world(place, dict(arguments), seed)
@@ -82,11 +82,11 @@ def _of_another_world(course: Course, arguments: dict[str, Any], seed: int) -> t
     model.frozen = True
     targets = [(target.type, target.property) for target in model.targets]
     tests = _random_steps(env, _LESSONS // 3, _FIRST_TEST + seed)
-    right = [_foretold(model, real.transition, targets) for real in tests]
+    right = [_predicted(model, real.transition, targets) for real in tests]
     return model, sum(right) / len(right)
 
 
-def _foretold(model: WorldModel, transition: Any, targets: list[tuple[str, str]]) -> bool:
+def _predicted(model: WorldModel, transition: Any, targets: list[tuple[str, str]]) -> bool:
     found = model.predict_one(transition.before)
     return bool(found.ok) and all(
         abs(found.scene[o.name][prop] - o[prop]) <= 1e-6

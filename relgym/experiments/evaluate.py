@@ -1,4 +1,4 @@
-"""How good is a model, one step ahead, on blocks that it hasn't seen? By what really happened (§4.3.3).
+"""How good is a model, one step ahead, on episodes that it hasn't seen? By what really happened (§4.3.3).
 
 A prediction is *wrong* if it is off by more than 1e-9, or if no mode made it. Left out, and counted, are only
 steps of which the env's own contact log says that a corner was hit or that several contacts acted at once,
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.experiments.analytic import AnalyticModes, Case
-from relgym.experiments.blocks import Block
+from relgym.experiments.episodes import Episode
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
@@ -47,14 +47,14 @@ class ModeErrors:
         Number of transitions.
     wrong
         How many were predicted wrongly, those without a prediction included.
-    silent
+    abstained
         How many were not predicted by any mode.
     """
 
     name: str
     examples: int
     wrong: int
-    silent: int
+    abstained: int
 
     @property
     def rate(self) -> float:
@@ -86,13 +86,13 @@ class TargetErrors:
     @property
     def total(self) -> ModeErrors:
         """Errors in all modes together."""
-        sums = (sum(getattr(m, name) for m in self.modes) for name in ("examples", "wrong", "silent"))
+        sums = (sum(getattr(m, name) for m in self.modes) for name in ("examples", "wrong", "abstained"))
         return ModeErrors("all", *sums)
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Errors of a model on a set of blocks, by target."""
+    """Errors of a model on a set of episodes, by target."""
 
     targets: tuple[TargetErrors, ...]
 
@@ -107,8 +107,8 @@ class Evaluation:
             rows += [_row(m) for m in target.modes]
             if len(target.modes) > 1:
                 rows.append(_row(target.total))
-        text = table(["what really happened", "examples", "wrong", "silent", "wrong %"], rows)
-        notes = [f"wrong: off by more than {TOLERANCE:g}, or silent: not predicted by any mode"]
+        text = table(["what really happened", "examples", "wrong", "abstained", "wrong %"], rows)
+        notes = [f"wrong: off by more than {TOLERANCE:g}, or abstained: not predicted by any mode"]
         left_out = [f"{t.left_out} of {t.left_out + t.total.examples:,} ({t.target})" for t in self.targets]
         if any(t.left_out for t in self.targets):
             notes += [f"left out: {', '.join(left_out)}:"]
@@ -117,15 +117,17 @@ class Evaluation:
         return "\n".join([text, "", *notes])
 
 
-def evaluate(model: WorldModel, blocks: Iterable[Block], modes: AnalyticModes | None = None) -> Evaluation:
-    """Predict every transition of some blocks, one step ahead, as a batch.
+def evaluate(
+    model: WorldModel, episodes: Iterable[Episode], modes: AnalyticModes | None = None
+) -> Evaluation:
+    """Predict every transition of some episodes, one step ahead, as a batch.
 
     Parameters
     ----------
     model
         The model; unchanged.
-    blocks
-        Blocks of the model's schema, not those that it learned from.
+    episodes
+        Episodes of the model's schema, not those that it learned from.
     modes
         The ball world's linear laws; without them all corner hits and multiple contacts are left out.
 
@@ -135,24 +137,24 @@ def evaluate(model: WorldModel, blocks: Iterable[Block], modes: AnalyticModes | 
     """
     names: dict[str, tuple[str, ...]] = {}
     found: _Parts = {}
-    for part in _chunks(blocks):
+    for part in _chunks(episodes):
         names |= part[0].truth.mode_names if modes is None else mode_labels(modes)
         for target, results in _results(model, part, modes).items():
             found.setdefault(target, []).extend(results)
     return Evaluation(tuple(_target_errors(t, names.get(t, ()), np.concatenate(r)) for t, r in found.items()))
 
 
-def explicable(block: Block, modes: AnalyticModes | None) -> dict[str, NDArray[np.bool_]]:
-    """Per labelled target: which of a block's transitions count, shape ``(n,)``.
+def explicable(episode: Episode, modes: AnalyticModes | None) -> dict[str, NDArray[np.bool_]]:
+    """Per labelled target: which of an episode's transitions count, shape ``(n,)``.
 
     Those with one plain contact or none do; of the others those that some linear law explains.
     """
-    plain = ~(block.truth.corner | (block.truth.active > 1))
+    plain = ~(episode.truth.corner | (episode.truth.active > 1))
     result = {}
-    for target in block.truth.mode:
+    for target in episode.truth.mode:
         result[target] = plain.copy()
         if modes is not None and not plain.all():
-            v = block.columns("ball", "vx", "vy")
+            v = episode.columns("ball", "vx", "vy")
             result[target] |= modes.explaining(target[-1], v[:-1], v[1:], TOLERANCE).any(axis=1)
     return result
 
@@ -174,15 +176,21 @@ def _label(case: Case) -> str:
 
 
 def _row(errors: ModeErrors) -> list[Cell]:
-    return [f"  {errors.name}", errors.examples, errors.wrong, errors.silent, round(100.0 * errors.rate, 3)]
+    return [
+        f"  {errors.name}",
+        errors.examples,
+        errors.wrong,
+        errors.abstained,
+        round(100.0 * errors.rate, 3),
+    ]
 
 
-def _chunks(blocks: Iterable[Block]) -> Iterator[list[Block]]:
-    """Consecutive blocks with the same objects, some thousand transitions at a time."""
-    for _, group in groupby(blocks, key=lambda block: block.layout.names):
-        part: list[Block] = []
-        for block in group:
-            part.append(block)
+def _chunks(episodes: Iterable[Episode]) -> Iterator[list[Episode]]:
+    """Consecutive episodes with the same objects, some thousand transitions at a time."""
+    for _, group in groupby(episodes, key=lambda episode: episode.layout.names):
+        part: list[Episode] = []
+        for episode in group:
+            part.append(episode)
             if sum(map(len, part)) >= _CHUNK:
                 yield part
                 part = []
@@ -190,7 +198,7 @@ def _chunks(blocks: Iterable[Block]) -> Iterator[list[Block]]:
             yield part
 
 
-def _results(model: WorldModel, part: Sequence[Block], modes: AnalyticModes | None) -> _Parts:
+def _results(model: WorldModel, part: Sequence[Episode], modes: AnalyticModes | None) -> _Parts:
     """Per target, arrays of shape ``(n, 4)``: residual, did a mode speak, true mode, does it count."""
     layout, results = part[0].layout, _Parts()
     prediction = model.predict_batch(layout, np.concatenate([b.vectors[:-1] for b in part]))

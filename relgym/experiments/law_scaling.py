@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from relgym.experiments.bar import Measure, measured
+from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.law_score import SEEDS, taught
 from relgym.experiments.law_trials import trial_rooms
 from relgym.experiments.law_worlds import Ball, World

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.experiments.bar import Measure
-from relgym.experiments.blocks import Block
+from relgym.experiments.criterion import Measure
+from relgym.experiments.episodes import Episode
 from relgym.experiments.rooms import Room
 from relgym.laws.book import LawBook
 from relgym.laws.touching import Contacts
@@ -30,7 +30,7 @@ SEEDS: Final = tuple(range(400, 410))
 TESTS: Final = tuple(range(500, 505))
 """Seeds of the test sets; nothing was chosen on them either."""
 
-Part: TypeAlias = Block | Room
+Part: TypeAlias = Episode | Room
 """Consecutive scenes with the same objects."""
 
 Rows: TypeAlias = tuple[str, list[Measure], list[str]]
@@ -43,12 +43,12 @@ class Score:
 
     transitions: int
     wrong: int
-    silent: int
+    abstained: int
 
     @property
     def bad(self) -> int:
         """Predictions that aren't right, for whatever reason."""
-        return self.wrong + self.silent
+        return self.wrong + self.abstained
 
     @property
     def share(self) -> float:
@@ -58,7 +58,7 @@ class Score:
 
 def score(model: WorldModel, parts: Iterable[Part]) -> Score:
     """Let a model predict every transition one step ahead."""
-    total = wrong = silent = 0
+    total = wrong = abstained = 0
     for layout, group in groupby(parts, key=lambda part: part.layout):
         for part in group:
             found = model.predict_batch(layout, part.vectors[:-1])
@@ -66,13 +66,13 @@ def score(model: WorldModel, parts: Iterable[Part]) -> Score:
             off = np.abs(found.vectors[:, columns] - part.vectors[1:, columns]).max(axis=1) > WRONG
             total += len(off)
             wrong += int((off & found.ok).sum())
-            silent += int((~found.ok).sum())
-    return Score(total, wrong, silent)
+            abstained += int((~found.ok).sum())
+    return Score(total, wrong, abstained)
 
 
 def score_laws(book: LawBook, parts: Iterable[Part]) -> Score:
     """Let laws alone predict every transition of every mover, whether or not a model would go by them."""
-    total = wrong = silent = 0
+    total = wrong = abstained = 0
     for part in parts:
         relations = Extractor(part.schema).extract(part.layout, part.vectors[:-1])
         contacts = Contacts.of(book.cast(part.layout), relations, part.vectors[:-1])
@@ -84,8 +84,8 @@ def score_laws(book: LawBook, parts: Iterable[Part]) -> Score:
             known = motion.known[:, body]
             total += len(known)
             wrong += int((off & known).sum())
-            silent += int((~known).sum())
-    return Score(total, wrong, silent)
+            abstained += int((~known).sum())
+    return Score(total, wrong, abstained)
 
 
 def taught(

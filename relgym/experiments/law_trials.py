@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from relgym.experiments.bar import Measure, measured
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.law_motion import episode
 from relgym.experiments.law_score import TESTS, Rows, score, score_laws, taught
 from relgym.experiments.law_worlds import Ball, Material, World
@@ -150,10 +150,10 @@ def other_worlds(seeds: Sequence[int], train: int = 40, test: int = 20) -> Rows:
             missed.append(len(found ^ trial.laws) + (frame != trial.frame))
             shares.append(100.0 * score(model, trial_rooms(trial.world, test, seed=TESTS[0])).share)
         measures.append(measured(f"{trial.name}: laws missed or invented", 0, missed))
-        measures.append(measured(f"{trial.name}: wrong or silent, %", 0.1, shares))
+        measures.append(measured(f"{trial.name}: wrong or abstained, %", 0.1, shares))
         notes += [f"{trial.name}: {row}" for row in report_of(model).laws]
     shares = [100.0 * transplanted(seed, train, test) for seed in seeds]
-    measures.append(measured("space by laws of contact from the plane: wrong or silent, %", 0.1, shares))
+    measures.append(measured("space by laws of contact from the plane: wrong or abstained, %", 0.1, shares))
     return "other worlds", measures, notes
 
 
@@ -170,8 +170,8 @@ def transplanted(seed: int, train: int = 40, test: int = 20) -> float:
 
 
 # ------------------------------------------------------------------ row 8
-def noisy(parts: Sequence[Block], sd: float, *, rng: np.random.Generator) -> Iterator[Block]:
-    """The same blocks, with independent noise on everything that moves: positions and velocities."""
+def noisy(parts: Sequence[Episode], sd: float, *, rng: np.random.Generator) -> Iterator[Episode]:
+    """The same episodes, with independent noise on everything that moves: positions and velocities."""
     for part in parts:
         vectors = part.vectors.copy()
         for i, t in enumerate(part.layout.types):
@@ -183,7 +183,7 @@ def noisy(parts: Sequence[Block], sd: float, *, rng: np.random.Generator) -> Ite
         yield replace(part, vectors=vectors)
 
 
-def noise(seeds: Sequence[int], blocks: int = 24) -> Rows:
+def noise(seeds: Sequence[int], episodes: int = 24) -> Rows:
     """Row 8: restitution and friction from noisy states."""
     measures = []
     for experiment in (1, 2):
@@ -193,7 +193,7 @@ def noise(seeds: Sequence[int], blocks: int = 24) -> Rows:
             off: dict[str, list[float]] = {name: [] for name, value in truth.items() if value}
             frames = []
             for seed in seeds:
-                parts = list(ball_blocks(experiment, seed=seed, blocks=blocks))
+                parts = list(ball_episodes(experiment, seed=seed, episodes=episodes))
                 model = taught(noisy(parts, sd, rng=np.random.default_rng([seed, 1])))
                 assert model.laws is not None, "frames='auto' learns laws"
                 frames.append(_formulas(model.laws)[0] != "contact")
@@ -217,7 +217,7 @@ def constants(book: LawBook) -> dict[str, float]:
 
 # ------------------------------------------------------------------ row 10
 def inexpressible(seeds: Sequence[int], train: int = 40, test: int = 20) -> Rows:
-    """Row 10: laws of contacts that aren't of their form must keep silent."""
+    """Row 10: laws of contacts that aren't of their form must abstain."""
     measures: list[Measure] = []
     for name, world in INEXPRESSIBLE.items():
         laws, models = [], []
@@ -230,5 +230,5 @@ def inexpressible(seeds: Sequence[int], train: int = 40, test: int = 20) -> Rows
         total = laws[0].transitions
         measures.append(measured(f"{name}: laws wrong of {total:,}", 0, [s.wrong for s in laws]))
         measures.append(measured(f"{name}: model wrong", 0, [s.wrong for s in models]))
-        measures.append(measured(f"{name}: model silent", total, [s.silent for s in models]))
+        measures.append(measured(f"{name}: model abstained", total, [s.abstained for s in models]))
     return "physics that laws can't state", measures, []

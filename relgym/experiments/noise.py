@@ -1,7 +1,7 @@
 """Noise tolerance (§4.6, Figure 4.18): the expected noise swept against the true one, and estimated.
 
 Every number that changes from step to step (targets, and what follows from them) is corrupted independently at
-every step, in training and in testing. Numbers that stay what they are while a block lasts are known exactly:
+every step, in training and in testing. Numbers that stay what they are while an episode lasts are known exactly:
 a ball whose extents are corrupted one by one is no ball.
 """
 
@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig, ModelConfig
-from relgym.experiments.bar import Measure, measured
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import ball_blocks
+from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.data import ball_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.online import learned
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout
@@ -32,7 +32,7 @@ __all__ = [
     "best_sigmas",
     "corrupted",
     "moving",
-    "noise_bars",
+    "noise_measures",
     "noise_outcomes",
     "shortfall",
 ]
@@ -43,8 +43,8 @@ VARIANCES: Final = (1e-20, 1e-15, 1e-10, 1e-8, 1e-5)
 SIGMAS: Final = tuple(variance**0.5 for variance in VARIANCES)
 """The same as standard deviations, which is what a learner is told."""
 
-TEST_BLOCKS: Final = 40
-"""Blocks of a test set: a median needs fewer than a rate of errors does."""
+TEST_EPISODES: Final = 40
+"""Episodes of a test set: a median needs fewer than a rate of errors does."""
 
 EXACT: Final = 1e-12
 """An error of no more than this is as good as none, in units of the property."""
@@ -65,24 +65,24 @@ def moving(schema: SceneSchema, layout: SceneLayout) -> list[int]:
     ]
 
 
-def corrupted(block: Block, variance: float, *, rng: np.random.Generator) -> Block:
-    """The block as seen through noise: each moving number plus a draw of its own at every step.
+def corrupted(episode: Episode, variance: float, *, rng: np.random.Generator) -> Episode:
+    """The episode as seen through noise: each moving number plus a draw of its own at every step.
 
     Parameters
     ----------
-    block
-        A block; its truth stays what it was.
+    episode
+        An episode; its truth stays what it was.
     variance
         Of the noise, in squared units of each property.
     """
-    columns = moving(block.schema, block.layout)
-    vectors = block.vectors.copy()
+    columns = moving(episode.schema, episode.layout)
+    vectors = episode.vectors.copy()
     vectors[:, columns] += rng.normal(scale=variance**0.5, size=(len(vectors), len(columns)))
     vectors.flags.writeable = False
-    return replace(block, vectors=vectors)
+    return replace(episode, vectors=vectors)
 
 
-def shortfall(model: WorldModel, blocks: Iterable[Block], target: str) -> float:
+def shortfall(model: WorldModel, episodes: Iterable[Episode], target: str) -> float:
     """Mode-averaged median error (§4.6): the median error of each true mode, averaged.
 
     All modes count the same, however rare. Where the model says nothing, the error is that of the present value.
@@ -91,20 +91,20 @@ def shortfall(model: WorldModel, blocks: Iterable[Block], target: str) -> float:
     ----------
     model
         Unchanged.
-    blocks
-        Fresh blocks; steps without a single true mode are left out.
+    episodes
+        Fresh episodes; steps without a single true mode are left out.
     target
         Such as ``ball.vy``.
     """
     kind, prop = target.split(".")
     errors: list[NDArray[np.float64]] = []
     modes: list[NDArray[np.int64]] = []
-    for block in blocks:
-        (index,) = block.layout.of_type(kind)
-        column = block.layout.column(index, prop)
-        predicted = model.predict_batch(block.layout, block.vectors[:-1]).vectors[:, column]
-        errors.append(np.abs(predicted - block.vectors[1:, column]))
-        modes.append(block.truth.mode[target])
+    for episode in episodes:
+        (index,) = episode.layout.of_type(kind)
+        column = episode.layout.column(index, prop)
+        predicted = model.predict_batch(episode.layout, episode.vectors[:-1]).vectors[:, column]
+        errors.append(np.abs(predicted - episode.vectors[1:, column]))
+        modes.append(episode.truth.mode[target])
     error, mode = np.concatenate(errors), np.concatenate(modes)
     return float(np.mean([np.median(error[mode == m]) for m in np.unique(mode[mode >= 0])]))
 
@@ -142,8 +142,8 @@ def noise_outcomes(
     training: Iterable[int],
     test: int,
     sigmas: Mapping[float, Sequence[Sigma]],
-    blocks: int | None = None,
-    test_blocks: int = TEST_BLOCKS,
+    episodes: int | None = None,
+    test_episodes: int = TEST_EPISODES,
 ) -> Iterator[NoiseOutcome]:
     """Train and test on experiment 1 through noise; outcomes as they come.
 
@@ -153,12 +153,12 @@ def noise_outcomes(
         Seeds.
     sigmas
         Per true variance: the standard deviations to expect.
-    blocks, test_blocks
-        How many blocks to train and to test on; default of the former: as many as in the thesis.
+    episodes, test_episodes
+        How many episodes to train and to test on; default of the former: as many as in the thesis.
     """
     for seed in training:
-        clean = list(ball_blocks(1, seed=seed, blocks=blocks))
-        fresh = list(ball_blocks(1, seed=test, blocks=test_blocks, test=True))
+        clean = list(ball_episodes(1, seed=seed, episodes=episodes))
+        fresh = list(ball_episodes(1, seed=test, episodes=test_episodes, test=True))
         for number, (variance, expected) in enumerate(sorted(sigmas.items())):
             taught = _through_noise(clean, variance, np.random.default_rng([seed, number]))
             tested = _through_noise(fresh, variance, np.random.default_rng([seed, number, test]))
@@ -166,12 +166,12 @@ def noise_outcomes(
                 yield _outcome(taught, tested, variance, sigma, seed)
 
 
-def _through_noise(blocks: Iterable[Block], variance: float, rng: np.random.Generator) -> list[Block]:
-    return [corrupted(block, variance, rng=rng) for block in blocks]
+def _through_noise(episodes: Iterable[Episode], variance: float, rng: np.random.Generator) -> list[Episode]:
+    return [corrupted(episode, variance, rng=rng) for episode in episodes]
 
 
 def _outcome(
-    taught: Sequence[Block], tested: Sequence[Block], variance: float, sigma: Sigma, seed: int
+    taught: Sequence[Episode], tested: Sequence[Episode], variance: float, sigma: Sigma, seed: int
 ) -> NoiseOutcome:
     config = ModelConfig(frames="world", clustering=ClusteringConfig(noise_std=sigma))
     model = learned(taught, config=config)
@@ -196,7 +196,9 @@ def best_sigmas(outcomes: Iterable[NoiseOutcome]) -> dict[tuple[float, str], flo
     return {key: min(found, key=lambda sigma: (median(found[sigma]), sigma)) for key, found in errors.items()}
 
 
-def noise_bars(outcomes: Iterable[NoiseOutcome], best: Mapping[tuple[float, str], float]) -> list[Measure]:
+def noise_measures(
+    outcomes: Iterable[NoiseOutcome], best: Mapping[tuple[float, str], float]
+) -> list[Measure]:
     """Row 11: error with the estimated noise over that with the best hand-set one, one figure per training seed.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Learning from blocks one transition at a time, each predicted before it is learned from (§4.2)."""
+"""Learning from episodes one transition at a time, each predicted before it is learned from (§4.2)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
 from relgym.experiments.analytic import AnalyticModes
-from relgym.experiments.blocks import Block
+from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import TOLERANCE, explicable
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float1D
@@ -27,18 +27,18 @@ _THESIS_AXES = ModelConfig(frames="world")
 
 @dataclass(slots=True)
 class Course:
-    """How learning from a stream of blocks went.
+    """How learning from a stream of episodes went.
 
     Attributes
     ----------
     model
-        The model; the blocks seen so far taught it.
+        The model; the episodes seen so far taught it.
     wrong
-        Per target and block: which predictions were off by more than `TOLERANCE` or made by no mode.
+        Per target and episode: which predictions were off by more than `TOLERANCE` or made by no mode.
     counted
         Likewise: which transitions count (see `explicable`).
     seconds
-        Per block: time of predicting and learning from each transition, in seconds.
+        Per episode: time of predicting and learning from each transition, in seconds.
     """
 
     model: WorldModel
@@ -47,21 +47,21 @@ class Course:
     seconds: list[Float1D] = field(default_factory=list)
 
     def rate(self, target: str, first: int, last: int | None = None) -> float:
-        """Share of wrong predictions of a target from block `first` on (the first is 1) up to `last`."""
+        """Share of wrong predictions of a target from episode `first` on (the first is 1) up to `last`."""
         part = slice(first - 1, last)
         counted = np.concatenate(self.counted[target][part])
         return float(np.concatenate(self.wrong[target][part])[counted].mean())
 
 
 def follow(
-    blocks: Iterable[Block], *, config: ModelConfig | None = None, laws: AnalyticModes | None = None
+    episodes: Iterable[Episode], *, config: ModelConfig | None = None, laws: AnalyticModes | None = None
 ) -> Iterator[Course]:
-    """Predict and learn block after block.
+    """Predict and learn episode after episode.
 
     Parameters
     ----------
-    blocks
-        Blocks of one schema.
+    episodes
+        Episodes of one schema.
     config
         Free parameters of the model; default: along the world's axes, as in the thesis.
     laws
@@ -69,41 +69,41 @@ def follow(
 
     Yields
     ------
-    The course after each block; always the same object.
+    The course after each episode; always the same object.
     """
     course: Course | None = None
-    for block in blocks:
-        course = course or Course(WorldModel(block.schema, config or _THESIS_AXES))
-        seconds, wrong = _learn(course.model, block)
+    for episode in episodes:
+        course = course or Course(WorldModel(episode.schema, config or _THESIS_AXES))
+        seconds, wrong = _learn(course.model, episode)
         course.seconds.append(seconds)
-        for target, counted in explicable(block, laws).items():
+        for target, counted in explicable(episode, laws).items():
             course.counted.setdefault(target, []).append(counted)
             course.wrong.setdefault(target, []).append(wrong[target])
         yield course
 
 
 def last(courses: Iterable[Course]) -> Course:
-    """The course after the last block."""
+    """The course after the last episode."""
     *_, course = courses
     return course
 
 
-def learned(blocks: Iterable[Block], *, config: ModelConfig | None = None) -> WorldModel:
-    """The model that some blocks teach, its classifiers up to date; nothing is predicted on the way."""
+def learned(episodes: Iterable[Episode], *, config: ModelConfig | None = None) -> WorldModel:
+    """The model that some episodes teach, its classifiers up to date; nothing is predicted on the way."""
     model: WorldModel | None = None
-    for block in blocks:
-        model = model or WorldModel(block.schema, config or _THESIS_AXES)
-        for transition in block.transitions():
+    for episode in episodes:
+        model = model or WorldModel(episode.schema, config or _THESIS_AXES)
+        for transition in episode.transitions():
             model.learn_one(transition)
-    assert model is not None, "no blocks, no schema"
+    assert model is not None, "no episodes, no schema"
     model.finish()
     return model
 
 
-def _learn(model: WorldModel, block: Block) -> tuple[Float1D, dict[str, _Bools]]:
-    n, layout = len(block), block.layout
-    seconds, wrong = np.zeros(n), {target: np.ones(n, dtype=np.bool_) for target in block.truth.mode}
-    for k, transition in enumerate(block.transitions()):
+def _learn(model: WorldModel, episode: Episode) -> tuple[Float1D, dict[str, _Bools]]:
+    n, layout = len(episode), episode.layout
+    seconds, wrong = np.zeros(n), {target: np.ones(n, dtype=np.bool_) for target in episode.truth.mode}
+    for k, transition in enumerate(episode.transitions()):
         start = perf_counter()
         prediction = model.predict_one(transition.before)
         model.learn_one(transition)

@@ -112,7 +112,7 @@ def draw_curves(path: Path, curves: Mapping[str, Mapping[str, Sequence[float]]])
     path
         Where to write the picture (PNG).
     curves
-        Per world and target: share of wrong predictions in each block, made before learning from it.
+        Per world and target: share of wrong predictions in each episode, made before learning from it.
 
     Raises
     ------
@@ -123,19 +123,19 @@ def draw_curves(path: Path, curves: Mapping[str, Mapping[str, Sequence[float]]])
     panels = figure.subplots(1, len(curves), squeeze=False)[0]
     for panel, (title, targets) in zip(panels, curves.items(), strict=True):
         for k, (target, shares) in enumerate(targets.items()):
-            blocks, percent = np.arange(1, len(shares) + 1), 100.0 * np.array(shares)
+            episodes, percent = np.arange(1, len(shares) + 1), 100.0 * np.array(shares)
             # Later curves are thinner: where two agree, both can be seen.
             style = {
                 "color": _COLOURS[k % len(_COLOURS)],
                 "lw": max(1.0, 3.5 - 2.3 * k),
                 "ms": max(3, 9 - 5 * k),
             }
-            panel.plot(blocks, percent, ".-", label=target, **style)
+            panel.plot(episodes, percent, ".-", label=target, **style)
         panel.set_yscale("symlog", linthresh=1.0)
         panel.set_ylim(-0.08, 140.0)
         panel.set_yticks([0, 1, 10, 100], ["0", "1", "10", "100"])
         panel.set_title(title, fontsize=11)
-        panel.set_xlabel("block")
+        panel.set_xlabel("episode")
         panel.set_ylabel("wrong before learning from it, %")
         panel.grid(alpha=0.3)
         panel.legend(frameon=False)

@@ -9,7 +9,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.experiments.blocks import Block
+from relgym.experiments.episodes import Episode
 from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
@@ -59,31 +59,31 @@ class RolloutErrors:
         )
 
 
-def rollouts(model: WorldModel, blocks: Sequence[Block]) -> RolloutErrors:
-    """Predict every block from its first scene alone and compare with what happened (§4.8).
+def rollouts(model: WorldModel, episodes: Sequence[Episode]) -> RolloutErrors:
+    """Predict every episode from its first scene alone and compare with what happened (§4.8).
 
-    Actions and exogenous properties come from the block; everything else from the model's own predictions.
+    Actions and exogenous properties come from the episode; everything else from the model's own predictions.
 
     Parameters
     ----------
     model
         The model; unchanged.
-    blocks
-        Blocks of equal length, which the model hasn't learned from.
+    episodes
+        Episodes of equal length, which the model hasn't learned from.
     """
     errors, stopped = [], []
-    for _, group in groupby(blocks, key=lambda block: block.layout.names):
+    for _, group in groupby(episodes, key=lambda episode: episode.layout.names):
         part = list(group)
         off, early = _roll(model, np.stack([b.vectors for b in part]), part[0].layout)
         errors.append(off)
         stopped.append(early)
     largest, early = np.concatenate(errors), np.concatenate(stopped)
-    corner = np.array([bool(b.truth.corner.any()) for b in blocks])
+    corner = np.array([bool(b.truth.corner.any()) for b in episodes])
     failed = early | (largest > STRAY)
     median = float(np.median(largest[~failed])) if (~failed).any() else float("nan")
     return RolloutErrors(
-        trials=len(blocks),
-        steps=len(blocks[0]),
+        trials=len(episodes),
+        steps=len(episodes[0]),
         failed=int(failed.sum()),
         failed_without_corner=int((failed & ~corner).sum()),
         stopped=int(early.sum()),
@@ -92,10 +92,10 @@ def rollouts(model: WorldModel, blocks: Sequence[Block]) -> RolloutErrors:
     )
 
 
-def largest_errors(model: WorldModel, blocks: Sequence[Block]) -> NDArray[np.float64]:
-    """Largest position error of each block's roll-out, in units; infinite where it stopped early."""
+def largest_errors(model: WorldModel, episodes: Sequence[Episode]) -> NDArray[np.float64]:
+    """Largest position error of each episode's roll-out, in units; infinite where it stopped early."""
     errors = []
-    for _, group in groupby(blocks, key=lambda block: block.layout.names):
+    for _, group in groupby(episodes, key=lambda episode: episode.layout.names):
         part = list(group)
         off, early = _roll(model, np.stack([b.vectors for b in part]), part[0].layout)
         errors.append(np.where(early, np.inf, off))

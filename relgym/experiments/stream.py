@@ -1,4 +1,4 @@
-"""Online in earnest: errors while learning, and what later blocks may not change (rows 5 and 6)."""
+"""Online in earnest: errors while learning, and what later episodes may not change (rows 5 and 6)."""
 
 from __future__ import annotations
 
@@ -9,44 +9,44 @@ from dataclasses import dataclass, replace
 
 from relgym.config import ModelConfig
 from relgym.experiments.accuracy import AXES
-from relgym.experiments.bar import Measure, measured
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import evaluate
 from relgym.experiments.online import Course, follow, last
 from relgym.model.world_model import WorldModel
 
-__all__ = ["KindsOutcome", "box_then_ramp", "prequential_bars", "same_model", "stream_bars"]
+__all__ = ["KindsOutcome", "box_then_ramp", "prequential_measures", "same_model", "stream_measures"]
 
 EARLY, LATE = 3, 32
-"""Blocks from which on the two bars of row 5 hold; the first block is 1."""
+"""Episodes from which on the two bars of row 5 hold; the first episode is 1."""
 
 
-def prequential_bars(courses: Iterable[Course]) -> list[Measure]:
-    """Row 5: share of wrong predictions from block 3 and from block 32 on; the worse of both coordinates."""
+def prequential_measures(courses: Iterable[Course]) -> list[Measure]:
+    """Row 5: share of wrong predictions from episode 3 and from episode 32 on; the worse of both coordinates."""
     runs = list(courses)
     found = []
     for first, limit in ((EARLY, 0.02), (LATE, 0.003)):
         rates = [max(run.rate(target, first) for target in AXES.values()) for run in runs]
-        found.append(measured(f"wrong from block {first} on", limit, rates))
+        found.append(measured(f"wrong from episode {first} on", limit, rates))
     return found
 
 
-def same_model(blocks: Iterable[Block], after: int, *, config: ModelConfig | None = None) -> bool:
-    """Row 6: whether the model after some blocks is, byte for byte, the same if more follow.
+def same_model(episodes: Iterable[Episode], after: int, *, config: ModelConfig | None = None) -> bool:
+    """Row 6: whether the model after some episodes is, byte for byte, the same if more follow.
 
-    One model sees the first blocks only. The other one sees all, and a copy is taken on the way.
+    One model sees the first episodes only. The other one sees all, and a copy is taken on the way.
 
     Parameters
     ----------
-    blocks
-        More than `after` blocks.
+    episodes
+        More than `after` episodes.
     after
-        After how many blocks to compare.
+        After how many episodes to compare.
     config
         Free parameters of the model.
     """
-    every = list(blocks)
+    every = list(episodes)
     alone = last(follow(every[:after], config=config))
     taken = ""
     for k, course in enumerate(follow(every, config=config), start=1):
@@ -68,25 +68,25 @@ class KindsOutcome:
         return max(self.after[axis] - self.before[axis] for axis in self.before)
 
 
-def box_then_ramp(*, seed: int, test: int, blocks: int = 40, test_blocks: int = 40) -> KindsOutcome:
+def box_then_ramp(*, seed: int, test: int, episodes: int = 40, test_episodes: int = 40) -> KindsOutcome:
     """Row 6: learn scenes with a box only, then with a ramp only, and test on the former before and after.
 
     Parameters
     ----------
     seed, test
         Seeds of training and test scenes.
-    blocks, test_blocks
-        How many blocks of either kind to learn from, and how many to test on.
+    episodes, test_episodes
+        How many episodes of either kind to learn from, and how many to test on.
     """
     setting = BALL_EXPERIMENTS[1]
-    laws, whole = setting.modes(), next(ball_blocks(1, seed=seed)).schema
+    laws, whole = setting.modes(), next(ball_episodes(1, seed=seed)).schema
 
-    def only(kind: str, number: int, count: int, *, fresh: bool = False) -> list[Block]:
-        rooms = ball_blocks(replace(setting, objects=(kind,)), seed=number, blocks=count, test=fresh)
+    def only(kind: str, number: int, count: int, *, fresh: bool = False) -> list[Episode]:
+        rooms = ball_episodes(replace(setting, objects=(kind,)), seed=number, episodes=count, test=fresh)
         return [replace(room, schema=whole, layout=whole.layout(room.layout.names)) for room in rooms]
 
-    box, ramp = only("box", seed, blocks), only("ramp", seed, blocks)
-    tested = only("box", test, test_blocks, fresh=True)
+    box, ramp = only("box", seed, episodes), only("ramp", seed, episodes)
+    tested = only("box", test, test_episodes, fresh=True)
 
     def wrong(model: WorldModel) -> dict[str, float]:
         found = evaluate(model, tested, laws)
@@ -99,7 +99,7 @@ def box_then_ramp(*, seed: int, test: int, blocks: int = 40, test_blocks: int = 
     return KindsOutcome(*rates)
 
 
-def stream_bars(same: Iterable[bool], kinds: Iterable[KindsOutcome]) -> list[Measure]:
+def stream_measures(same: Iterable[bool], kinds: Iterable[KindsOutcome]) -> list[Measure]:
     """Row 6, one figure per run."""
     return [
         measured("models equal byte for byte", 1.0, map(float, same), ">="),

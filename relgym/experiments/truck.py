@@ -1,4 +1,4 @@
-"""The box pushing domain beyond Table 3.1: constants per block, bystanders, other numbers of boxes (rows 9 and 10)."""
+"""The box pushing domain beyond Table 3.1: constants per episode, bystanders, other numbers of boxes (rows 9 and 10)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from relgym.config import ModelConfig
 from relgym.experiments.analytic import truck_modes
-from relgym.experiments.bar import Measure, measured
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import truck_blocks
+from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.data import truck_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import evaluate
 from relgym.experiments.online import learned
 from relgym.experiments.truck_check import truck_mode_of
@@ -23,12 +23,12 @@ from relgym.scene.schema import SceneSchema
 __all__ = [
     "BystanderOutcome",
     "CountOutcome",
-    "PerBlockOutcome",
-    "bystander_bars",
+    "PerEpisodeOutcome",
+    "bystander_measures",
     "bystanders",
     "counts",
-    "per_block",
-    "per_block_bars",
+    "per_episode",
+    "per_episode_measures",
 ]
 
 LARGEST: Final = 5
@@ -38,12 +38,12 @@ BYSTANDERS: Final = (2, 3, 4, 5, 6, 7)
 COUNTS: Final = (2, 3, 4)
 
 _REPEATS: Final = {2: 12, 3: 2, 4: 1}  # so that every law has some hundred examples
-_EVERY: Final = 40  # of 1,920 blocks with five boxes
+_EVERY: Final = 40  # of 1,920 episodes with five boxes
 
 
 @dataclass(frozen=True, slots=True)
-class PerBlockOutcome:
-    """What became of constants that are drawn once a block.
+class PerEpisodeOutcome:
+    """What became of constants that are drawn once an episode.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class PerBlockOutcome:
     noise
         Training examples that no mode explains.
     wrong
-        Share of wrong predictions on fresh blocks.
+        Share of wrong predictions on fresh episodes.
     """
 
     found: int
@@ -63,24 +63,24 @@ class PerBlockOutcome:
     wrong: float
 
 
-def per_block(*, seed: int, test: int, config: ModelConfig | None = None) -> PerBlockOutcome:
-    """Learn blocks whose force and frictions are constant within each; test on fresh ones."""
-    model = learned(truck_blocks("block", seed=seed), config=config)
+def per_episode(*, seed: int, test: int, config: ModelConfig | None = None) -> PerEpisodeOutcome:
+    """Learn episodes whose force and frictions are constant within each; test on fresh ones."""
+    model = learned(truck_episodes("episode", seed=seed), config=config)
     part = model.property_model("truck", "vx")
     largest = sorted(part.modes, key=lambda mode: -mode.examples)[:LARGEST]
     laws = truck_modes(3)
     stated = {truck_mode_of(mode, laws) for mode in largest} - {None}
     spurious = tuple(mode.formula() for mode in part.modes if truck_mode_of(mode, laws) is None)
-    wrong = _wrong(model, truck_blocks("block", seed=test, test=True))
-    return PerBlockOutcome(len(stated), spurious, part.clusterer.noise_examples, wrong)
+    wrong = _wrong(model, truck_episodes("episode", seed=test, test=True))
+    return PerEpisodeOutcome(len(stated), spurious, part.clusterer.noise_examples, wrong)
 
 
-def per_block_bars(outcomes: Iterable[PerBlockOutcome]) -> list[Measure]:
+def per_episode_measures(outcomes: Iterable[PerEpisodeOutcome]) -> list[Measure]:
     """Row 9, one figure per training seed."""
     runs = list(outcomes)
     return [
         measured("rows of Table 3.1 among the five largest modes", 3, [run.found for run in runs], ">="),
-        measured("wrong on fresh blocks", 0.01, [run.wrong for run in runs]),
+        measured("wrong on fresh episodes", 0.01, [run.wrong for run in runs]),
     ]
 
 
@@ -104,24 +104,24 @@ def bystanders(*, seed: int, test: int, config: ModelConfig | None = None) -> By
     """Learn scenes in which 2 to 7 boxes stand beside the track, shuffled; test on fresh ones.
 
     Without any bystander in the lessons nothing teaches that a box has to be in the row to count: a second model,
-    which saw none, should fall silent where it can't tell.
+    which saw none, should abstain where it can't tell.
     """
     rng = np.random.default_rng(seed)
     taught = [b for n in BYSTANDERS for b in _beside(islice(_rows(n, seed), n % 2, None, 2))]
     model = learned([taught[k] for k in rng.permutation(len(taught))], config=config)
     alone = learned(_beside(_rows(0, seed)), config=config)
     fresh = {n: _beside(_rows(n, test, fresh=True)) for n in BYSTANDERS}
-    guessed = {n: _guessed(alone, blocks) for n, blocks in fresh.items()}
-    return BystanderOutcome({n: _wrong(model, blocks) for n, blocks in fresh.items()}, guessed)
+    guessed = {n: _guessed(alone, episodes) for n, episodes in fresh.items()}
+    return BystanderOutcome({n: _wrong(model, episodes) for n, episodes in fresh.items()}, guessed)
 
 
-def _rows(n: int, seed: int, *, fresh: bool = False) -> Iterator[Block]:
-    return truck_blocks(seed=seed, repeats=1, bystanders=n, test=fresh)
+def _rows(n: int, seed: int, *, fresh: bool = False) -> Iterator[Episode]:
+    return truck_episodes(seed=seed, repeats=1, bystanders=n, test=fresh)
 
 
-def _beside(blocks: Iterable[Block]) -> list[Block]:
-    """The blocks in a schema that has the most bystanders."""
-    return _in_schema(next(_rows(max(BYSTANDERS), 0)).schema, blocks)
+def _beside(episodes: Iterable[Episode]) -> list[Episode]:
+    """The episodes in a schema that has the most bystanders."""
+    return _in_schema(next(_rows(max(BYSTANDERS), 0)).schema, episodes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,16 +143,16 @@ class CountOutcome:
 def counts(*, seed: int, test: int, config: ModelConfig | None = None) -> CountOutcome:
     """Learn scenes with 2, 3 and 4 boxes, shuffled; test on fresh ones, and on scenes with 5."""
     rng = np.random.default_rng(seed)
-    taught = [block for n in COUNTS for block in _among(n_boxes=n, seed=seed, repeats=_REPEATS[n])]
+    taught = [episode for n in COUNTS for episode in _among(n_boxes=n, seed=seed, repeats=_REPEATS[n])]
     model = learned([taught[k] for k in rng.permutation(len(taught))], config=config)
     fresh = {n: _among(n_boxes=n, seed=test, repeats=1, test=True) for n in COUNTS}
-    new = islice(truck_blocks(seed=test, n_boxes=max(COUNTS) + 1, repeats=1, test=True), 0, None, _EVERY)
+    new = islice(truck_episodes(seed=test, n_boxes=max(COUNTS) + 1, repeats=1, test=True), 0, None, _EVERY)
     spoken = evaluate(model, list(new))["truck.vx"].total
-    guessed = 1.0 - spoken.silent / spoken.examples
-    return CountOutcome({n: _wrong(model, blocks) for n, blocks in fresh.items()}, guessed)
+    guessed = 1.0 - spoken.abstained / spoken.examples
+    return CountOutcome({n: _wrong(model, episodes) for n, episodes in fresh.items()}, guessed)
 
 
-def bystander_bars(beside: Sequence[BystanderOutcome], counted: Sequence[CountOutcome]) -> list[Measure]:
+def bystander_measures(beside: Sequence[BystanderOutcome], counted: Sequence[CountOutcome]) -> list[Measure]:
     """Row 10, one figure per training seed."""
     return [
         measured("wrong with 2-7 bystanders", 0.001, [max(run.wrong.values()) for run in beside]),
@@ -164,19 +164,21 @@ def bystander_bars(beside: Sequence[BystanderOutcome], counted: Sequence[CountOu
     ]
 
 
-def _among(**options: Any) -> list[Block]:
-    """Blocks with some of the boxes, in a schema that has the most."""
-    return _in_schema(next(truck_blocks(seed=0, n_boxes=max(COUNTS))).schema, truck_blocks(**options))
+def _among(**options: Any) -> list[Episode]:
+    """Episodes with some of the boxes, in a schema that has the most."""
+    return _in_schema(next(truck_episodes(seed=0, n_boxes=max(COUNTS))).schema, truck_episodes(**options))
 
 
-def _in_schema(schema: SceneSchema, blocks: Iterable[Block]) -> list[Block]:
-    return [replace(block, schema=schema, layout=schema.layout(block.layout.names)) for block in blocks]
+def _in_schema(schema: SceneSchema, episodes: Iterable[Episode]) -> list[Episode]:
+    return [
+        replace(episode, schema=schema, layout=schema.layout(episode.layout.names)) for episode in episodes
+    ]
 
 
-def _wrong(model: WorldModel, blocks: Iterable[Block]) -> float:
-    return evaluate(model, blocks)["truck.vx"].total.rate
+def _wrong(model: WorldModel, episodes: Iterable[Episode]) -> float:
+    return evaluate(model, episodes)["truck.vx"].total.rate
 
 
-def _guessed(model: WorldModel, blocks: Iterable[Block]) -> float:
-    total = evaluate(model, blocks)["truck.vx"].total
-    return (total.wrong - total.silent) / total.examples
+def _guessed(model: WorldModel, episodes: Iterable[Episode]) -> float:
+    total = evaluate(model, episodes)["truck.vx"].total
+    return (total.wrong - total.abstained) / total.examples

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from relgym.clustering.mode import Mode
 from relgym.envs.truck_scenes import stacks_of
 from relgym.experiments.analytic import TruckMode, truck_modes
-from relgym.experiments.blocks import Block
+from relgym.experiments.episodes import Episode
 from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
@@ -65,15 +65,15 @@ class TruckCheck:
         )
 
 
-def check_truck(model: WorldModel, blocks: Iterable[Block], *, every: int = 1) -> TruckCheck:
+def check_truck(model: WorldModel, episodes: Iterable[Episode], *, every: int = 1) -> TruckCheck:
     """Compare a model of the truck's velocity with the true laws, and query it one scene at a time.
 
     Parameters
     ----------
     model
         The model; unchanged.
-    blocks
-        Blocks that it hasn't learned from.
+    episodes
+        Episodes that it hasn't learned from.
     every
         Ask about every so many transitions.
 
@@ -84,16 +84,16 @@ def check_truck(model: WorldModel, blocks: Iterable[Block], *, every: int = 1) -
     part = model.property_model("truck", "vx")
     queries = right_mode = right_roles = 0
     laws: dict[str, int] = {}
-    for block in blocks:
-        boxes = sum(len(stack) for stack in stacks_of(block.scene(0)))
+    for episode in episodes:
+        boxes = sum(len(stack) for stack in stacks_of(episode.scene(0)))
         true = truck_modes(boxes)
         known = {mode.id: truck_mode_of(mode, true) for mode in part.modes}
         laws |= {law.name: next((m for m, own in known.items() if own == law), 0) for law in true}
-        for k in range(0, len(block), every):
-            scene = block.scene(k)
+        for k in range(0, len(episode), every):
+            scene = episode.scene(k)
             answer = model.predict_one(scene)["truck", "vx"]
             queries += 1
-            right_mode += known.get(answer.mode) == true[int(block.truth.mode["truck.vx"][k])]
+            right_mode += known.get(answer.mode) == true[int(episode.truth.mode["truck.vx"][k])]
             right_roles += answer.ok and _roles_are_right(scene, part.mode(answer.mode), answer.roles)
     spurious = tuple(m.id for m in part.modes if m.id not in laws.values())
     noise = part.clusterer.noise_examples

@@ -23,7 +23,7 @@ from relgym.scene.schema import SceneSchema
 __all__ = ["LawBook", "Motion"]
 
 SPREAD = 100.0
-"""Rival laws agree where their predictions differ by at most this many tolerances."""
+"""Alternative laws agree where their predictions differ by at most this many tolerances."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Motion:
         Next velocities of all K bodies, and behind them their spins where some type has one; shape
         ``(d [+ 1], n, K)``.
     known
-        Whether that is a claim, shape ``(n, K)``: no rival law disagrees, and it lies within experience. False
+        Whether that is a claim, shape ``(n, K)``: no alternative law disagrees, and it lies within experience. False
         for bodies that aren't movers.
     stated
         Whether the laws say anything at all, shape ``(n, K)``.
@@ -176,8 +176,8 @@ class LawBook:
         slack = SPREAD * self.tolerance
         seen = within(laws[0], group, joints, after, impulse, slack).all(axis=1, keepdims=True)
         sure = stated & (~involved | (seen & settled[:, None]))
-        for rival in laws[1:]:
-            other = compose(rival, group, joints, before, free).velocity
+        for alternative in laws[1:]:
+            other = compose(alternative, group, joints, before, free).velocity
             sure &= (np.abs(other - after)[governed] <= slack).all(axis=0) | ~involved
         motion.velocity[:, scenes] = np.where(involved & stated, after, free)
         motion.stated[scenes] &= stated
@@ -226,9 +226,9 @@ class LawBook:
         return next(iter(self._engaged_pairs(cast)), None)
 
     def _engaged_pairs(self, cast: Cast) -> list[Engaged]:
-        """The law of pairs laid over a cast, then its rivals; cached."""
+        """The law of pairs laid over a cast, then its alternatives; cached."""
         if (known := self._engaged.get(cast.layout)) is None:
-            laws = [] if self.pair is None else [self.pair, *_rivals(self.pair)]
+            laws = [] if self.pair is None else [self.pair, *_alternatives(self.pair)]
             known = [Engaged(law, _chosen(law, cast.kinds), cast.first, cast.second) for law in laws]
             self._engaged[cast.layout] = known
         return known
@@ -245,11 +245,11 @@ def _chosen(law: PairLaw, kinds: tuple[Kind, ...]) -> NDArray[np.intp]:
     return numbers
 
 
-def _rivals(law: PairLaw) -> Iterator[PairLaw]:
+def _alternatives(law: PairLaw) -> Iterator[PairLaw]:
     """The law with one axis' law replaced by one that explains the examples equally well."""
     for k, laws in enumerate(law.axes):
         for j, each in enumerate(laws):
-            for operator, pieces in each.rivals:
-                other = replace(each, operator=operator, pieces=pieces, rivals=())
+            for operator, pieces in each.alternatives:
+                other = replace(each, operator=operator, pieces=pieces, alternatives=())
                 changed = (*laws[:j], other, *laws[j + 1 :])
                 yield replace(law, axes=(*law.axes[:k], changed, *law.axes[k + 1 :]))

@@ -120,13 +120,13 @@ def _groups(
 def _alike(
     examples: AxisExamples, groups: list[tuple[AxisFit, list[int], NDArray[np.intp]]]
 ) -> list[tuple[AxisFit, list[int], NDArray[np.intp]]]:
-    """Decide ties by analogy: a form that a law without rivals has needs to be stated only once."""
-    settled = {_form(fit.operator, fit.pieces) for fit, _, _ in groups if not fit.rivals}
+    """Decide ties by analogy: a form that a law without alternatives has needs to be stated only once."""
+    settled = {_form(fit.operator, fit.pieces) for fit, _, _ in groups if not fit.alternatives}
     result = []
     for fit, members, rows in groups:
-        every = [(fit.operator, fit.pieces), *fit.rivals]
+        every = [(fit.operator, fit.pieces), *fit.alternatives]
         familiar = [each for each in every if _form(*each) in settled]
-        if fit.rivals and len(familiar) == 1:
+        if fit.alternatives and len(familiar) == 1:
             fit = refitted(examples.rows(rows), *familiar[0])
         result.append((fit, members, rows))
     return result
@@ -141,4 +141,6 @@ def _law(fit: AxisFit, kinds: tuple[Kind, ...], examples: AxisExamples) -> AxisL
     # Sides of 0 on which no velocity was ever seen: what ends there would be outside experience.
     signs = (bool((examples.y < -examples.tolerance).any()), bool((examples.y > examples.tolerance).any()))
     unexplained = int((~fit.explained).sum())
-    return AxisLaw(fit.pieces, fit.operator, kinds, fit.rivals, signs, len(examples), unexplained, fit.bits)
+    return AxisLaw(
+        fit.pieces, fit.operator, kinds, fit.alternatives, signs, len(examples), unexplained, fit.bits
+    )

@@ -1,7 +1,7 @@
 """Learns laws of motion from a stream of transitions: a free law per type, one law of touching pairs.
 
 Single contacts teach the law of pairs; transitions in which a body has several check how laws compose. Every
-contact is judged before it is learned from. One that the laws don't explain is news: the law of pairs is
+contact is evaluated before it is learned from. One that the laws don't explain is news: the law of pairs is
 sought again, in all frames, among the bounded number of contacts kept. When a free law turns out to have been
 over-specific, all that was derived from it is derived again from the raw contacts.
 """
@@ -152,7 +152,7 @@ class LawLearner:
         right = {}
         for body in cast.movers:
             if stays[cast.layout.bodies[body]]:
-                right[body] = self._judge(cast, motion, body, after)
+                right[body] = self._assess(cast, motion, body, after)
                 if degree[body] == 0:
                     changed |= self._learn_free(cast, body, motion, after[:, body], right[body])
         if changed:
@@ -164,7 +164,7 @@ class LawLearner:
             changed |= self._hear(sum(news))
         return changed
 
-    def _judge(self, cast: Cast, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
+    def _assess(self, cast: Cast, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
         count = len(self.book.components(cast.sources[body][0].type.name))
         off = np.abs(motion.velocity[:count, 0, body] - after[:count, body])
         return bool(motion.stated[0, body] and (off <= self.book.tolerance).all())

@@ -21,7 +21,7 @@ from relgym.scene.geometry.vectors import FloatArray
 __all__ = ["AxisExamples", "find_pieces", "fitted"]
 
 LOOSE = 100.0
-"""A function through one or two examples is extrapolated: at first a tolerance so much wider judges it."""
+"""A function through one or two examples is extrapolated: at first a tolerance so much wider evaluates it."""
 
 ACTING = 10.0
 """A term acts on an example where it contributes more than this many tolerances."""

@@ -72,7 +72,7 @@ class AxisLaw:
         How they are combined.
     kinds
         Kinds of contacts that it was learned from.
-    rivals
+    alternatives
         Other choices of (operator, pieces) that explain every example just as well and as briefly. Where they
         differ, the law claims nothing.
     signs
@@ -87,7 +87,7 @@ class AxisLaw:
     pieces: tuple[Piece, ...]
     operator: Operator
     kinds: tuple[Kind, ...]
-    rivals: tuple[tuple[Operator, tuple[Piece, ...]], ...] = ()
+    alternatives: tuple[tuple[Operator, tuple[Piece, ...]], ...] = ()
     signs: tuple[bool, bool] = (True, True)
     examples: int = 0
     unexplained: int = 0
@@ -103,8 +103,8 @@ class AxisLaw:
         return texts[0] if len(texts) == 1 else f"{self.operator}({', '.join(texts)})"
 
     def says(self) -> tuple[Any, ...]:
-        """Operator and pieces of the law and of its rivals, weights to nine digits, and what it has seen."""
-        forms = ((self.operator, self.pieces), *self.rivals)
+        """Operator and pieces of the law and of its alternatives, weights to nine digits, and what it has seen."""
+        forms = ((self.operator, self.pieces), *self.alternatives)
         stated = tuple((o, tuple(piece.formula(9) for piece in pieces)) for o, pieces in forms)
         return stated, self.signs, self.trusted()
 
@@ -118,7 +118,7 @@ class AxisLaw:
             "pieces": _pieces_to_json(self.pieces),
             "operator": self.operator,
             "kinds": [list(kind) for kind in self.kinds],
-            "rivals": [[operator, _pieces_to_json(pieces)] for operator, pieces in self.rivals],
+            "rivals": [[operator, _pieces_to_json(pieces)] for operator, pieces in self.alternatives],
             "signs": list(self.signs),
             "examples": self.examples,
             "unexplained": self.unexplained,

@@ -16,7 +16,7 @@ from relgym.laws.records import ZERO, Operator, Piece, combined
 __all__ = ["AxisFit", "fit_axis", "refitted"]
 
 MOST_COMBINED = 3
-MOST_RIVALS = 4
+MOST_ALTERNATIVES = 4
 
 GRIP_BITS = 16.0
 """Bits of the claim that a body is not let go where no impulse acts: more than saying how it moves on."""
@@ -31,7 +31,7 @@ class AxisFit:
 
     pieces: tuple[Piece, ...]
     operator: Operator
-    rivals: tuple[tuple[Operator, tuple[Piece, ...]], ...]
+    alternatives: tuple[tuple[Operator, tuple[Piece, ...]], ...]
     explained: NDArray[np.bool_]
     bits: float
 
@@ -63,11 +63,11 @@ def fit_axis(examples: AxisExamples, *, rng: np.random.Generator) -> AxisFit:
     best = [(operator, chosen) for score, operator, chosen in scored if score <= least + TIE]
     fits = [_refit(examples, operator, tuple(pieces[k] for k in chosen)) for operator, chosen in best]
     first = fits[0]
-    rivals = [f for f in fits[1:] if f.bits <= first.bits + TIE and not _same(f, first)]
+    alternatives = [f for f in fits[1:] if f.bits <= first.bits + TIE and not _same(f, first)]
     return AxisFit(
         first.pieces,
         first.operator,
-        tuple((f.operator, f.pieces) for f in islice(rivals, MOST_RIVALS)),
+        tuple((f.operator, f.pieces) for f in islice(alternatives, MOST_ALTERNATIVES)),
         first.explained,
         first.bits,
     )

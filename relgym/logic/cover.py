@@ -21,7 +21,7 @@ from relgym.logic.tables import Tables
 __all__ = ["Cover"]
 
 _ATTEMPTS: Final = 8
-"""How many clauses of one search are pruned and judged before the search counts as fruitless."""
+"""How many clauses of one search are pruned and evaluated before the search counts as fruitless."""
 
 _RELAID: Final = 0.7
 """Share of the tuples below which a search gets tables of its own."""

@@ -61,7 +61,7 @@ def learn(
     Notes
     -----
     Deviations from the thesis: clauses are found by beam search and FOIL's gain, not by negatives alone; all
-    tuples judge a clause, not a random quarter; a rejected clause doesn't end learning; description length
+    tuples evaluate a clause, not a random quarter; a rejected clause doesn't end learning; description length
     decides what is noise. Two strategies are tried, clauses without any negatives first and clauses that
     compress best; the definition that takes fewer bits is kept.
     Deterministic. Cost: see `search.grow`, per clause.

@@ -289,12 +289,12 @@ class Answers(StandIns):
         return any(binding is not None and bool(binding.open) for binding in bindings)
 
     def _rank_batch(self, situation: Situation, x: NDArray[np.float64]) -> RankingBatch:
-        """Rank the modes for n examples; a single mode has no rival and needs no look at the scene."""
+        """Rank the modes for n examples; a single mode has no runner-up and needs no look at the scene."""
         modes, n = self.classifier.modes, len(x)
         if len(modes) == 1:
             sure = np.ones(n, dtype=np.bool_)
             return RankingBatch(np.full((n, 1), modes[0]), np.zeros((n, 1)), np.full(n, np.inf), sure, sure)
-        shown = situation.glimpse(self.classifier.relations)
+        shown = situation.preview(self.classifier.relations)
         if self.conditions.pairs:
             ahead = self.conditions.values(situation.signature, x)
             shown = replace(shown, own=np.concatenate([shown.own, ahead], axis=1))

@@ -1,4 +1,4 @@
-"""Why a model predicts what it predicts: mode, roles, deciding clause and rival, as records and as text."""
+"""Why a model predicts what it predicts: mode, roles, deciding clause and runner-up, as records and as text."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Reason:
 
     Attributes
     ----------
-    rival
+    runner_up
         Id of the mode that was not chosen.
-    rival_value
+    runner_up_value
         What it would have predicted; NaN if its roles are open.
     clause
         The clause that decided; empty if none held and that decided.
@@ -43,11 +43,11 @@ class Reason:
     winner
         Id of the mode that this pair preferred.
     correct, incorrect
-        Training examples that went the same way, of the winner and of its rival.
+        Training examples that went the same way, of the winner and of its runner-up.
     """
 
-    rival: int
-    rival_value: float
+    runner_up: int
+    runner_up_value: float
     clause: str
     objects: tuple[tuple[str, str], ...]
     tests: str
@@ -71,7 +71,7 @@ class Explanation:
     digits
         Significant digits in the text.
     reasons
-        The mode against every other one, in the order of the ranking; the first is its strongest rival.
+        The mode against every other one, in the order of the ranking; the first is its strongest runner-up.
     laws
         What laws of motion predicted it, a line each, where they and no mode did: the free law, then every
         contact.
@@ -127,10 +127,10 @@ class Explanation:
         lines.append(
             f"            in training right {reason.correct:,.0f} times, wrong {reason.incorrect:,.0f} times"
         )
-        says = f"which says {reason.rival_value:.{self.digits}g}"
-        if math.isnan(reason.rival_value):
+        says = f"which says {reason.runner_up_value:.{self.digits}g}"
+        if math.isnan(reason.runner_up_value):
             says = "whose roles would have to be filled first"
-        lines.append(f"  rival     mode {reason.rival}, {says}; margin {self.prediction.margin:.3g}")
+        lines.append(f"  runner-up mode {reason.runner_up}, {says}; margin {self.prediction.margin:.3g}")
         return lines
 
 
@@ -193,12 +193,12 @@ def _reasons(
     reasons = []
     for verdict in part.classifier.explain(example, values):
         # Where a mode ranked higher can't fill its roles, its own pair with the chosen mode says why it led.
-        rival = verdict.rival if verdict.winner == chosen else verdict.winner
+        runner_up = verdict.runner_up if verdict.winner == chosen else verdict.winner
         objects = _objects(part, example, values, verdict, names or [scene.layout.names[index]])
         clause = "" if verdict.clause is None else as_relations(str(verdict.clause), part.flags)
         tree = as_relations(verdict.tree, part.flags)
         counts = (verdict.correct, verdict.incorrect)
-        reasons.append(Reason(rival, by_mode[rival], clause, objects, tree, verdict.winner, *counts))
+        reasons.append(Reason(runner_up, by_mode[runner_up], clause, objects, tree, verdict.winner, *counts))
     return tuple(reasons)
 
 
@@ -208,7 +208,7 @@ def _objects(
     """Objects for which the deciding clause holds; `names` are those of the example's objects."""
     if verdict.clause is None:
         return ()
-    pair = {verdict.winner, verdict.rival}
+    pair = {verdict.winner, verdict.runner_up}
     classifier = next(c for c in part.classifier.classifiers if {c.i, c.j} == pair)
     view = View.of_batch(ExampleBatch.of(example), part.classifier.modes, np.array([values]))
     world = world_of(view.facts(classifier.context, classifier.scope), 0)

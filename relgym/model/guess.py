@@ -2,7 +2,7 @@
 
 Of a property that follows from what nobody sees (a driver's intentions) no mode speaks, and it would keep its value; of
 a car's position that is far off. A guess is a sparse function of what the target and bodiless objects have, features
-included, that foretells best what it wasn't fitted to. It has no modes, no conditions and no say about what is a law:
+included, that predicts best what it wasn't fitted to. It has no modes, no conditions and no say about what is a law:
 its outcome stays `UNEXPLAINED`. An approximation that errs more gives way to it, and where it doesn't speak
 (`relgym.model.scope`) a guess fitted to what happens there stands in.
 """
@@ -41,7 +41,7 @@ SIZES = (0, 1, 2, 4, 8, 16)
 """Numbers of terms tried; with none it is what changes in the mean."""
 
 FOLDS = 4
-"""Sizes are compared on stretches of time, each foretold by what is fitted to all others."""
+"""Sizes are compared on stretches of time, each predicted by what is fitted to all others."""
 
 SURE = 2.0
 """A guess must be better than that nothing changes by so many standard errors: where a handful of examples makes most
@@ -190,7 +190,7 @@ def _data(
 
 
 def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> tuple[int | None, float]:
-    """The smallest number of terms that foretells well what it wasn't fitted to.
+    """The smallest number of terms that predicts well what it wasn't fitted to.
 
     Returns
     -------

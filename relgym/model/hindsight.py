@@ -3,7 +3,7 @@
 Modes that together cover all examples explain nothing if nobody can tell which of them holds when: of an env whose
 state is the number of a cell, a few constants and offsets cover every step. What gives them away is that the mode that
 wins the vote was the wrong one. So whoever asks a model before each step tells it afterwards
-(`WorldModel.look_back`); a model that is only taught is never judged.
+(`WorldModel.look_back`); a model that is only taught is never evaluated.
 """
 
 from __future__ import annotations
@@ -105,8 +105,8 @@ def look_back(
 ) -> None:
     """Tell each target how its predictions of a step came out; arguments as of `WorldModel.look_back`.
 
-    Only what a mode said counts: neither stopgaps nor laws of motion, which know by themselves where they fail. What
-    rests on another property's next value that was off isn't judged, since the fault is that one's.
+    Only what a mode said counts: neither fallback values nor laws of motion, which know by themselves where they fail. What
+    rests on another property's next value that was off isn't evaluated, since the fault is that one's.
     """
     layout = prediction.scene.layout
     targets = {(t.type, t.property): t for t in parts.targets}

@@ -97,7 +97,7 @@ class Parts:
         if not isinstance(scene, Scene):
             raise ObservationError(
                 f"expected a Scene, got {type(scene).__name__}; of an observation and an action a learner's "
-                "foretell(observation, action) makes one, or view.with_action(view.scene(observation), action)"
+                "predict(observation, action) makes one, or view.with_action(view.scene(observation), action)"
             )
         schema = scene.schema
         if schema is not self.schema and self._kin.get(id(schema)) is not schema:

@@ -74,7 +74,7 @@ class Situation:
         """Relations and numbers for classifiers."""
         return replace(self._bare, table=self._percept.relations.table) if self._body >= 0 else self._bare
 
-    def glimpse(self, relations: Collection[str]) -> ExampleBatch:
+    def preview(self, relations: Collection[str]) -> ExampleBatch:
         """`examples` in which only these binary relations can be told; the others hold nowhere."""
         if self._body < 0:
             return self._bare

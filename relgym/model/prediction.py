@@ -18,11 +18,11 @@ __all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
 class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
-    Only `PREDICTED` is a mode's word. With every other outcome the value is a stopgap, not a claim: what is unexplained
+    Only `PREDICTED` is a mode's word. With every other outcome the value is a fallback value, not a claim: what is unexplained
     is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes, and so it is where an
     approximation isn't good (`relgym.model.scope`); or, where modes cover the examples but nothing tells which of them
     holds when, it is what the vote's winner says; outside experience it is what the mode says that would win the vote;
-    what depends on such a stopgap follows from it; else the property keeps its value.
+    what depends on such a fallback value follows from it; else the property keeps its value.
     """
 
     PREDICTED = "predicted by a mode"
@@ -57,13 +57,13 @@ class Prediction:
     roles
         Names of the objects that play the mode's roles, the target first.
     margin
-        Lead of the mode over its rival, in log-odds; infinite with a single mode, 0 with none.
+        Lead of the mode over its runner-up, in log-odds; infinite with a single mode, 0 with none.
     frame
         Axes in which what predicted it is stated: ``"world"`` for modes; laws of touching pairs name their own
         (`relgym.laws.frames`), and then the roles are the target and all that it touches.
     spread
         Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
-        among a few, or else on the same side of a threshold that tells) left, in units of the property; of a stopgap
+        among a few, or else on the same side of a threshold that tells) left, in units of the property; of a fallback value
         what it left there; NaN where the property keeps its value.
     """
 
@@ -84,7 +84,7 @@ class Prediction:
 
     @builtins.property
     def informed(self) -> bool:
-        """Whether a mode predicted it, or the stopgap is more than that nothing changes."""
+        """Whether a mode predicted it, or the fallback value is more than that nothing changes."""
         return self.ok or self.mode != 0 or not math.isnan(self.spread)
 
 

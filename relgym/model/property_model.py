@@ -80,7 +80,7 @@ class PropertyModel(Answers):
             config,
         )
 
-    def _judge(self) -> bool:
+    def _assess(self) -> bool:
         seen = self.clusterer.seen
         if not self.clusterer.clusters:
             return seen >= HOPELESS
@@ -117,7 +117,7 @@ class PropertyModel(Answers):
         """
         self._compare(situation, example, table.x[row], y)
         report = self.clusterer.learn_one(table, row, y, turn)
-        self._unexplained = self._judge()
+        self._unexplained = self._assess()
         if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
             self._measure(table)
         x = table.x[row : row + 1]
@@ -137,7 +137,7 @@ class PropertyModel(Answers):
         return report
 
     def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
-        """Let the guess and the modes foretell an example before it is learned from."""
+        """Let the guess and the modes predict an example before it is learned from."""
         binding = self._guessing(situation.signature)
         if binding is None or self._unexplained or not self.classifier.modes:
             return
@@ -165,7 +165,7 @@ class PropertyModel(Answers):
     def follow(self, table: ExampleTable) -> None:
         """The modes changed from outside: classifiers and spreads follow."""
         self._follow(table)
-        self._unexplained = self._judge()
+        self._unexplained = self._assess()
         self._measure(table)
 
     def _measure(self, table: ExampleTable) -> None:

@@ -42,7 +42,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
                 one = replace(one, outcome=outcome, mode=0, spread=np.nan)
-                one = _stopgap(parts.models[target], percept, index, following, one)
+                one = _fallback(parts.models[target], percept, index, following, one)
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
@@ -52,7 +52,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
     return ScenePrediction(Scene(scene.schema, layout, following), tuple(found))
 
 
-def _stopgap(
+def _fallback(
     model: PropertyModel,
     percept: Percept,
     index: int,

@@ -147,8 +147,8 @@ def _pair_table(classifier: BinaryClassifier, flags: frozenset[str]) -> PairTabl
         rows.append(ClauseRow(as_relations(name, flags), right, wrong, tuple(tests)))
     rows[-1] = ClauseRow(_OTHERWISE, rows[-1].correct, rows[-1].incorrect, rows[-1].tests)
     # §3.4.5: a negated definition's clauses describe mode j.
-    rival = classifier.i if classifier.positive == classifier.j else classifier.j
-    return PairTable(classifier.positive, rival, tuple(rows))
+    other = classifier.i if classifier.positive == classifier.j else classifier.j
+    return PairTable(classifier.positive, other, tuple(rows))
 
 
 def _role_rows(part: PropertyModel) -> tuple[RoleRow, ...]:

@@ -68,14 +68,14 @@ class PairTable:
     ----------
     mode
         The mode that the clauses speak for.
-    rival
+    other
         The mode that holds otherwise.
     rows
         Clauses in the order in which they are tried.
     """
 
     mode: int
-    rival: int
+    other: int
     rows: tuple[ClauseRow, ...]
 
     @property
@@ -206,7 +206,7 @@ def _clause_table(pairs: tuple[PairTable, ...]) -> str:
     """All pairs' clauses under one heading, so that the columns of all pairs line up."""
     rows: list[list[Cell] | str] = []
     for pair in pairs:
-        rows.append(f"mode {pair.mode} rather than {pair.rival}  (training accuracy {pair.performance:.4f})")
+        rows.append(f"mode {pair.mode} rather than {pair.other}  (training accuracy {pair.performance:.4f})")
         for row in pair.rows:
             first, *rest = wrapped(row.clause, _CLAUSE_WIDTH, "∧")
             rows.append(

@@ -1,4 +1,4 @@
-"""How far modes go: where they speak, and the changes that an approximation may foretell.
+"""How far modes go: where they speak, and the changes that an approximation may predict.
 
 Examples that no mode explains, or comes close to, lie together more often than not: a lander's law of flight says
 nothing of its legs' touch, and far less of a crash, where features lead anywhere; of an end that was seen nine times no
@@ -51,7 +51,7 @@ class Scope:
     tree
         Says yes where some mode explains what follows, or comes close to it; None: everywhere.
     least, most
-        Smallest and largest change that approximations and guesses may foretell, in units of the target.
+        Smallest and largest change that approximations and guesses may predict, in units of the target.
     """
 
     tree: DecisionTree | None = None
@@ -93,7 +93,7 @@ class Scope:
     def within(
         self, values: NDArray[np.float64], signature: SlotSignature, x: NDArray[np.float64], target: Target
     ) -> NDArray[np.float64]:
-        """Values foretold of rows ``(n, d)``, none further from the present ones than is allowed; NaN stays."""
+        """Values predicted of rows ``(n, d)``, none further from the present ones than is allowed; NaN stays."""
         present = signature.present(x, target)
         found: NDArray[np.float64] = np.clip(values, present + self.least, present + self.most)
         return found
@@ -139,7 +139,7 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable, *, guessing: bool)
     table
         The rows of the examples.
     guessing
-        Whether a guess stands in where modes don't speak. Then they are silent where they err by more than `CLOSE` of
+        Whether a guess stands in where modes don't speak. Then they abstain where they err by more than `CLOSE` of
         what mostly changes; without one only where it is closer to say that nothing changes: a law that is off there is
         better than none.
 

@@ -359,7 +359,7 @@ class WorldModel:
 
     @refusing(ObservationError)
     def explain(self, scene: Scene) -> str:
-        """Why this prediction: mode, function, roles, clause and rival of every target."""
+        """Why this prediction: mode, function, roles, clause and runner-up of every target."""
         from relgym.model.explain import explain
 
         with self._calm(scene.vector):

@@ -32,9 +32,9 @@ from relgym.scene.boxes import axis_relations
 from relgym.scene.context import close_set
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Geometry
 from relgym.scene.geometry.vectors import FloatArray
+from relgym.scene.measurements import Measurements, Pairs, Plan, square
 from relgym.scene.objects import Float2D, SceneLayout, pose_columns
 from relgym.scene.schema import SceneSchema
-from relgym.scene.sight import Pairs, Plan, Sight, square
 from relgym.scene.unary import unary, unary_names
 
 __all__ = ["TOUCH_EPS", "Extractor", "Relations", "unary"]
@@ -61,17 +61,22 @@ class Relations:
         The schema's axes.
     names
         Names of the relations, alphabetical (R of them).
-    sights
+    chunks
         The scenes, in pieces.
     """
 
     def __init__(
-        self, layout: SceneLayout, axes: Axes, names: tuple[str, ...], plan: Plan, sights: Sequence[Sight]
+        self,
+        layout: SceneLayout,
+        axes: Axes,
+        names: tuple[str, ...],
+        plan: Plan,
+        chunks: Sequence[Measurements],
     ) -> None:
         self.layout, self.names = layout, names
         self._axes, self._plan = axes, plan
-        self._sights = tuple(sights)
-        self._size: int = sum(sight.pose.shape[2] for sight in self._sights)
+        self._chunks = tuple(chunks)
+        self._size: int = sum(chunk.pose.shape[2] for chunk in self._chunks)
         self._kept: dict[str, _Table] = {}
         self._of: dict[int, FloatArray] = {}
         self._table: _Table | None = None
@@ -84,8 +89,8 @@ class Relations:
     def table(self) -> _Table:
         """Which relation holds for which ordered pair, shape ``(n, R, K, K)``; False on the diagonal."""
         if self._table is None:
-            for sight in self._sights:
-                sight.boxes.prepare()
+            for chunk in self._chunks:
+                chunk.boxes.prepare()
             self._table = self._filled(self.names)
         return self._table
 
@@ -97,12 +102,12 @@ class Relations:
         count = len(self._plan.pairs.number)
         table = np.zeros((len(self), len(self.names), count, count), dtype=np.bool_)
         at = 0
-        for sight in self._sights:
-            rows = slice(at, at + sight.pose.shape[2])
+        for chunk in self._chunks:
+            rows = slice(at, at + chunk.pose.shape[2])
             at = rows.stop
             for r, name in enumerate(self.names):
                 if name in names:
-                    table[rows, r] = _found(self._axes, sight, name).transpose(2, 0, 1)
+                    table[rows, r] = _found(self._axes, chunk, name).transpose(2, 0, 1)
         table &= self._plan.pairs.others
         return table
 
@@ -111,7 +116,7 @@ class Relations:
         if self._table is not None:
             return self._table[:, self.names.index(name)]
         if (known := self._kept.get(name)) is None:
-            parts = [_found(self._axes, sight, name) for sight in self._sights]
+            parts = [_found(self._axes, chunk, name) for chunk in self._chunks]
             known = self._kept[name] = _joined(parts).transpose(2, 0, 1) & self._plan.pairs.others
         return known
 
@@ -119,7 +124,7 @@ class Relations:
     def distance(self) -> FloatArray:
         """Signed distances, shape ``(n, K, K)``; symmetric, infinite on the diagonal."""
         if self._distance is None:
-            parts = [sight.every().distance for sight in self._sights]
+            parts = [chunk.every().distance for chunk in self._chunks]
             both = np.concatenate([np.concatenate(parts, axis=1), np.full((1, len(self)), np.inf)])
             self._distance = np.ascontiguousarray(
                 both.take(self._plan.pairs.number, axis=0).transpose(2, 0, 1)
@@ -129,7 +134,7 @@ class Relations:
     def distances(self, body: int) -> FloatArray:
         """Signed distances of one body, shape ``(n, K)``; infinite for itself."""
         if (known := self._of.get(body)) is None:
-            parts = [sight.of(body).distance for sight in self._sights]
+            parts = [chunk.of(body).distance for chunk in self._chunks]
             both = np.concatenate([_joined(parts), np.full((1, len(self)), np.inf)])
             known = self._of[body] = np.ascontiguousarray(both.take(self._plan.pairs.number[body], axis=0).T)
         return known
@@ -138,14 +143,14 @@ class Relations:
         """Whether the bodies of some pairs touch, shape ``(n, len(first))``; a pair is of two bodies."""
         pairs = self._plan.pairs
         mask, numbers = pairs.among(first, second), pairs.number[first, second]
-        parts = [sight.touches(mask).take(numbers, axis=0) for sight in self._sights]
+        parts = [chunk.touches(mask).take(numbers, axis=0) for chunk in self._chunks]
         return np.ascontiguousarray(_joined(parts).T)
 
     def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Relations:
         """Relations of some of the scenes."""
-        vectors = np.concatenate([sight.vectors for sight in self._sights])[chosen]
-        sights = [Sight(self._plan, vectors, self._sights[0].eps, self._sights[0].precision)]
-        return Relations(self.layout, self._axes, self.names, self._plan, sights)
+        vectors = np.concatenate([chunk.vectors for chunk in self._chunks])[chosen]
+        chunks = [Measurements(self._plan, vectors, self._chunks[0].eps, self._chunks[0].precision)]
+        return Relations(self.layout, self._axes, self.names, self._plan, chunks)
 
     def touched(self, body: int) -> _Table:
         """Which bodies touch one, shape ``(n, K)``; it doesn't touch itself."""
@@ -153,11 +158,11 @@ class Relations:
 
     def touch(self, body: int) -> float | FloatArray:
         """Distance up to which others touch a body; where numbers are coarse of shape ``(n, K)``."""
-        return self._limits(body, [sight.touch for sight in self._sights])
+        return self._limits(body, [chunk.touch for chunk in self._chunks])
 
     def parting(self, body: int) -> float | FloatArray:
         """Speed up to which others don't part from a body that they touch; as `touch`."""
-        return self._limits(body, [sight.parting for sight in self._sights])
+        return self._limits(body, [chunk.parting for chunk in self._chunks])
 
     def _limits(self, body: int, parts: Sequence[float | FloatArray]) -> float | FloatArray:
         arrays = [part for part in parts if isinstance(part, np.ndarray)]
@@ -180,7 +185,7 @@ class Relations:
         NaN for the body itself. Velocities are the scenes', in length per step.
         """
         normal = self._normals(body)
-        velocity = _joined([sight.velocity for sight in self._sights])
+        velocity = _joined([chunk.velocity for chunk in self._chunks])
         approach, slip = contacts.motion(velocity[:, body, None] - velocity, normal)
         last = len(normal) + 3
         out = np.empty((len(self), len(self._plan.pairs.number), last + len(normal) * self._plan.offsets))
@@ -188,7 +193,7 @@ class Relations:
         out[..., 1 : last - 2] = normal.transpose(2, 1, 0)
         out[..., last - 2], out[..., last - 1] = approach.T, slip.T
         if self._plan.offsets:
-            position = _joined([sight.boxes.position for sight in self._sights])
+            position = _joined([chunk.boxes.position for chunk in self._chunks])
             out[..., last:] = (position[:, body, None] - position).transpose(2, 1, 0)
         out[:, body] = np.nan
         return out
@@ -202,7 +207,7 @@ class Relations:
         numbers = np.minimum(pairs.number[body], len(pairs.first) - 1)
         signs = np.where(np.arange(count) > body, 1.0, -1.0)
         signs[body] = np.nan
-        parts = [sight.of(body).normal.take(numbers, axis=1) for sight in self._sights]
+        parts = [chunk.of(body).normal.take(numbers, axis=1) for chunk in self._chunks]
         normals: FloatArray = _joined(parts) * signs[:, None]
         return normals
 
@@ -212,24 +217,24 @@ def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
 
 
-def _found(axes: Axes, sight: Sight, name: str) -> _Table:
+def _found(axes: Axes, chunk: Measurements, name: str) -> _Table:
     """One relation's table in a piece of the scenes, shape ``(K, K, n)``; the diagonal means nothing."""
     if name == "intersect":
-        return sight.touching()
+        return chunk.touching()
     if name == "on-top":
-        return sight.boxes.on_top(sight.touching())
+        return chunk.boxes.on_top(chunk.touching())
     if name == "smaller-than":
-        return sight.boxes.smaller()
+        return chunk.boxes.smaller()
     if name.startswith("approaching"):
-        closing = sight.closing()
+        closing = chunk.closing()
         found: _Table = closing < np.inf
         if name == "approaching-fastest":
-            slack = sight.parting
+            slack = chunk.parting
             if isinstance(slack, np.ndarray):
-                slack = square(slack, sight.pairs, contacts.APPROACH_EPS)
+                slack = square(slack, chunk.pairs, contacts.APPROACH_EPS)
             found &= closing <= closing.min(axis=1, initial=np.inf, keepdims=True) + slack
         return found
-    return sight.boxes.along(*axis_relations(axes)[name])
+    return chunk.boxes.along(*axis_relations(axes)[name])
 
 
 class Extractor:
@@ -306,8 +311,8 @@ class Extractor:
         chunk = max(1, _CHUNK // max(1, plan.pairs.number.size))
         starts = range(0, max(1, len(vectors)), chunk)
         coarse = self.schema.precision
-        sights = [Sight(plan, vectors[i : i + chunk], self.eps, coarse) for i in starts]
-        return Relations(layout, self.axes, self.names, plan, sights)
+        chunks = [Measurements(plan, vectors[i : i + chunk], self.eps, coarse) for i in starts]
+        return Relations(layout, self.axes, self.names, plan, chunks)
 
     def unary(self, layout: SceneLayout) -> dict[str, _Table]:
         """Return the unary relations of a layout's bodies (`unary`)."""

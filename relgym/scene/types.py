@@ -67,7 +67,7 @@ class ObjectType:
     angles
         Properties that are angles in radians: they go round at ±π, and π and -π are the same place.
     exogenous
-        Properties redrawn from outside the world; the model never predicts them (they persist in roll-outs).
+        Properties resampled from outside the world; the model never predicts them (they persist in roll-outs).
     optional
         Whether objects of the type may be absent from a scene.
     flags

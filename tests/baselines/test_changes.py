@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from relgym.baselines.catalogue import installed
-from relgym.baselines.changes import CHANGES, ONLINE, LastChange, NoChange, along, fitted_once, rivals, titles
+from relgym.baselines.changes import (
+    CHANGES,
+    ONLINE,
+    LastChange,
+    NoChange,
+    along,
+    fitted_once,
+    predicted_changes,
+    titles,
+)
 from relgym.baselines.kinds import Columns
 from relgym.errors import ConfigError, QueryError
 
@@ -51,7 +60,7 @@ def test_nobody_is_shown_what_comes_before_having_said_it() -> None:
     # The same beginning, another end: what is said of the beginning doesn't change.
     other = CHANGE.copy()
     other[120:] += 100.0
-    mine, theirs = (rivals(X, change, once=False) for change in (CHANGE, other))
+    mine, theirs = (predicted_changes(X, change, once=False) for change in (CHANGE, other))
     assert set(mine) == set(ONLINE) & set(installed(CHANGES))
     for name in mine:
         np.testing.assert_array_equal(mine[name][:121], theirs[name][:121])
@@ -59,21 +68,22 @@ def test_nobody_is_shown_what_comes_before_having_said_it() -> None:
 
 def test_a_linear_change_is_learned_along_the_way() -> None:
     off = {
-        name: np.abs(told[100:] - CHANGE[100:]).mean() for name, told in rivals(X, CHANGE, once=False).items()
+        name: np.abs(told[100:] - CHANGE[100:]).mean()
+        for name, told in predicted_changes(X, CHANGE, once=False).items()
     }
     assert off["rls"] < 1e-3 < off["persistence"]
 
 
 @pytest.mark.sb3
 def test_those_that_are_fitted_once_come_on_request() -> None:
-    few = rivals(X[:40], CHANGE[:40], once=True)
+    few = predicted_changes(X[:40], CHANGE[:40], once=True)
     assert list(few) == list(CHANGES)
     assert np.isnan(few["forest"][:20]).all() and np.isfinite(few["ensemble"][20:]).all()
 
 
 def test_the_last_change_may_be_given_where_rows_are_of_several_objects() -> None:
     last = RNG.normal(size=CHANGE.shape)
-    assert rivals(X, CHANGE, once=False, last=last)["constant-velocity"] is last
+    assert predicted_changes(X, CHANGE, once=False, last=last)["constant-velocity"] is last
 
 
 def test_tables_call_them_by_title() -> None:
@@ -90,11 +100,11 @@ def test_a_tree_that_saw_nothing_says_so() -> None:
 def test_a_stream_of_one_row_is_refused(once: bool) -> None:
     for rows in (0, 1):
         with pytest.raises(ConfigError, match=f"a stream of {rows} rows: expected at least two"):
-            rivals(X[:rows], CHANGE[:rows], once=once)
+            predicted_changes(X[:rows], CHANGE[:rows], once=once)
 
 
 def test_whole_numbers_may_change_by_fractions() -> None:
     x = np.array([[0], [1], [2], [3], [4]])
     change = np.array([[0], [1], [1], [2], [3]])
-    told = rivals(x, change, once=False)["rls"]
+    told = predicted_changes(x, change, once=False)["rls"]
     assert (told != np.round(told)).any()

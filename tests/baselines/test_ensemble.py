@@ -1,4 +1,4 @@
-"""The neural rival learns what nets learn, behind the interface of every model."""
+"""The neural baseline learns what nets learn, behind the interface of every model."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_world_with_its_task(rng: np.random.Generator) -> None:
     for x, push in zip(rng.uniform(-5, 5, 400), rng.uniform(-2, 2, 400), strict=True):
         before = scene(float(x), float(push))
         following = after(before)
-        said = task.judge(layout, following.vector[None], None, following.vector[None])
+        said = task.evaluate(layout, following.vector[None], None, following.vector[None])
         model.learn_step(
             Transition(before, following), float(said.rewards[0]), terminated=bool(said.terminated[0])
         )
@@ -79,7 +79,7 @@ def test_a_world_with_its_task(rng: np.random.Generator) -> None:
     assert found.ok.all()
     assert np.abs(found.vectors[:, 0] - truth).mean() < 0.2
     np.testing.assert_array_equal(found.vectors[:, 3:], np.stack([t.vector for t in tests])[:, 3:])
-    rewards, ended = model.judge_all(tests[0].layout, np.stack([t.vector for t in tests]))
+    rewards, ended = model.predict_rewards(tests[0].layout, np.stack([t.vector for t in tests]))
     assert np.abs(rewards + np.abs(truth)).mean() < 0.4
     assert (ended == (np.abs(truth) > 5.0)).mean() > 0.9
     one = model.predict_one(tests[0])

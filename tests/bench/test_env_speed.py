@@ -9,7 +9,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 import relgym  # noqa: F401  (registers the ids)
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
-from relgym.experiments.data import ball_blocks
+from relgym.experiments.data import ball_episodes
 
 STEPS = 1000
 
@@ -48,7 +48,7 @@ def test_a_thousand_engine_steps(benchmark: BenchmarkFixture) -> None:
 
 def test_experiment_1_data(benchmark: BenchmarkFixture) -> None:
     """16,000 transitions with ground truth."""
-    benchmark.pedantic(lambda: list(ball_blocks(1, seed=0)), rounds=3)
+    benchmark.pedantic(lambda: list(ball_episodes(1, seed=0)), rounds=3)
 
 
 def test_rendering(benchmark: BenchmarkFixture) -> None:

@@ -9,7 +9,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from scenes import random_vectors, schema_of
 
-from relgym.experiments.data import ball_blocks
+from relgym.experiments.data import ball_episodes
 from relgym.scene import Extractor, canonical_order, signature
 
 BATCH = 24_000
@@ -17,10 +17,10 @@ BATCH = 24_000
 
 @pytest.fixture(scope="module")
 def world() -> tuple[Extractor, np.ndarray]:
-    """A ball among six bodies that stand still: the states of some blocks of experiment 1."""
-    blocks = list(ball_blocks(1, blocks=10, seed=0))
-    vectors = np.concatenate([b.vectors[:-1] for b in blocks])
-    return Extractor(blocks[0].schema), np.resize(vectors, (BATCH, vectors.shape[1]))
+    """A ball among six bodies that stand still: the states of some episodes of experiment 1."""
+    episodes = list(ball_episodes(1, episodes=10, seed=0))
+    vectors = np.concatenate([b.vectors[:-1] for b in episodes])
+    return Extractor(episodes[0].schema), np.resize(vectors, (BATCH, vectors.shape[1]))
 
 
 def test_one_scene(benchmark: BenchmarkFixture, world: tuple[Extractor, np.ndarray]) -> None:

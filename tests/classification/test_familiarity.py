@@ -30,8 +30,8 @@ def _reordered(example: Example, order: list[int]) -> Example:
 
 @settings(max_examples=30, deadline=None)
 @given(st.permutations(range(4)), st.integers(0, 15))
-def test_order_of_objects_is_irrelevant(order: list[int], block: int) -> None:
-    example = list(truck_stream(16, rng=np.random.default_rng(0)))[10 * block].example
+def test_order_of_objects_is_irrelevant(order: list[int], episode: int) -> None:
+    example = list(truck_stream(16, rng=np.random.default_rng(0)))[10 * episode].example
     assert _situation(_reordered(example, order)) == _situation(example)
 
 

@@ -251,11 +251,13 @@ def test_without_exemplars_a_classifier_still_answers(learned: tuple[ModeClassif
         assert again.rank(item.example, values) == classifier.rank(item.example, values)
 
 
-def test_explanation_names_the_clause_and_the_rival(learned: tuple[ModeClassifier, list[int]]) -> None:
+def test_explanation_names_the_clause_and_the_runner_up(learned: tuple[ModeClassifier, list[int]]) -> None:
     classifier, _ = learned
     item = next(i for i in ball_stream(900, rng=np.random.default_rng(3)) if i.mode == BOUNCE)
     verdicts = classifier.explain(item.example, item.values.tolist())
-    assert [v.rival for v in verdicts] == list(classifier.rank(item.example, item.values.tolist()).modes[1:])
+    assert [v.runner_up for v in verdicts] == list(
+        classifier.rank(item.example, item.values.tolist()).modes[1:]
+    )
     assert {v.winner for v in verdicts} == {BOUNCE}
     assert any("approach" in str(v.clause) for v in verdicts)
     assert all(v.probability > 0.5 for v in verdicts)
@@ -315,8 +317,8 @@ def test_unseen_layouts_are_not_familiar_where_no_clause_speaks() -> None:
     assert not ranking.familiar
 
 
-def _taught_truck(classifier: ModeClassifier, blocks: int, bystanders: int = 0) -> None:
-    for item in truck_stream(blocks, rng=np.random.default_rng(0), bystanders=bystanders):
+def _taught_truck(classifier: ModeClassifier, episodes: int, bystanders: int = 0) -> None:
+    for item in truck_stream(episodes, rng=np.random.default_rng(0), bystanders=bystanders):
         classifier.observe(item.example, item.mode, item.fits, item.values)
         classifier.refresh()
 

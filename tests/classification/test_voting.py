@@ -101,9 +101,9 @@ def test_familiar_is_what_was_seen_or_what_a_clause_speaks_for() -> None:
     assert not voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN).seen
     sure = [[9.0, 0.0], [0.0, 9.0]]
     voting.set_pairs([_pair(i, j, sure, fires=False) for i, j in ((1, 2), (1, 3), (2, 3))])
-    silent = voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN)
-    assert silent.modes[0] == 3
-    assert not silent.familiar
+    abstained = voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN)
+    assert abstained.modes[0] == 3
+    assert not abstained.familiar
     assert voting.rank(_ITEM.example, values, _COUNTS, _EVERYTHING_SEEN).familiar
 
 
@@ -118,7 +118,7 @@ def test_no_modes_no_winner() -> None:
 def test_verdicts_give_clause_counts_and_probability() -> None:
     voting = _voting("soft")
     first, second = voting.verdicts(_ITEM.example, [0.0] * 3, (1, 2, 3))
-    assert (first.winner, first.rival, str(first.clause)) == (1, 2, "vx <= 9")
+    assert (first.winner, first.runner_up, str(first.clause)) == (1, 2, "vx <= 9")
     assert (first.correct, first.incorrect, first.probability) == (98.0, 0.0, 99 / 100)
-    assert (second.winner, second.rival, second.clause) == (3, 1, None)
+    assert (second.winner, second.runner_up, second.clause) == (3, 1, None)
     assert (second.correct, second.incorrect) == (5.0, 4.0)

@@ -65,7 +65,7 @@ def test_unification_gives_all_examples_to_the_general_mode() -> None:
 
 
 def test_modes_that_differ_in_their_constant_unify_as_a_family(rng: np.random.Generator) -> None:
-    # Friction is constant while a block lasts, so each block teaches v' = v - c first.
+    # Friction is constant while an episode lasts, so each episode teaches v' = v - c first.
     signature = SlotSignature((BALL, ObjectType("box", ("friction",), Box())))
     stream = Stream(signature)
     frictions = rng.uniform(0.1, 1.0, 10)
@@ -195,13 +195,13 @@ def test_a_given_noise_overrides_the_estimate(rng: np.random.Generator) -> None:
 # ---------------------------------------------------------------------- invariants of every stream
 @dataclass(frozen=True)
 class Recipe:
-    """A stream: laws (weights of v and w, constant), rubbish among them, rest, in blocks or mixed."""
+    """A stream: laws (weights of v and w, constant), rubbish among them, rest, in episodes or mixed."""
 
     seed: int
     laws: tuple[tuple[float, float, float], ...]
     rubbish: bool
     rest: bool
-    blocks: bool
+    episodes: bool
 
     def stream(self) -> tuple[np.ndarray, np.ndarray]:
         rng = np.random.default_rng(self.seed)
@@ -210,7 +210,7 @@ class Recipe:
         parts = [a * x[:, 0] + b * x[:, 1] + c for a, b, c in self.laws]
         parts += [rng.normal(size=100)] * self.rubbish
         which = rng.integers(0, len(parts), 100)
-        return x, np.choose(np.sort(which) if self.blocks else which, parts)
+        return x, np.choose(np.sort(which) if self.episodes else which, parts)
 
 
 NUMBERS = st.sampled_from([-0.9, 0.0, 0.5, 1.0])

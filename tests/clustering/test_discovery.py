@@ -14,7 +14,7 @@ SCALE = Scale(1e-13, 4.0, 8.0)
 CONFIG = ClusteringConfig()
 
 
-def judged(x: np.ndarray, y: np.ndarray, fit: LinearFit, support: int = 3) -> Consensus | None:
+def evaluated(x: np.ndarray, y: np.ndarray, fit: LinearFit, support: int = 3) -> Consensus | None:
     return identified(x, y, fit, scale=SCALE, support=support)
 
 
@@ -23,7 +23,7 @@ def test_a_weight_that_one_example_determines_is_dropped(rng: np.random.Generato
     x = np.column_stack([rng.normal(size=30), np.zeros(30)])
     y = -0.17 * x[:, 0]
     x[7, 1], y[7] = 0.4, 0.9
-    found = judged(x, y, least_squares(x, y, (0, 1)))
+    found = evaluated(x, y, least_squares(x, y, (0, 1)))
     assert found is not None
     assert found.fit.columns == (0,)
     assert found.fit.weights == pytest.approx((-0.17,), abs=1e-12)
@@ -35,7 +35,7 @@ def test_an_example_far_out_in_every_column_backs_no_weight_either(rng: np.rando
     x = np.column_stack([-0.02 - 0.04 * rng.random(12), 1e-18 * rng.normal(size=12)])
     y = -0.78 * x[:, 0] - 0.0006
     x[5], y[5] = (0.0355, -0.0041), 0.0032
-    found = judged(x, y, least_squares(x, y, (0, 1)))
+    found = evaluated(x, y, least_squares(x, y, (0, 1)))
     assert found is not None
     assert found.fit.columns == (0,)
     assert found.inliers.tolist() == [k != 5 for k in range(12)]
@@ -48,7 +48,7 @@ def test_three_examples_must_back_each_weight(
     x = np.column_stack([rng.normal(size=40), np.zeros(40)])
     x[:backing, 1] = rng.normal(size=backing)
     y = 0.5 * x[:, 0] - 0.7 * x[:, 1]
-    found = judged(x, y, least_squares(x, y, (0, 1)))
+    found = evaluated(x, y, least_squares(x, y, (0, 1)))
     assert found is not None
     assert found.fit.columns == columns
 
@@ -73,22 +73,22 @@ def test_constants_of_a_few_scenes_are_no_law(rng: np.random.Generator) -> None:
     y = x[:, 0] + np.array([1e-3, -2e-3, 5e-4])[scene]
     fit = least_squares(x, y, (0, 1, 2))
     assert np.abs(y - fit.predict(x)).max() < 1e-12
-    assert judged(x, y, fit) is None
+    assert evaluated(x, y, fit) is None
 
 
 def test_constants_of_many_scenes_that_obey_are_a_law(rng: np.random.Generator) -> None:
     scene = np.arange(60) % 10
     x = np.column_stack([rng.normal(size=60), rng.normal(size=(10, 2))[scene]])
     y = x[:, 0] + 0.3 * x[:, 1] - 0.2 * x[:, 2]
-    found = judged(x, y, least_squares(x, y, (0, 1, 2)))
+    found = evaluated(x, y, least_squares(x, y, (0, 1, 2)))
     assert found is not None
     assert found.fit.columns == (0, 1, 2)
 
 
 def test_persistence_needs_no_other_proof() -> None:
     x = np.repeat([3.0, 5.0], 6)[:, None]
-    assert judged(x, x[:, 0], LinearFit((0,), (1.0,), 0.0, 0.0)) is not None
-    assert judged(x, -0.9 * x[:, 0], LinearFit((0,), (-0.9,), 0.0, 0.0)) is None
+    assert evaluated(x, x[:, 0], LinearFit((0,), (1.0,), 0.0, 0.0)) is not None
+    assert evaluated(x, -0.9 * x[:, 0], LinearFit((0,), (-0.9,), 0.0, 0.0)) is None
 
 
 def test_exact_data_need_ten_examples_and_noisy_ones_forty(rng: np.random.Generator) -> None:

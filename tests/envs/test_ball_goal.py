@@ -156,7 +156,7 @@ def test_who_leaves_begins_anew() -> None:
 
 @settings(max_examples=20)
 @given(st.integers(0, 10**6))
-def test_arrays_of_scenes_are_judged_as_single_ones(seed: int) -> None:
+def test_arrays_of_scenes_are_evaluated_as_single_ones(seed: int) -> None:
     env, rng, task = goal_env(), np.random.default_rng(seed), GoalTask()
     scenes, after, said = [], [], []
     actions = rng.uniform(-1.0, 1.0, (6, 2))
@@ -170,7 +170,7 @@ def test_arrays_of_scenes_are_judged_as_single_ones(seed: int) -> None:
         said.append((reward, terminated, info["is_success"]))
         assert task.reward(acting(scenes[-1], action), action, env.scene) == reward
     before_vectors, after_vectors = (np.stack([s.vector for s in some]) for some in (scenes, after))
-    verdict = task.judge(scenes[0].layout, before_vectors, actions, after_vectors)
+    verdict = task.evaluate(scenes[0].layout, before_vectors, actions, after_vectors)
     whole = zip(
         verdict.rewards.tolist(), verdict.terminated.tolist(), verdict.succeeded.tolist(), strict=True
     )

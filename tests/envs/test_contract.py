@@ -28,7 +28,7 @@ MADE: list[tuple[str, dict[str, Any]]] = [
     ("relgym/BallBoxRamp-v0", {"objects": ("box", "ramp", "ramp"), "balls": 3, "type_names": "thesis"}),
     ("relgym/BallBoxRamp-v0", {"objects": ()}),
     ("relgym/BallGoal-v0", {"objects": ("box", "box", "ramp"), "type_names": "thesis", "friction": 0.2}),
-    ("relgym/TruckPush-v0", {"n_boxes": 5, "redraw": "step", "bystanders": 2}),
+    ("relgym/TruckPush-v0", {"n_boxes": 5, "resample": "step", "bystanders": 2}),
     ("relgym/TruckPush-v0", {"task": None}),
     ("relgym/TruckPush-v0", {"bystanders": 2}),
 ]
@@ -44,7 +44,7 @@ def scene_env(env_id: str, **arguments: Any) -> SceneEnv:
 
 
 @made
-def test_gymnasiums_checker_is_silent(env_id: str, arguments: dict[str, Any]) -> None:
+def test_gymnasiums_checker_says_nothing(env_id: str, arguments: dict[str, Any]) -> None:
     check_env(scene_env(env_id, **arguments))  # warnings are errors
 
 

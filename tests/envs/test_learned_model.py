@@ -46,7 +46,7 @@ PUSH = np.array([1.0], np.float32)
 @pytest.fixture(scope="module")
 def truck() -> ModelLearner:
     """A truck with one box, watched for 12 episodes of ever new pushes."""
-    env = ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step"))
+    env = ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=1, resample="step"))
     env.action_space.seed(0)
     for episode in range(12):
         env.reset(seed=episode)
@@ -208,7 +208,7 @@ def test_a_dream_can_be_learned_from(cart: ModelLearner) -> None:
 
 # ---------------------------------------------------------------------- where dreams begin
 def test_a_dream_begins_as_the_real_env_would(truck: ModelLearner) -> None:
-    real = gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step")
+    real = gym.make("relgym/TruckPush-v0", n_boxes=1, resample="step")
     dream = LearnedModelEnv(truck.model, like=real)
     for options in (None, {"box1_friction": 0.25, "speed": 3.0}):
         expected, _ = real.reset(seed=8, options=options)
@@ -266,7 +266,7 @@ def test_a_given_scene_must_be_of_this_world(cart: ModelLearner, truck: ModelLea
 
 # ---------------------------------------------------------------------- other objects than in training
 def test_a_dream_of_other_objects_is_like_an_env_that_has_them(cart: ModelLearner) -> None:
-    env = ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=2, redraw="step"))
+    env = ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=2, resample="step"))
     env.action_space.seed(0)
     for episode in range(24):
         env.reset(seed=episode, options={"layout": 1 + episode % 2})
@@ -563,7 +563,7 @@ def test_what_was_learned_of_the_task_holds_among_other_objects() -> None:
     assert np.mean(right) > 0.9
 
 
-def test_a_dream_is_judged_by_the_real_envs_own_task() -> None:
+def test_a_dream_is_evaluated_by_the_real_envs_own_task() -> None:
     real = gym.make("relgym/TruckPush-v0", task="push", n_boxes=1)
     learner = ModelLearner(gym.make("relgym/TruckPush-v0", task="push", n_boxes=1), predict=False)
     learner.action_space.seed(0)
@@ -594,9 +594,9 @@ def test_what_is_given_goes_before_what_is_learned() -> None:
     dream = LearnedModelEnv(cart_model(), reward=lambda *_: 7.0)
     dream.reset(seed=0)
     assert dream.step(PUSH)[1] == 7.0
-    judged = LearnedModelEnv(cart_model(), task=Errand(), reward="learned")
-    judged.reset(options={"scene": CART_SCHEMA.scene({"cart": [0.0, 0.0]})})
-    _, reward, terminated, _, info = judged.step(PUSH)
+    evaluated = LearnedModelEnv(cart_model(), task=Errand(), reward="learned")
+    evaluated.reset(options={"scene": CART_SCHEMA.scene({"cart": [0.0, 0.0]})})
+    _, reward, terminated, _, info = evaluated.step(PUSH)
     assert reward == pytest.approx(1.0) and terminated and info["is_success"] is True
 
 
@@ -656,7 +656,7 @@ def test_reward_and_termination_are_functions_of_both_scenes(truck: ModelLearner
 
     dream = LearnedModelEnv(
         truck.model,
-        like=gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step"),
+        like=gym.make("relgym/TruckPush-v0", n_boxes=1, resample="step"),
         reward=gained,
         terminated=lambda _before, _action, after: after["truck"]["vx"] > 100.0,
     )
@@ -682,7 +682,7 @@ def test_a_dream_ends_where_the_model_knows_nothing() -> None:
 
 def test_what_knows_nothing_cannot_be_dreamed_of(truck: ModelLearner) -> None:
     ignorant = WorldModel(truck.model.schema)
-    like = gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step")
+    like = gym.make("relgym/TruckPush-v0", n_boxes=1, resample="step")
     dream = LearnedModelEnv(ignorant, like=like)  # live: it may learn yet
     with pytest.raises(
         QueryError, match=r"knows none of its targets \['truck.vx', 'box.px'\] after 0 transitions"
@@ -699,7 +699,9 @@ def test_a_prediction_by_a_small_margin_is_not_followed() -> None:
     assert not wary[0.0].step(0)[3]
     *_, truncated, info = wary[1e6].step(0)
     assert truncated and info["cause"] == "low_margin"
-    assert "leads its rival by too little" in info["reason"] and "expected at least 1e+06" in info["reason"]
+    assert (
+        "leads its runner-up by too little" in info["reason"] and "expected at least 1e+06" in info["reason"]
+    )
     with pytest.raises(ConfigError, match="min_margin=-1"):
         LearnedModelEnv(room_model(), min_margin=-1.0)
 

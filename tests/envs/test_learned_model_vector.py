@@ -155,7 +155,7 @@ def _begin_many(rng: np.random.Generator, count: int) -> np.ndarray:
 
 def test_resets_of_a_real_env_are_those_of_single_dreams() -> None:
     truck = gym.make("relgym/TruckPush-v0", n_boxes=1, task=None)
-    model = relgym.wrappers.ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=1, redraw="step"))
+    model = relgym.wrappers.ModelLearner(gym.make("relgym/TruckPush-v0", n_boxes=1, resample="step"))
     model.action_space.seed(0)
     for episode in range(8):
         model.reset(seed=episode)
@@ -403,7 +403,7 @@ def test_a_step_whose_new_beginnings_fail_is_not_made() -> None:
     assert cut.all() and infos["_final_obs"].all()
 
 
-def test_who_judges_changes_nothing() -> None:
+def test_who_evaluates_changes_nothing() -> None:
     def greedy(_layout: Any, before: Any, _actions: Any, after: Any) -> Any:
         after -= before
         return after[:, 0]

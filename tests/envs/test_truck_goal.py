@@ -116,7 +116,7 @@ def test_the_goal_keeps_its_place(n_boxes: int, seed: int) -> None:
 
 
 @given(st.integers(0, 10**6))
-def test_arrays_of_scenes_are_judged_as_single_ones(seed: int) -> None:
+def test_arrays_of_scenes_are_evaluated_as_single_ones(seed: int) -> None:
     env, rng = pushing(), np.random.default_rng(seed)
     task = PushTask()
     scenes: list[Scene] = []
@@ -185,7 +185,7 @@ def test_the_goal_is_no_body_and_the_action_is_not_seen() -> None:
 
 def test_to_push_is_the_task_unless_nobody_could_plan() -> None:
     assert gym.make("relgym/TruckPush-v0").get_wrapper_attr("task") == PushTask()
-    assert gym.make("relgym/TruckPush-v0", redraw="step").get_wrapper_attr("task") is None
+    assert gym.make("relgym/TruckPush-v0", resample="step").get_wrapper_attr("task") is None
     assert TruckPushEnv(task=None).task is None
 
 
@@ -209,7 +209,7 @@ def test_half_the_gravity_is_half_the_friction() -> None:
 
 
 def test_bad_combinations_are_named() -> None:
-    with pytest.raises(ConfigError, match=r"redraw='step'.*task=None"):
-        TruckPushEnv(task="push", redraw="step")
+    with pytest.raises(ConfigError, match=r"resample='step'.*task=None"):
+        TruckPushEnv(task="push", resample="step")
     with pytest.raises(ConfigError, match="goal_distance"):
         TruckPushEnv(task=None).reset(options={"goal_distance": 3.0})

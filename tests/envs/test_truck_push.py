@@ -123,18 +123,18 @@ def test_bystanders_stay() -> None:
         )
 
 
-def test_frictions_per_block_or_step() -> None:
-    for redraw, same in (("block", True), ("step", False)):
-        env = TruckPushEnv(redraw=redraw, task=None)
+def test_frictions_per_episode_or_step() -> None:
+    for resample, same in (("episode", True), ("step", False)):
+        env = TruckPushEnv(resample=resample, task=None)
         _, info = env.reset(seed=0)
         env.step(FULL)
         assert (env.scene["box1"]["friction"] == info["scene"]["box1"]["friction"]) == same
         assert env.schema.type("box").exogenous == (() if same else ("friction",))
 
 
-@pytest.mark.parametrize("redraw", ["block", "step"])
-def test_a_restored_state_goes_on_exactly(redraw: str) -> None:
-    env, fresh = TruckPushEnv(redraw=redraw, task=None), TruckPushEnv(redraw=redraw, task=None)
+@pytest.mark.parametrize("resample", ["episode", "step"])
+def test_a_restored_state_goes_on_exactly(resample: str) -> None:
+    env, fresh = TruckPushEnv(resample=resample, task=None), TruckPushEnv(resample=resample, task=None)
     env.reset(seed=0)
     env.step(FULL)
     fresh.set_state(env.get_state())
@@ -191,7 +191,7 @@ def test_actions_outside_are_refused(action: Any) -> None:
     [
         ({"n_boxes": 0}, "n_boxes=0"),
         ({"bystanders": -1}, "bystanders=-1"),
-        ({"redraw": "never"}, "'never'"),
+        ({"resample": "never"}, "'never'"),
         ({"task": "fly"}, "task='fly'"),
         ({"force_range": (-5.0, 5.0)}, "force_range"),
         ({"friction_range": (0.5, 0.1)}, "friction_range"),

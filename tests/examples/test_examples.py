@@ -12,7 +12,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 RUNS = {
     "read_the_laws.py": (["--steps", "400"], "vy' = vy - 0.00098"),
-    "live_in_a_dream.py": (["--blocks", "8", "--trials", "1"], "trial 0: the trucks were never more than"),
+    "live_in_a_dream.py": (["--episodes", "8", "--trials", "1"], "trial 0: the trucks were never more than"),
     "grandparents.py": ([], "grandparent(A, B) ← parent(A, C) ∧ parent(C, B)"),
     "vector_envs.py": (["--transitions", "400"], "8 envs: "),
     "view_dict.py": (["--steps", "120"], "lower.x: x' = 0.85 x + 0.1 upper.x"),
@@ -27,7 +27,7 @@ NEED_SB3 = {
         "of 1 test episodes reach the goal",
     ),
     "dyna_truck.py": (
-        ["--steps", "400", "--warm_up", "390", "--burst", "20", "--episodes", "2"],
+        ["--steps", "400", "--warm_up", "390", "--catch_up", "20", "--episodes", "2"],
         "of 2 test episodes end on the goal after 400 real steps",
     ),
 }

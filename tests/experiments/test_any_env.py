@@ -34,7 +34,7 @@ def test_the_mountain_car_is_learned_from_its_own_advice() -> None:
     assert weight(model, "x", "v") == 0.0
 
 
-def test_limits_are_judged_apart() -> None:
+def test_limits_are_evaluated_apart() -> None:
     study = STUDIES["pendulum"]
     lesson = collect(study, 60, TUNING_SEEDS[0])
     assert regular(study, lesson).all()
@@ -67,13 +67,13 @@ def test_a_long_life_is_measured_beyond_its_bound(
     name: str, right: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     figures = memory(name, [(TUNING_SEEDS[0], TUNING_TEST_SEED)], steps=600, bound=200)
-    found = {m.bar.what: m for m in figures}
+    found = {m.criterion.what: m for m in figures}
     assert found["most rows kept, over the bound"].ok
     assert found[right].worst < 0.5
     assert "600 transitions, 200 kept" in capsys.readouterr().out
 
 
-def test_the_stream_is_foretold_beside_others(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_stream_is_predicted_beside_others(capsys: pytest.CaptureFixture[str]) -> None:
     main(["stream", "--quick", "--tuning"])
     text = capsys.readouterr().out
     assert "constant velocity" in text and "RLS" in text
@@ -83,7 +83,7 @@ def test_the_stream_is_foretold_beside_others(capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_a_fleet_teaches_what_its_envs_did(mode: AutoresetMode, capsys: pytest.CaptureFixture[str]) -> None:
     figures = taught("cart", mode, TUNING_SEEDS[0], 30)
-    assert all(value >= bar if least else value <= bar for (_, bar, least), value in figures.items())
+    assert all(value >= limit if least else value <= limit for (_, limit, least), value in figures.items())
     text = capsys.readouterr().out
     assert "x' = x + 0.02 xdot" in text
     assert "fooled by leaps: 0 " not in text  # learned as if they were transitions, resets would be noise

@@ -1,4 +1,4 @@
-"""Recordings of envs that can't be installed here: written, read, learned from, and judged."""
+"""Recordings of envs that can't be installed here: written, read, learned from, and evaluated."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from gymnasium import spaces
 
 from relgym.envs.views import Rows, Static, TableView
 from relgym.experiments.any_env_pong import KINDS, kinds_of, names
-from relgym.experiments.any_env_rows import Rows as Seen
-from relgym.experiments.any_env_rows import live, size, stream
+from relgym.experiments.any_env_recorded import Rows as Seen
+from relgym.experiments.any_env_recorded import live, size, stream
 from relgym.experiments.any_env_tables import main
 from relgym.experiments.recording import Recording, record
 from relgym.experiments.seeds import TUNING_SEEDS
@@ -98,7 +98,7 @@ def test_a_recording_is_what_was_seen(tmp_path: Path) -> None:
     assert not np.array_equal(steps[149].after, steps[150].before)
 
 
-def test_every_step_is_foretold_before_it_is_learned(
+def test_every_step_is_predicted_before_it_is_learned(
     lived: tuple[Recording, WorldModel, dict[str, Seen]],
 ) -> None:
     recording, model, rows = lived

@@ -18,19 +18,19 @@ from relgym.model.world_model import WorldModel
 
 def test_lessons_are_the_thesis_data() -> None:
     truck, ball = demonstrations()
-    assert sum(len(block) for block in truck.training(0)) == 1920
-    assert sum(len(block) for block in ball.training(0)) == 16_000
-    assert sum(len(block) for block in ball.testing(0)) == 24_000
+    assert sum(len(episode) for episode in truck.training(0)) == 1920
+    assert sum(len(episode) for episode in ball.training(0)) == 16_000
+    assert sum(len(episode) for episode in ball.testing(0)) == 24_000
 
 
-def test_what_the_wrapper_sees_are_the_blocks_own_transitions() -> None:
+def test_what_the_wrapper_sees_are_the_episodes_own_transitions() -> None:
     ball = demonstrations(quick=True)[1]
-    blocks, env = list(ball.training(5))[:2], ball.make()
+    episodes, env = list(ball.training(5))[:2], ball.make()
     taught = WorldModel(env.model.schema, env.model.config)
     lesson = learn_online(env, ball, seed=5)
-    for block in blocks:
+    for episode in episodes:
         next(lesson)
-        for transition in block.transitions():
+        for transition in episode.transitions():
             taught.learn_one(transition)
     env.model.finish()
     taught.finish()
@@ -39,15 +39,15 @@ def test_what_the_wrapper_sees_are_the_blocks_own_transitions() -> None:
 
 def test_forces_arrive_in_newtons() -> None:
     truck = demonstrations(quick=True)[0]
-    block, env = next(iter(truck.training(2))), truck.make()
+    episode, env = next(iter(truck.training(2))), truck.make()
     first = next(learn_online(env, truck, seed=2))
     assert first.steps == 40 and set(first.wrong) == {"truck.vx", "box.px"}
-    physical = block.columns("action", "force")[:-1, 0]
+    physical = episode.columns("action", "force")[:-1, 0]
     assert physical.min() >= 300.0 and physical.max() <= 500.0
     assert env.model.seen == 40
 
 
-def test_the_first_block_is_the_hardest() -> None:
+def test_the_first_episode_is_the_hardest() -> None:
     ball = demonstrations(quick=True)[1]
     lesson = learn_online(ball.make(), ball, seed=0)
     curve = [next(lesson) for _ in range(6)]
@@ -56,10 +56,10 @@ def test_the_first_block_is_the_hardest() -> None:
 
 
 def _trajectory(off: float = 0.0) -> Trajectory:
-    block = next(iter(demonstrations(quick=True)[1].training(0)))
-    imagined = block.vectors.copy()
-    imagined[10:, block.layout.column(block.layout.index("ball"), "px")] += off
-    return Trajectory("ball", block.scene(0), "ball", block.vectors, imagined, len(block))
+    episode = next(iter(demonstrations(quick=True)[1].training(0)))
+    imagined = episode.vectors.copy()
+    imagined[10:, episode.layout.column(episode.layout.index("ball"), "px")] += off
+    return Trajectory("ball", episode.scene(0), "ball", episode.vectors, imagined, len(episode))
 
 
 def test_distance_between_real_and_imagined() -> None:
@@ -83,8 +83,8 @@ def test_pictures_are_written(tmp_path: Path) -> None:
 
 
 def test_a_path_that_leaves_the_scene_is_drawn_over_time(tmp_path: Path) -> None:
-    block = next(iter(demonstrations(quick=True)[0].training(0)))
-    shown = Trajectory("truck", block.scene(0), "truck", block.vectors, block.vectors, 7)
+    episode = next(iter(demonstrations(quick=True)[0].training(0)))
+    shown = Trajectory("truck", episode.scene(0), "truck", episode.vectors, episode.vectors, 7)
     assert _size(draw_trajectories(tmp_path / "truck.png", [shown]))[1] == 1080
 
 

@@ -134,7 +134,7 @@ def test_every_arm_runs(arm: str) -> None:
         testing=Examination(COURSES["truck"], episodes=3),
         heard=lambda at, good: heard.append((at, good)),
         agent={"learning_starts": 245, "batch_size": 16},
-        dyna={"dreams": 8, "updates": 1, "burst": 2} if ARMS[arm].dreams else {},
+        dyna={"dreams": 8, "updates": 1, "catch_up": 2} if ARMS[arm].dreams else {},
     )
     assert found.curve == tuple(heard)
     assert [at for at, _ in heard] == [250]
@@ -144,7 +144,7 @@ def test_every_arm_runs(arm: str) -> None:
 
 @pytest.mark.sb3
 @pytest.mark.parametrize(("arm", "entropy"), [("sac5", 1.0), ("relgym", 0.01)])
-def test_what_suits_dreams_is_not_asked_of_rivals(arm: str, entropy: float) -> None:
+def test_what_suits_dreams_is_not_asked_of_baselines(arm: str, entropy: float) -> None:
     weights: list[float] = []
     run(
         COURSES["ball"],

@@ -30,17 +30,17 @@ def test_a_course_through_a_world_that_changes_goes_on_to_its_end() -> None:
     change = {"after": 250, "arguments": {"gravity": 5.0}}
     found = plain(dyna_trials.learning(course="truck", arm="sac", seed=100, steps=500, change=change))
     assert [at for at, _ in found["curve"]] == [250, 500]
-    assert (found["steps"], found["trusted"]) == (500, 0.0)
+    assert (found["steps"], found["accepted"]) == (500, 0.0)
 
 
-def test_a_model_of_another_world_is_right_there_and_not_trusted_here(
+def test_a_model_of_another_world_is_right_there_and_not_accepted_here(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(dyna_trials, "_LESSONS", 900)
     arguments = {"gravity": 5.0}
     found = plain(dyna_trials.misled(course="truck", arm="relgym", seed=100, steps=250, arguments=arguments))
     assert found["right_there"] > 0.9
-    assert found["run"]["trusted"] == 0.0
+    assert found["run"]["accepted"] == 0.0
 
 
 def test_agents_that_train_in_dreams_alone() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from relgym.config import ModelConfig
-from relgym.experiments.data import ball_blocks
-from relgym.experiments.law_bars import ROWS
+from relgym.experiments.data import ball_episodes
+from relgym.experiments.law_benchmarks import ROWS
 from relgym.experiments.law_classic import CLASSICS, Classic, classic_transitions
 from relgym.experiments.law_scaling import on_the_floor
 from relgym.experiments.law_score import Score, score, score_laws, taught
@@ -47,10 +47,10 @@ def _laws(model: WorldModel) -> LawBook:
 
 
 def test_noise_touches_what_moves_only() -> None:
-    (block,) = ball_blocks(1, seed=0, blocks=1)
-    (found,) = noisy([block], 1e-3, rng=np.random.default_rng(0))
-    off = found.vectors - block.vectors
-    at = block.layout.offsets[block.layout.index("ball")]
+    (episode,) = ball_episodes(1, seed=0, episodes=1)
+    (found,) = noisy([episode], 1e-3, rng=np.random.default_rng(0))
+    off = found.vectors - episode.vectors
+    at = episode.layout.offsets[episode.layout.index("ball")]
     moving = np.zeros(off.shape[1], dtype=bool)
     moving[[at, at + 1, at + 9, at + 10]] = True
     assert (off[:, ~moving] == 0.0).all()

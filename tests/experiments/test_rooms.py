@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.law_score import score, taught
 from relgym.experiments.rooms import Room, room_schema, rooms
 
@@ -36,7 +36,7 @@ def test_the_same_generator_gives_the_same_rooms() -> None:
 @pytest.mark.parametrize("experiment", [1, 2])
 def test_laws_of_small_rooms_hold_in_large_ones(experiment: int) -> None:
     setting = BALL_EXPERIMENTS[experiment]
-    model = taught(ball_blocks(experiment, seed=0, blocks=8))
+    model = taught(ball_episodes(experiment, seed=0, episodes=8))
     large = rooms(
         4,
         objects=12,
@@ -46,4 +46,4 @@ def test_laws_of_small_rooms_hold_in_large_ones(experiment: int) -> None:
         steps=300,
     )
     found = score(model, large)
-    assert (found.transitions, found.wrong, found.silent) == (1200, 0, 0)
+    assert (found.transitions, found.wrong, found.abstained) == (1200, 0, 0)

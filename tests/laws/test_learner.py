@@ -8,19 +8,19 @@ from law_streams import Stream, errors, formulas, learn, taught
 from numpy.typing import NDArray
 
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
-from relgym.experiments.data import BallExperiment, ball_blocks
+from relgym.experiments.data import BallExperiment, ball_episodes
 from relgym.laws.learner import LawLearner
 from relgym.laws.text import law_rows
 
 
-def blocks(
+def episodes(
     experiment: int | BallExperiment, count: int, *, seed: int = 0, test: bool = False
 ) -> list[Stream]:
-    found = ball_blocks(experiment, seed=seed, blocks=count, test=test)
+    found = ball_episodes(experiment, seed=seed, episodes=count, test=test)
     return [Stream(b.schema, b.layout, b.vectors) for b in found]
 
 
-def episodes(env: BallBoxRampEnv, count: int, *, seed: int) -> list[Stream]:
+def played(env: BallBoxRampEnv, count: int, *, seed: int) -> list[Stream]:
     streams = []
     for k in range(count):
         env.reset(seed=100 * seed + k)
@@ -37,28 +37,28 @@ def episodes(env: BallBoxRampEnv, count: int, *, seed: int) -> list[Stream]:
     ("experiment", "count", "tangent"), [(1, 8, "u_t"), (2, 16, "max(0, u_t - 0.2 J_n)")]
 )
 def test_three_sentences_explain_every_step(experiment: int, count: int, tangent: str) -> None:
-    learner = taught(blocks(experiment, count))
+    learner = taught(episodes(experiment, count))
     bounce = {1: "-0.9", 2: "-0.95"}[experiment]
     assert formulas(learner.book) == [[f"max(u_n, {bounce} v_n)"], [tangent]]
     assert learner.book.pair is not None
     assert learner.book.pair.frame == "contact"
     assert len(law_rows(learner.book, ["ball"])) == 3
-    assert errors(learner.book, blocks(experiment, 16, seed=1, test=True)) == (0, 0, 3200)
+    assert errors(learner.book, episodes(experiment, 16, seed=1, test=True)) == (0, 0, 3200)
 
 
 @pytest.mark.parametrize("incline", [15.0, 60.0])
 def test_other_inclines_need_no_learning(incline: float) -> None:
-    learner = taught(blocks(2, 12))
-    away = blocks(BallExperiment(incline, 0.95, (0.2,), 8), 8, seed=1)
+    learner = taught(episodes(2, 12))
+    away = episodes(BallExperiment(incline, 0.95, (0.2,), 8), 8, seed=1)
     assert errors(learner.book, away) == (0, 0, 1600)
 
 
 def test_types_that_differ_in_friction() -> None:
-    learner = taught(blocks(3, 16))
+    learner = taught(episodes(3, 16))
     normal, tangent = formulas(learner.book)
     assert normal == ["max(u_n, -0.95 v_n)"]
     assert sorted(tangent) == ["max(0, u_t - 0.1 J_n)", "max(0, u_t - 0.2 J_n)"]
-    assert errors(learner.book, blocks(3, 12, seed=1, test=True))[0] == 0
+    assert errors(learner.book, episodes(3, 12, seed=1, test=True))[0] == 0
 
 
 def touching_only(kind: str, stream: Stream) -> NDArray[np.intp]:
@@ -68,22 +68,22 @@ def touching_only(kind: str, stream: Stream) -> NDArray[np.intp]:
 
 @pytest.mark.parametrize("experiment", [1, 2])
 def test_the_floor_teaches_everything(experiment: int) -> None:
-    wrong, silent, _ = errors(
-        _of_one_kind(experiment, "floor").book, blocks(experiment, 10, seed=1, test=True)
+    wrong, abstained, _ = errors(
+        _of_one_kind(experiment, "floor").book, episodes(experiment, 10, seed=1, test=True)
     )
-    assert (wrong, silent) == (0, 0)
+    assert (wrong, abstained) == (0, 0)
 
 
 @pytest.mark.parametrize("experiment", [1, 2])
 def test_walls_alone_leave_open_what_gravity_does(experiment: int) -> None:
     learner = _of_one_kind(experiment, "wall", 24)
-    wrong, silent, _ = errors(learner.book, blocks(experiment, 10, seed=1, test=True))
+    wrong, abstained, _ = errors(learner.book, episodes(experiment, 10, seed=1, test=True))
     assert wrong == 0
-    assert silent > 0
+    assert abstained > 0
 
 
 def _of_one_kind(experiment: int, kind: str, count: int = 12) -> LawLearner:
-    streams = blocks(experiment, count)
+    streams = episodes(experiment, count)
     learner = LawLearner(streams[0].schema, streams[0].schema.targets or (), seed=0)
     others = touching_only(kind, streams[0])
     layout = streams[0].layout
@@ -94,12 +94,12 @@ def _of_one_kind(experiment: int, kind: str, count: int = 12) -> LawLearner:
 
 
 def test_the_same_stream_and_seed_give_the_same_laws() -> None:
-    one, two = (taught(blocks(2, 3)).to_json(history=True) for _ in range(2))
+    one, two = (taught(episodes(2, 3)).to_json(history=True) for _ in range(2))
     assert one == two
 
 
 def test_it_goes_on_as_if_never_saved() -> None:
-    streams = blocks(2, 5)
+    streams = episodes(2, 5)
     whole = taught(streams)
     first = taught(streams[:2])
     again = LawLearner(first.schema, first.schema.targets or (), seed=7)
@@ -114,26 +114,26 @@ def test_it_goes_on_as_if_never_saved() -> None:
 # ---------------------------------------------------------------------- other worlds
 def test_balls_share_what_passes_between_them() -> None:
     env = BallBoxRampEnv(balls=3)
-    learner = taught(episodes(env, 8, seed=1))
+    learner = taught(played(env, 8, seed=1))
     assert formulas(learner.book) == [["max(u_n, -0.9 v_n)"], ["u_t"]]
     assert learner.book.shares["ball", "ball"].formula() == "0.5"
-    assert errors(learner.book, episodes(env, 6, seed=2)) == (0, 0, 3600)
+    assert errors(learner.book, played(env, 6, seed=2)) == (0, 0, 3600)
 
 
 def test_every_material_has_its_own_law() -> None:
     bounces = {"floor": 0.9, "ramp": 0.6, "box": 0.3, "wall": 0.75, "ceiling": 0.9}
     env = BallBoxRampEnv(elasticity=bounces)
-    learner = taught(episodes(env, 16, seed=1))
+    learner = taught(played(env, 16, seed=1))
     normal, tangent = formulas(learner.book)
     assert set(normal) == {f"max(u_n, -{e:g} v_n)" for e in set(bounces.values())}
     assert tangent == ["u_t"]
-    assert errors(learner.book, episodes(env, 6, seed=2))[0] == 0
+    assert errors(learner.book, played(env, 6, seed=2))[0] == 0
 
 
 @pytest.mark.parametrize("sd", [1e-6, 1e-4])
 def test_noisy_positions(sd: float, rng: np.random.Generator) -> None:
     noisy = []
-    for stream in blocks(2, 10):
+    for stream in episodes(2, 10):
         vectors = stream.vectors.copy()
         at = stream.layout.offsets[stream.layout.index("ball")]
         shift = rng.normal(size=(len(vectors) + 1, 2)) * sd

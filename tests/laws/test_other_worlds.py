@@ -41,8 +41,8 @@ def test_every_world_has_its_laws(trial: Trial, books: dict[str, LawBook]) -> No
     assert book.pair is not None
     assert book.pair.frame == trial.frame
     assert {law for axis in formulas(book) for law in axis} == trial.laws
-    wrong, silent, total = errors(book, streams(trial.world, 2, seed=2))
-    assert wrong + silent <= 0.001 * total
+    wrong, abstained, total = errors(book, streams(trial.world, 2, seed=2))
+    assert wrong + abstained <= 0.001 * total
 
 
 def named(name: str) -> Trial:
@@ -82,8 +82,8 @@ def test_two_spinning_balls() -> None:
     assert formulas(book) == [["max(u_n, -0.9 v_n)"], ["max(0, u_t - 0.6 J_n)"]]
     assert book.pair is not None
     assert {f"{grip:.6g}" for _, grip in book.pair.grips} == {"0.333333"}
-    wrong, silent, total = errors(book, streams(world, 3, seed=2))
-    assert wrong + silent <= 0.001 * total
+    wrong, abstained, total = errors(book, streams(world, 3, seed=2))
+    assert wrong + abstained <= 0.001 * total
 
 
 def test_a_spin_that_nothing_drags_at_is_left_alone() -> None:
@@ -96,9 +96,9 @@ def test_a_spin_that_nothing_drags_at_is_left_alone() -> None:
 @pytest.mark.parametrize("name", sorted(INEXPRESSIBLE))
 def test_what_the_form_cannot_state_is_left_unsaid(name: str) -> None:
     learner = taught(streams(INEXPRESSIBLE[name], 5, seed=1))
-    wrong, silent, total = errors(learner.book, streams(INEXPRESSIBLE[name], 2, seed=2))
+    wrong, abstained, total = errors(learner.book, streams(INEXPRESSIBLE[name], 2, seed=2))
     assert wrong == 0
-    assert 0 < silent < 0.3 * total  # contacts only: free flight is still foretold
+    assert 0 < abstained < 0.3 * total  # contacts only: free flight is still predicted
 
 
 # ---------------------------------------------------------------------- what must not matter

@@ -63,7 +63,7 @@ def test_a_rare_piece_is_found_among_many_slides(n: int, rng: np.random.Generato
 def test_ties_stay_open(rng: np.random.Generator) -> None:
     tied = examples(rng, 80, "max(u, -0.9 * v)", pull=0.0)  # nothing pulls: u = v
     found = fit_axis(tied, rng=rng)
-    forms = {tuple(sorted(p.formula(4) for p in pieces)) for _, pieces in found.rivals}
+    forms = {tuple(sorted(p.formula(4) for p in pieces)) for _, pieces in found.alternatives}
     forms.add(tuple(sorted(p.formula(4) for p in found.pieces)))
     assert {("-0.9 u", "u"), ("-0.9 v", "u")} <= forms
 

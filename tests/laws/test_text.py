@@ -5,7 +5,7 @@ import pytest
 from law_streams import Stream, moved, taught
 
 from relgym.errors import ConfigError
-from relgym.experiments.data import ball_blocks
+from relgym.experiments.data import ball_episodes
 from relgym.laws.account import accounts
 from relgym.laws.book import LawBook
 from relgym.laws.text import law_rows, world_rows
@@ -15,7 +15,7 @@ from relgym.scene.relations import Extractor
 
 @pytest.fixture(scope="module")
 def streams() -> list[Stream]:
-    return [Stream(b.schema, b.layout, b.vectors) for b in ball_blocks(2, seed=0, blocks=12)]
+    return [Stream(b.schema, b.layout, b.vectors) for b in ball_episodes(2, seed=0, episodes=12)]
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_table_4_9_follows_from_the_laws(book: LawBook) -> None:
 
 
 def test_table_4_2_follows_from_the_laws() -> None:
-    smooth = taught(Stream(b.schema, b.layout, b.vectors) for b in ball_blocks(1, seed=0, blocks=8)).book
+    smooth = taught(Stream(b.schema, b.layout, b.vectors) for b in ball_episodes(1, seed=0, episodes=8)).book
     (row,) = world_rows(smooth, "ball", 30.0)
     assert row.case == "v'_n = -0.9 v_n, v'_t = u_t"
     assert row.functions == (

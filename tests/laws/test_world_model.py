@@ -9,30 +9,30 @@ import pytest
 
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
-from relgym.experiments.data import BallExperiment, ball_blocks
+from relgym.experiments.data import BallExperiment, ball_episodes
 from relgym.model.world_model import WorldModel
 
 STEEP = BallExperiment(60.0, 0.9, (0.0,), 80)
 
 
-def wrong(model: WorldModel, experiment: int | BallExperiment, blocks: int) -> int:
-    """Transitions off by more than 1e-9, or silent, corners and several contacts included."""
+def wrong(model: WorldModel, experiment: int | BallExperiment, episodes: int) -> int:
+    """Transitions off by more than 1e-9, or abstained, corners and several contacts included."""
     count = 0
-    for block in ball_blocks(experiment, seed=91, blocks=blocks, test=True):
-        predicted = model.predict_batch(block.layout, block.vectors[:-1])
-        columns = [block.layout.column(block.layout.index("ball"), p) for p in ("vx", "vy")]
-        off = np.abs(predicted.vectors[:, columns] - block.vectors[1:][:, columns]).max(axis=1) > 1e-9
+    for episode in ball_episodes(experiment, seed=91, episodes=episodes, test=True):
+        predicted = model.predict_batch(episode.layout, episode.vectors[:-1])
+        columns = [episode.layout.column(episode.layout.index("ball"), p) for p in ("vx", "vy")]
+        off = np.abs(predicted.vectors[:, columns] - episode.vectors[1:][:, columns]).max(axis=1) > 1e-9
         count += int((off | ~predicted.ok).sum())
     return count
 
 
 @pytest.fixture(scope="module")
 def model() -> WorldModel:
-    """Experiment 1 after twelve blocks."""
+    """Experiment 1 after twelve episodes."""
     known: WorldModel | None = None
-    for block in ball_blocks(1, seed=7, blocks=12):
-        known = known or WorldModel(block.schema)
-        for transition in block.transitions():
+    for episode in ball_episodes(1, seed=7, episodes=12):
+        known = known or WorldModel(episode.schema)
+        for transition in episode.transitions():
             known.learn_one(transition)
     assert known is not None
     known.finish()
@@ -60,10 +60,10 @@ def test_the_thesis_functions_follow(model: WorldModel) -> None:
 
 
 def test_single_and_batched_predictions_agree_bit_for_bit(model: WorldModel) -> None:
-    block = next(iter(ball_blocks(1, seed=92, blocks=1, test=True)))
-    batched = model.predict_batch(block.layout, block.vectors[:-1]).vectors
-    for k in range(0, len(block), 5):
-        assert model.predict_one(block.scene(k)).scene.vector.tobytes() == batched[k].tobytes()
+    episode = next(iter(ball_episodes(1, seed=92, episodes=1, test=True)))
+    batched = model.predict_batch(episode.layout, episode.vectors[:-1]).vectors
+    for k in range(0, len(episode), 5):
+        assert model.predict_one(episode.scene(k)).scene.vector.tobytes() == batched[k].tobytes()
 
 
 @pytest.mark.parametrize("history", [False, True])
@@ -75,9 +75,9 @@ def test_files_keep_the_laws(model: WorldModel, tmp_path: Path, history: bool) -
 
 
 def test_the_thesis_learner_stays_selectable() -> None:
-    block = next(iter(ball_blocks(1, seed=7, blocks=1)))
-    model = WorldModel(block.schema, ModelConfig(frames="world"))
-    for transition in block.transitions():
+    episode = next(iter(ball_episodes(1, seed=7, episodes=1)))
+    model = WorldModel(episode.schema, ModelConfig(frames="world"))
+    for transition in episode.transitions():
         model.learn_one(transition)
     assert "mode" in model.describe() and "v'_n" not in model.describe()
     with pytest.raises(ConfigError, match="frames must be one of"):

@@ -148,7 +148,7 @@ def test_the_report_says_so_in_a_sentence(lottery: WorldModel) -> None:
     assert f"outcome   {Outcome.UNEXPLAINED.value}" in lottery.explain(draws(1)[0].before)
 
 
-def test_whoever_is_only_taught_is_not_judged(tmp_path: Path) -> None:
+def test_whoever_is_only_taught_is_not_evaluated(tmp_path: Path) -> None:
     model = learned(SCHEMA, draws(300))
     assert not model.property_model("self", "x").unexplained
     assert model.advice() == ()
@@ -156,7 +156,7 @@ def test_whoever_is_only_taught_is_not_judged(tmp_path: Path) -> None:
     assert "hindsight" not in json.loads((tmp_path / "taught.json").read_bytes())["body"]
 
 
-def test_what_was_learned_is_the_same_whether_judged_or_not() -> None:
+def test_what_was_learned_is_the_same_whether_evaluated_or_not() -> None:
     steps = draws(120)
     assert watched(WorldModel(SCHEMA), steps).to_json(history=True) == _asked(steps).to_json(history=True)
 
@@ -220,7 +220,7 @@ def test_rounding_is_not_wrong() -> None:
     assert hindsight(model).to_json()["steps"] == [[1, 0], [1, 1]]
 
 
-def test_stopgaps_and_what_vanished_are_not_judged() -> None:
+def test_fallback_values_and_what_vanished_are_not_evaluated() -> None:
     model = learned(SCHEMA, pushes(60))
     scene = model.predict_one(pushes(1)[0].before).scene
     model.look_back(_saying(scene, Prediction("self", "x", 1.0, Outcome.OUTSIDE)), {("self", "x"): 5.0})

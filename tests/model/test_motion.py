@@ -11,8 +11,8 @@ from relgym.config import ModelConfig
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
 from relgym.envs.learned_model import LearnedModelEnv
 from relgym.errors import ConfigError
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import ball_blocks, truck_blocks
+from relgym.experiments.data import ball_episodes, truck_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.law_score import taught
 from relgym.experiments.law_trials import trial_rooms
 from relgym.experiments.law_worlds import Ball, Material, World
@@ -26,22 +26,22 @@ from relgym.scene.objects import Scene, Target
 VX, VY = Target("ball", "vx"), Target("ball", "vy")
 
 
-def train(blocks: list[Block], config: ModelConfig | None = None) -> WorldModel:
-    model = WorldModel(blocks[0].schema, config)
-    for block in blocks:
-        for each in block.transitions():
+def train(episodes: list[Episode], config: ModelConfig | None = None) -> WorldModel:
+    model = WorldModel(episodes[0].schema, config)
+    for episode in episodes:
+        for each in episode.transitions():
             model.learn_one(each)
     return model
 
 
 @pytest.fixture(scope="module")
 def model() -> WorldModel:
-    return train(list(ball_blocks(2, seed=0, blocks=10)))
+    return train(list(ball_episodes(2, seed=0, episodes=10)))
 
 
 @pytest.fixture(scope="module")
-def unseen() -> list[Block]:
-    return list(ball_blocks(2, seed=1, blocks=6, test=True))
+def unseen() -> list[Episode]:
+    return list(ball_episodes(2, seed=1, episodes=6, test=True))
 
 
 def test_laws_are_the_shorter_description_of_a_bouncing_ball(model: WorldModel) -> None:
@@ -51,25 +51,25 @@ def test_laws_are_the_shorter_description_of_a_bouncing_ball(model: WorldModel) 
     assert model.laws is not None
 
 
-def test_every_step_is_right_corners_included(model: WorldModel, unseen: list[Block]) -> None:
-    for block in unseen:
-        found = model.predict_batch(block.layout, block.vectors[:-1])
+def test_every_step_is_right_corners_included(model: WorldModel, unseen: list[Episode]) -> None:
+    for episode in unseen:
+        found = model.predict_batch(episode.layout, episode.vectors[:-1])
         assert found.ok.all()
         assert found.frames == ("contact", "contact")
-        assert np.abs(found.vectors - block.vectors[1:]).max() < 1e-12
+        assert np.abs(found.vectors - episode.vectors[1:]).max() < 1e-12
     assert largest_errors(model, unseen).max() < 1e-9
 
 
-def test_one_by_one_as_in_a_batch(model: WorldModel, unseen: list[Block]) -> None:
-    block = unseen[0]
-    batch = model.predict_batch(block.layout, block.vectors[:-1])
-    for k in range(len(block)):
-        single = model.predict_one(block.scene(k))
+def test_one_by_one_as_in_a_batch(model: WorldModel, unseen: list[Episode]) -> None:
+    episode = unseen[0]
+    batch = model.predict_batch(episode.layout, episode.vectors[:-1])
+    for k in range(len(episode)):
+        single = model.predict_one(episode.scene(k))
         assert single.scene.vector.tobytes() == batch.vectors[k].tobytes()
         assert [p.mode for p in single.parts] == batch.modes[k].tolist()
 
 
-def test_predictions_name_the_frame_and_what_is_touched(model: WorldModel, unseen: list[Block]) -> None:
+def test_predictions_name_the_frame_and_what_is_touched(model: WorldModel, unseen: list[Episode]) -> None:
     parts = [model.predict_one(unseen[0].scene(k))["ball", "vx"] for k in range(200)]
     free = next(p for p in parts if p.mode == FREE)
     touching = next(p for p in parts if p.mode == TOUCHING)
@@ -79,8 +79,8 @@ def test_predictions_name_the_frame_and_what_is_touched(model: WorldModel, unsee
 
 
 def test_modes_alone_when_asked_for() -> None:
-    blocks = list(ball_blocks(1, seed=0, blocks=2))
-    model = train(blocks, ModelConfig(frames="world"))
+    episodes = list(ball_episodes(1, seed=0, episodes=2))
+    model = train(episodes, ModelConfig(frames="world"))
     assert (model.laws, model.governed) == (None, frozenset())
     assert ModelConfig.thesis().frames == ModelConfig.original().frames == "world"
     with pytest.raises(ConfigError, match="frames must be one of"):
@@ -88,34 +88,34 @@ def test_modes_alone_when_asked_for() -> None:
 
 
 def test_without_contacts_nothing_changes() -> None:
-    blocks = list(truck_blocks("step", seed=0, repeats=1))[:8]
-    by_default, along_axes = (train(blocks, ModelConfig(frames=f)) for f in ("auto", "world"))  # type: ignore[arg-type]
+    episodes = list(truck_episodes("step", seed=0, repeats=1))[:8]
+    by_default, along_axes = (train(episodes, ModelConfig(frames=f)) for f in ("auto", "world"))  # type: ignore[arg-type]
     assert by_default.governed == frozenset()
     assert by_default.to_json()["targets"] == along_axes.to_json()["targets"]
 
 
 def test_modes_rest_while_laws_suffice(model: WorldModel) -> None:
-    block = next(iter(ball_blocks(2, seed=9, blocks=1)))
+    episode = next(iter(ball_episodes(2, seed=9, episodes=1)))
     before = model.property_model("ball", "vx").clusterer.y.size
-    reports = [model.learn_one(each) for each in list(block.transitions())[:5]]
+    reports = [model.learn_one(each) for each in list(episode.transitions())[:5]]
     assert [r.parts for r in reports] == [{}] * 5
     assert model.property_model("ball", "vx").clusterer.y.size == before
 
 
 def test_laws_that_fail_wake_the_modes() -> None:
-    model = train(list(ball_blocks(1, seed=0, blocks=6)))
-    assert not model.learn_one(next(next(ball_blocks(1, seed=3, blocks=1)).transitions())).parts
-    strange = next(iter(ball_blocks(1, seed=4, blocks=1)))
+    model = train(list(ball_episodes(1, seed=0, episodes=6)))
+    assert not model.learn_one(next(next(ball_episodes(1, seed=3, episodes=1)).transitions())).parts
+    strange = next(iter(ball_episodes(1, seed=4, episodes=1)))
     vectors = strange.vectors.copy()
     column = strange.layout.column(strange.layout.index("ball"), "vx")
     vectors[1:, column] += 0.01 * np.arange(1, len(vectors))  # a wind that never blew before
-    odd = Block(strange.schema, strange.layout, vectors, strange.truth, strange.configuration)
+    odd = Episode(strange.schema, strange.layout, vectors, strange.truth, strange.configuration)
     reports = [model.learn_one(each) for each in list(odd.transitions())[:30]]
     assert any(("ball", "vx") in r.parts for r in reports[1:])
 
 
-def test_a_world_the_laws_never_met_is_not_guessed(unseen: list[Block]) -> None:
-    model = train(list(ball_blocks(1, seed=0, blocks=4)))
+def test_a_world_the_laws_never_met_is_not_guessed(unseen: list[Episode]) -> None:
+    model = train(list(ball_episodes(1, seed=0, episodes=4)))
     assert model.laws is not None
     assert model.laws.pair is not None
     env = BallBoxRampEnv(balls=2)
@@ -128,23 +128,23 @@ def test_a_world_the_laws_never_met_is_not_guessed(unseen: list[Block]) -> None:
 
 
 @pytest.mark.parametrize("history", [False, True])
-def test_files_keep_the_laws(model: WorldModel, unseen: list[Block], history: bool, tmp_path: Path) -> None:
+def test_files_keep_the_laws(model: WorldModel, unseen: list[Episode], history: bool, tmp_path: Path) -> None:
     model.save(tmp_path / "one", history=history)
     again = WorldModel.load(tmp_path / "one")
-    block = unseen[0]
-    ours, theirs = (m.predict_batch(block.layout, block.vectors[:-1]) for m in (model, again))
+    episode = unseen[0]
+    ours, theirs = (m.predict_batch(episode.layout, episode.vectors[:-1]) for m in (model, again))
     assert ours.vectors.tobytes() == theirs.vectors.tobytes()
     again.save(tmp_path / "two", history=history)
     assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
 def test_learning_goes_on_as_if_never_saved(tmp_path: Path) -> None:
-    blocks = list(ball_blocks(2, seed=2, blocks=3))
-    whole = train(blocks)
-    train(blocks[:1]).save(tmp_path / "part", history=True)
+    episodes = list(ball_episodes(2, seed=2, episodes=3))
+    whole = train(episodes)
+    train(episodes[:1]).save(tmp_path / "part", history=True)
     again = WorldModel.load(tmp_path / "part")
-    for block in blocks[1:]:
-        for each in block.transitions():
+    for episode in episodes[1:]:
+        for each in episode.transitions():
             again.learn_one(each)
     again.save(tmp_path / "again", history=True)
     whole.save(tmp_path / "whole", history=True)
@@ -165,18 +165,18 @@ def test_description(model: WorldModel) -> None:
         model.describe(frame="own")
 
 
-def test_explanations(model: WorldModel, unseen: list[Block]) -> None:
-    block = unseen[0]
-    modes = model.predict_batch(block.layout, block.vectors[:-1]).modes[:, 0]
+def test_explanations(model: WorldModel, unseen: list[Episode]) -> None:
+    episode = unseen[0]
+    modes = model.predict_batch(episode.layout, episode.vectors[:-1]).modes[:, 0]
     free, touching = (int(np.flatnonzero(modes == m)[0]) for m in (FREE, TOUCHING))
-    assert "since it touches nothing" in model.explain(block.scene(free))
-    text = model.explain(block.scene(touching))
+    assert "since it touches nothing" in model.explain(episode.scene(free))
+    text = model.explain(episode.scene(touching))
     assert "ball touches" in text
     assert "v'_n = max(u_n, -0.95 v_n)" in text
 
 
-def test_a_spinning_ball_is_foretold_told_and_kept(tmp_path: Path) -> None:
-    world = World(2, (Ball(spins=True),), materials={"block": Material(0.9, 0.2)})
+def test_a_spinning_ball_is_predicted_told_and_kept(tmp_path: Path) -> None:
+    world = World(2, (Ball(spins=True),), materials={"episode": Material(0.9, 0.2)})
     model = taught(trial_rooms(world, 5, seed=1))
     room = trial_rooms(world, 1, seed=2)[0]
     batch = model.predict_batch(room.layout, room.vectors[:-1])

@@ -1,4 +1,4 @@
-"""A model speaks of scenes with other objects of the types it knows, and stays silent where it knows nothing."""
+"""A model speaks of scenes with other objects of the types it knows, and abstains where it knows nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from relgym.errors import ObservationError
-from relgym.experiments.data import truck_blocks
+from relgym.experiments.data import truck_episodes
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene
@@ -20,9 +20,9 @@ def model() -> WorldModel:
     """Truck-push with two and with three boxes."""
     known: WorldModel | None = None
     for n_boxes in (2, 3):
-        for block in truck_blocks("step", seed=5, n_boxes=n_boxes):
-            known = known or WorldModel(block.schema)
-            for transition in block.transitions():
+        for episode in truck_episodes("step", seed=5, n_boxes=n_boxes):
+            known = known or WorldModel(episode.schema)
+            for transition in episode.transitions():
                 known.learn_one(transition)
     assert known is not None
     known.finish()
@@ -31,23 +31,23 @@ def model() -> WorldModel:
 
 @pytest.mark.parametrize("n_boxes", [2, 3])
 def test_one_model_holds_for_either_number_of_boxes(model: WorldModel, n_boxes: int) -> None:
-    for block in truck_blocks("step", seed=6, n_boxes=n_boxes, repeats=1, test=True):
-        predicted = model.predict_batch(block.layout, block.vectors[:-1])
+    for episode in truck_episodes("step", seed=6, n_boxes=n_boxes, repeats=1, test=True):
+        predicted = model.predict_batch(episode.layout, episode.vectors[:-1])
         assert predicted.ok.all()
-        column = block.layout.column(block.layout.index("truck"), "vx")
-        assert np.abs(predicted.vectors[:, column] - block.vectors[1:, column]).max() < 1e-9
+        column = episode.layout.column(episode.layout.index("truck"), "vx")
+        assert np.abs(predicted.vectors[:, column] - episode.vectors[1:, column]).max() < 1e-9
 
 
 def test_layouts_that_were_never_seen_are_called_so(model: WorldModel) -> None:
-    block = next(iter(truck_blocks("step", seed=6, n_boxes=4, repeats=1, test=True)))
-    predicted = model.predict_batch(block.layout, block.vectors[:-1])
+    episode = next(iter(truck_episodes("step", seed=6, n_boxes=4, repeats=1, test=True)))
+    predicted = model.predict_batch(episode.layout, episode.vectors[:-1])
     outcomes = {OUTCOMES[k] for k in np.unique(predicted.outcomes)}
     assert not predicted.ok.any()
     assert outcomes == {Outcome.OUTSIDE, Outcome.DEPENDS}
-    single = model.predict_one(block.scene(0))
+    single = model.predict_one(episode.scene(0))
     assert single["truck", "vx"].outcome is Outcome.OUTSIDE
     assert single["box1", "px"].outcome is Outcome.DEPENDS
-    assert single.scene.schema is block.schema
+    assert single.scene.schema is episode.schema
 
 
 def altered(scene: Scene, change: dict[str, object], name: str) -> SceneSchema:
@@ -56,7 +56,7 @@ def altered(scene: Scene, change: dict[str, object], name: str) -> SceneSchema:
 
 
 def test_types_that_differ_are_refused(model: WorldModel) -> None:
-    scene = next(iter(truck_blocks("step", seed=6, n_boxes=2))).scene(0)
+    scene = next(iter(truck_episodes("step", seed=6, n_boxes=2))).scene(0)
     before = model.to_json(history=True)
     more = altered(scene, {"properties": (*scene.schema.type("box").properties, "colour")}, "box")
     values = {k: np.append(v, 0.0) if k.startswith("box") else v for k, v in scene.values().items()}

@@ -10,7 +10,7 @@ from worlds import LINE_TARGETS, learned, line, room, scene, schema_of, transiti
 from relgym.clustering.mode import NOISE
 from relgym.config import ModelConfig
 from relgym.errors import QueryError
-from relgym.experiments.data import truck_blocks
+from relgym.experiments.data import truck_episodes
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.property_model import bodies_of
 from relgym.model.world_model import WorldModel
@@ -80,35 +80,37 @@ def test_open_roles_give_the_same_bits_one_by_one_and_in_a_batch() -> None:
 
 
 def test_situations_never_seen_are_outside_experience() -> None:
-    # A quarter of the thesis' truck blocks: not every way to stack three boxes was shown.
-    blocks = list(truck_blocks(redraw="step", seed=0))
-    careful, bold = (WorldModel(blocks[0].schema, ModelConfig(abstain=abstain)) for abstain in (True, False))
-    for block in blocks[:12]:
-        for each in block.transitions():
+    # A quarter of the thesis' truck episodes: not every way to stack three boxes was shown.
+    episodes = list(truck_episodes(resample="step", seed=0))
+    careful, bold = (
+        WorldModel(episodes[0].schema, ModelConfig(abstain=abstain)) for abstain in (True, False)
+    )
+    for episode in episodes[:12]:
+        for each in episode.transitions():
             careful.learn_one(each)
             bold.learn_one(each)
     outcomes = []
-    for block in blocks[12:]:
-        one, other = (model.predict_one(block.scene(0))["truck", "vx"] for model in (careful, bold))
+    for episode in episodes[12:]:
+        one, other = (model.predict_one(episode.scene(0))["truck", "vx"] for model in (careful, bold))
         outcomes.append(one.outcome)
         assert other.outcome is Outcome.PREDICTED
         # Outside experience nothing is claimed, but the value is what the vote's winner says, if its roles aren't open.
-        assert one == other or (one.mode == 0 and one.value in {other.value, block.scene(0)["truck"]["vx"]})
-        batch = careful.predict_batch(block.layout, block.scene(0).vector[None])
-        assert batch.vectors[0].tobytes() == careful.predict_one(block.scene(0)).scene.vector.tobytes()
+        assert one == other or (one.mode == 0 and one.value in {other.value, episode.scene(0)["truck"]["vx"]})
+        batch = careful.predict_batch(episode.layout, episode.scene(0).vector[None])
+        assert batch.vectors[0].tobytes() == careful.predict_one(episode.scene(0)).scene.vector.tobytes()
     assert set(outcomes) == {Outcome.PREDICTED, Outcome.OUTSIDE}
 
 
-def test_rare_events_are_not_foretold_where_they_are_unlikely() -> None:
+def test_rare_events_are_not_predicted_where_they_are_unlikely() -> None:
     # Among few remembered examples there are corners in which by chance only the rare event lies.
     steps = touches(2000, np.random.default_rng(1))
     model = WorldModel(GROUND)
-    foretold = 0
+    predicted = 0
     for each in steps:
-        foretold += model.predict_one(each.before).scene["self"]["touch"] > 0.5
+        predicted += model.predict_one(each.before).scene["self"]["touch"] > 0.5
         model.learn_one(each)
     assert points.formulas(model, "touch") == ["touch' = 0", "touch' = 1"]
-    assert foretold == 0
+    assert predicted == 0
 
 
 def test_roles_name_the_objects_that_play_them(room_model: WorldModel) -> None:

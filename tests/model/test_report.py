@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from relgym.config import ModelConfig
-from relgym.experiments.data import truck_blocks
+from relgym.experiments.data import truck_episodes
 from relgym.model.explain import explanations
 from relgym.model.report import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport, report
 from relgym.model.world_model import WorldModel
@@ -32,14 +32,14 @@ def halving(steps: int = 12) -> WorldModel:
 
 @pytest.fixture(scope="module")
 def truck() -> tuple[WorldModel, Scene]:
-    """The truck's model after all 48 blocks, and a scene with a stack of two and a single box."""
+    """The truck's model after all 48 episodes, and a scene with a stack of two and a single box."""
     model, scene = None, None
-    for block in truck_blocks(seed=0):
-        model = model or WorldModel(block.schema)
-        for transition in block.transitions():
+    for episode in truck_episodes(seed=0):
+        model = model or WorldModel(episode.schema)
+        for transition in episode.transitions():
             model.learn_one(transition)
-        if block.configuration["layout"] == 2:
-            scene = block.scene(7)
+        if episode.configuration["layout"] == 2:
+            scene = episode.scene(7)
     assert model is not None and scene is not None
     model.finish()
     return model, scene
@@ -74,7 +74,7 @@ def test_one_mode_word_for_word() -> None:
     )
 
 
-def test_the_only_mode_has_no_rival() -> None:
+def test_the_only_mode_has_no_runner_up() -> None:
     assert halving().explain(SCHEMA.scene({"b": [3.0]})) == (
         "b.v: 3 -> 1.5\n"
         "  mode      1: v' = 0.5 v  (12 training examples)\n"
@@ -155,7 +155,7 @@ def test_truck_clauses_are_perfect_as_in_table_3_2(truck: tuple[WorldModel, Scen
         *clauses, otherwise = pair.rows
         # Not exact: a classifier remembers a sample of its examples, each with a weight.
         assert sum(row.correct for row in clauses) == pytest.approx(counts[pair.mode], rel=0.01)
-        assert otherwise.correct == pytest.approx(counts[pair.rival], rel=0.01)
+        assert otherwise.correct == pytest.approx(counts[pair.other], rel=0.01)
 
 
 def test_truck_roles_as_in_figure_3_8(truck: tuple[WorldModel, Scene]) -> None:
@@ -181,7 +181,7 @@ def test_explanation_names_the_objects_that_play_the_roles(truck: tuple[WorldMod
 
 def test_clauses_of_an_explanation_hold_for_the_objects_it_names(truck: tuple[WorldModel, Scene]) -> None:
     model, _ = truck
-    scenes = [block.scene(7) for block in islice(truck_blocks(seed=1), 12)]
+    scenes = [episode.scene(7) for episode in islice(truck_episodes(seed=1), 12)]
     reasons = [(s, r) for s in scenes for e in explanations(model, s) for r in e.reasons if r.clause]
     assert reasons, "in some layout at least one pair must be decided by a clause"
     for scene, reason in reasons:
@@ -195,8 +195,8 @@ def test_clauses_of_an_explanation_hold_for_the_objects_it_names(truck: tuple[Wo
 
 def test_open_roles_have_no_value_until_they_are_filled(truck: tuple[WorldModel, Scene]) -> None:
     model, scene = truck
-    rivals = [r for r in explanations(model, scene)[0].reasons if math.isnan(r.rival_value)]
-    assert rivals
+    runners_up = [r for r in explanations(model, scene)[0].reasons if math.isnan(r.runner_up_value)]
+    assert runners_up
     assert "roles would have to be filled" in model.explain(scene)
 
 

@@ -187,7 +187,7 @@ def fingerprint(model: WorldModel) -> str:
     return hashlib.sha256(json.dumps(model.to_json(history=True), sort_keys=True).encode()).hexdigest()
 
 
-def test_r5_the_model_after_a_block_doesnt_know_what_follows(room_steps: list[RawStep]) -> None:
+def test_r5_the_model_after_an_episode_doesnt_know_what_follows(room_steps: list[RawStep]) -> None:
     schema = schema_of(room_steps, ROOM_TARGETS)
     short, long = WorldModel(schema), WorldModel(schema)
     at = {}
@@ -203,14 +203,14 @@ def test_r5_the_model_after_a_block_doesnt_know_what_follows(room_steps: list[Ra
 
 def test_r5_asking_teaches_nothing(room_steps: list[RawStep]) -> None:
     schema = schema_of(room_steps, ROOM_TARGETS)
-    silent, asked = WorldModel(schema), WorldModel(schema)
+    abstained, asked = WorldModel(schema), WorldModel(schema)
     for each in transitions(schema, room_steps[:150]):
-        silent.learn_one(each)
+        abstained.learn_one(each)
         asked.predict_one(each.before)
         asked.learn_one(each)
         asked.predict_one(each.after)
         asked.predict_batch(each.after.layout, each.after.vector[None])
-    assert fingerprint(asked) == fingerprint(silent)
+    assert fingerprint(asked) == fingerprint(abstained)
 
 
 def test_r5_the_same_seed_gives_the_same_bytes_whatever_the_hash_seed(room_steps: list[RawStep]) -> None:

@@ -1,4 +1,4 @@
-"""How far modes go: where they speak, and the changes that an approximation may foretell."""
+"""How far modes go: where they speak, and the changes that an approximation may predict."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def lander(n: int, seed: int = 0, *, steepest: float = 1.5) -> list[Transition]:
     In what was thrown there is a law of its own, half of it noise.
     """
     rng = np.random.default_rng(seed)
-    kicks = rng.normal(size=n).tolist()
+    jolts = rng.normal(size=n).tolist()
 
     def moved(s: np.ndarray, u: np.ndarray) -> list[float]:
         if s[2]:
-            return [s[0], 2.0 * s[0] + kicks.pop(), s[2]]
+            return [s[0], 2.0 * s[0] + jolts.pop(), s[2]]
         return [s[0], s[1] + 0.5 * np.tanh(1.5 * s[0]) + 0.1 * u[0], s[2]]
 
     leg = (rng.random(n) < 0.095).astype(float)
@@ -136,20 +136,20 @@ def test_a_law_has_no_bounds() -> None:
     assert model.predict_one(far)["self", "v"].value == pytest.approx(1e6 + 1.0)
 
 
-def test_a_rare_end_is_not_foretold_as_the_others() -> None:
+def test_a_rare_end_is_not_predicted_as_the_others() -> None:
     model = learned(ROOM, strolls())
     assert len(model.modes("task", "reward")) == 1
     (beyond,) = model.property_model("task", "reward").scope.beyond()
     assert beyond.startswith("self.x") and " <= -" in beyond
 
-    def foretold(x: float) -> tuple[Outcome, float]:
+    def predicted(x: float) -> tuple[Outcome, float]:
         scene = ROOM.scene({"self": [x], "action": [0.0], "task": [0.0, 0.0]})
         one = model.predict_one(scene)["task", "reward"]
         return one.outcome, round(one.value, 6)
 
-    assert foretold(1.2) == (Outcome.PREDICTED, 1.0)
-    assert foretold(0.0) == (Outcome.PREDICTED, -0.01)
-    assert foretold(-1.2)[0] is Outcome.UNEXPLAINED
+    assert predicted(1.2) == (Outcome.PREDICTED, 1.0)
+    assert predicted(0.0) == (Outcome.PREDICTED, -0.01)
+    assert predicted(-1.2)[0] is Outcome.UNEXPLAINED
     text = model.explain(ROOM.scene({"self": [-1.2], "action": [0.0], "task": [0.0, 0.0]}))
     assert f"  because   no mode speaks where {beyond}" in text
 
@@ -163,11 +163,11 @@ def test_who_always_answers_has_no_scope() -> None:
 
 def test_what_lies_scattered_has_no_place() -> None:
     rng = np.random.default_rng(0)
-    kicked = (rng.random(600) < 0.08).tolist()
+    jolted = (rng.random(600) < 0.08).tolist()
 
     def moved(s: np.ndarray, u: np.ndarray) -> list[float]:
-        kick = 3.0 * rng.normal() if kicked.pop() else 0.0
-        return [s[0], s[1] + 0.5 * np.tanh(1.5 * s[0]) + kick, s[2]]
+        jolt = 3.0 * rng.normal() if jolted.pop() else 0.0
+        return [s[0], s[1] + 0.5 * np.tanh(1.5 * s[0]) + jolt, s[2]]
 
     starts = np.column_stack([rng.uniform(-1.5, 1.5, 600), rng.normal(size=600), rng.integers(2, size=600)])
     model = learned(

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from worlds import ROOM_TARGETS, RawStep, learned, line, room, scene, schema_of, transitions
 
 from relgym.errors import ModelFileError
-from relgym.experiments.data import ball_blocks
+from relgym.experiments.data import ball_episodes
 from relgym.model.storage import read_model, schema_from_json, schema_to_json, write_model
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Kinematics, ObjectType, Target
@@ -100,10 +100,10 @@ def test_learning_goes_on_as_if_never_saved(cut: int, room_steps: list[RawStep],
 
 def test_learning_goes_on_in_the_balls_room(tmp_path: Path) -> None:
     # Modes that explain one another's examples by chance, rest apart from bouncing, thresholds in clauses.
-    blocks = list(ball_blocks(1, seed=0, blocks=4))
-    whole, model = WorldModel(blocks[0].schema), WorldModel(blocks[0].schema)
-    for block in blocks:
-        for each in block.transitions():
+    episodes = list(ball_episodes(1, seed=0, episodes=4))
+    whole, model = WorldModel(episodes[0].schema), WorldModel(episodes[0].schema)
+    for episode in episodes:
+        for each in episode.transitions():
             whole.learn_one(each)
             model.learn_one(each)
         model.save(tmp_path / "half", history=True)

@@ -24,8 +24,8 @@ from worlds import (
 )
 
 from relgym.config import ClassificationConfig, ModelConfig
-from relgym.experiments.blocks import Block
-from relgym.experiments.data import ball_blocks, truck_blocks
+from relgym.experiments.data import ball_episodes, truck_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import evaluate
 from relgym.experiments.truck_check import check_truck
 from relgym.model.world_model import WorldModel
@@ -186,10 +186,10 @@ def test_a_sphere_among_rotated_boxes() -> None:
 
 
 # ---------------------------------------------------------------------- chapter III's truck, chapter IV's ball
-def train(blocks: Sequence[Block]) -> WorldModel:
-    model = WorldModel(blocks[0].schema, ModelConfig(frames="world"))
-    for block in blocks:
-        for each in block.transitions():
+def train(episodes: Sequence[Episode]) -> WorldModel:
+    model = WorldModel(episodes[0].schema, ModelConfig(frames="world"))
+    for episode in episodes:
+        for each in episode.transitions():
             model.learn_one(each)
     model.finish()
     return model
@@ -198,17 +198,17 @@ def train(blocks: Sequence[Block]) -> WorldModel:
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 5))]
 
 
-@pytest.mark.parametrize("redraw", ["step", "block"])
+@pytest.mark.parametrize("resample", ["step", "episode"])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_truck_push_is_table_3_1(redraw: str, seed: int) -> None:
-    model = train(list(truck_blocks(redraw=redraw, seed=seed)))  # type: ignore[arg-type]
+def test_truck_push_is_table_3_1(resample: str, seed: int) -> None:
+    model = train(list(truck_episodes(resample=resample, seed=seed)))  # type: ignore[arg-type]
     assert sorted(m.examples for m in model.modes("truck", "vx")) == [480, 480, 960]
-    check = check_truck(model, truck_blocks(redraw=redraw, seed=1000 + seed), every=8)  # type: ignore[arg-type]
+    check = check_truck(model, truck_episodes(resample=resample, seed=1000 + seed), every=8)  # type: ignore[arg-type]
     assert check.perfect, str(check)
 
 
-def test_sixteen_blocks_of_the_first_experiment() -> None:
-    model = train(list(ball_blocks(1, seed=0, blocks=16)))
+def test_sixteen_episodes_of_the_first_experiment() -> None:
+    model = train(list(ball_episodes(1, seed=0, episodes=16)))
     assert formulas(model, Target("ball", "vx"), 4) == [
         "vx' = -0.9 vx",
         "vx' = 0.525 vx - 0.8227 vy + 0.0004244",
@@ -220,15 +220,15 @@ def test_sixteen_blocks_of_the_first_experiment() -> None:
         "vy' = 0",
         "vy' = vy - 0.00098",
     ]
-    result = evaluate(model, ball_blocks(1, seed=1000, blocks=40, test=True))
+    result = evaluate(model, ball_episodes(1, seed=1000, episodes=40, test=True))
     for target in result.targets:
         assert target.total.rate <= 0.005
 
 
 @pytest.mark.slow
 def test_the_first_experiment() -> None:
-    model = train(list(ball_blocks(1, seed=0)))
-    for target in evaluate(model, ball_blocks(1, seed=1000, test=True)).targets:
+    model = train(list(ball_episodes(1, seed=0)))
+    for target in evaluate(model, ball_episodes(1, seed=1000, test=True)).targets:
         # Issue "Chapter III whole", row 1.
         assert target.total.rate <= 0.0005
 

@@ -53,12 +53,12 @@ class CartEnv(gym.Env[Any, Any]):
         return {"cart": np.array([self.v])} if self.says is None else self.says
 
 
-def run(env: gym.Env[Any, Any], steps: int, *, seed: int = 0, block: int = 25) -> list[Any]:
-    """Random actions, a new episode every `block` steps; all that the env returned but its infos."""
+def run(env: gym.Env[Any, Any], steps: int, *, seed: int = 0, episode: int = 25) -> list[Any]:
+    """Random actions, a new episode every `episode` steps; all that the env returned but its infos."""
     seen: list[Any] = []
     env.action_space.seed(seed)
     for k in range(steps):
-        if k % block == 0:
+        if k % episode == 0:
             seen.append(env.reset(seed=seed + k)[0])
         observation, reward, terminated, truncated, _ = env.step(env.action_space.sample())
         seen.append((observation, reward, terminated, truncated))

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from relgym.envs.tasks import Judgement
+from relgym.envs.tasks import TaskOutcome
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.scene.objects import Float2D, ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
@@ -31,9 +31,9 @@ SCHEMA = SceneSchema(
 class LineTask:
     """Reward -|x'| of the first cart; over when it is further than 5 from the origin."""
 
-    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         x = after[:, layout.column(layout.index("cart"), "x")]
-        return Judgement(-np.abs(x), np.abs(x) > 5.0, np.zeros(len(x), dtype=bool))
+        return TaskOutcome(-np.abs(x), np.abs(x) > 5.0, np.zeros(len(x), dtype=bool))
 
 
 class LineEnv(gym.Env[Any, Any]):
@@ -64,7 +64,7 @@ class LineEnv(gym.Env[Any, Any]):
         self.vector[0] += 2.0 * float(action[0])
         self.steps += 1
         layout = SCHEMA.layout(("cart", "other", "mark"))
-        said = self.task.judge(layout, before[None], action, self.vector[None])
+        said = self.task.evaluate(layout, before[None], action, self.vector[None])
         return self._observation(), float(said.rewards[0]), bool(said.terminated[0]), self.steps >= 8, {}
 
     def _observation(self) -> Any:
@@ -98,8 +98,8 @@ class LineModel:
         x, push = (layout.column(layout.index(n), p) for n, p in (("cart", "x"), ("action", "push")))
         after[:, x] += vectors[:, push] + self.off
         mute = np.abs(vectors[:, x]) > self.mute_from
-        spoken, silent = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.OUTSIDE)
-        outcomes = np.where(mute, silent, spoken).astype(np.int8)[:, None]
+        spoken, abstained = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.OUTSIDE)
+        outcomes = np.where(mute, abstained, spoken).astype(np.int8)[:, None]
         n = len(vectors)
         return BatchPrediction(
             layout, after, (("cart", "x"),), np.zeros((n, 1), dtype=np.int64), outcomes, np.zeros((n, 1))

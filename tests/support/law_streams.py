@@ -64,7 +64,7 @@ def taught(
 
 def errors(book: LawBook, streams: Iterable[Stream], tolerance: float = 1e-9) -> tuple[int, int, int]:
     """Transitions of movers that the laws have wrong, that they decline to predict, and all."""
-    wrong = silent = total = 0
+    wrong = abstained = total = 0
     for stream in streams:
         contacts, motion = moved(book, stream)
         cast = contacts.cast
@@ -74,9 +74,9 @@ def errors(book: LawBook, streams: Iterable[Stream], tolerance: float = 1e-9) ->
             count = len(book.components(cast.layout.types[cast.layout.bodies[body]].name))
             off = np.abs(motion.velocity[:count, :, body] - after[:count, body]).max(axis=0)
             wrong += int((known & ~(off <= tolerance)).sum())
-            silent += int((~known).sum())
+            abstained += int((~known).sum())
             total += len(known)
-    return wrong, silent, total
+    return wrong, abstained, total
 
 
 def formulas(book: LawBook, digits: int = 6) -> list[list[str]]:

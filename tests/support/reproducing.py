@@ -13,7 +13,7 @@ __all__ = ["SMALL", "reproduced"]
 
 SMALL = Protocol(
     batches=1,
-    test_blocks=3,
+    test_episodes=3,
     checkpoints={1: (1,), 2: (1,), 3: (1,)},
     transfer_batches=2,
     trials=2,

@@ -147,13 +147,13 @@ _LAYOUTS = (((0, 1, 2),), ((0, 1), (2,)), ((0,), (1, 2)), ((0,), (1,), (2,)))
 """Figure 3.1: stacks beside the truck from near to far, each from bottom to top."""
 
 
-def truck_stream(blocks: int, *, rng: np.random.Generator, bystanders: int = 0) -> Iterator[Labelled]:
-    """Ten examples per block: a truck pushes three boxes, in the layouts of Figure 3.1 and any order."""
-    for block in range(blocks):
-        stacks = _LAYOUTS[block % 4]
+def truck_stream(episodes: int, *, rng: np.random.Generator, bystanders: int = 0) -> Iterator[Labelled]:
+    """Ten examples per episode: a truck pushes three boxes, in the layouts of Figure 3.1 and any order."""
+    for episode in range(episodes):
+        stacks = _LAYOUTS[episode % 4]
         order = rng.permutation(3 + bystanders) + 1
         for step in range(10):
-            yield _truck(stacks, order, 10 * block + step, rng)
+            yield _truck(stacks, order, 10 * episode + step, rng)
 
 
 def _truck(

@@ -316,13 +316,13 @@ def test_what_would_follow_an_observation_and_an_action_can_be_asked() -> None:
     env = learned()
     observation, _ = env.reset(seed=3)
     action = env.action_space.sample()
-    told = env.foretell(observation, action)
+    told = env.predict(observation, action)
     assert told.ok
     following, *_ = env.step(action)
     said = env.view.observation(told.scene)
     np.testing.assert_allclose(np.concatenate(list(said.values())), np.concatenate(list(following.values())))
     with pytest.raises(
-        ObservationError, match=r"expected a Scene, got ndarray.*foretell\(observation, action\)"
+        ObservationError, match=r"expected a Scene, got ndarray.*predict\(observation, action\)"
     ):
         env.model.predict_one(np.zeros(3))
 

@@ -118,7 +118,7 @@ def test_modes_that_nobody_can_choose_between_are_called_unexplained(name: str) 
     assert (
         "advice: unexplained; its modes cover the examples, but nothing tells which" in env.model.describe()
     )
-    said, wrong = _foretold(env, 100)
+    said, wrong = _predicted(env, 100)
     assert wrong > 15
     assert Outcome.PREDICTED not in {p.outcome for p in said if p.property == part.target.property}
 
@@ -133,7 +133,7 @@ def test_what_is_explained_is_not_called_unexplained(name: str, targets: tuple[s
         assert not env.model.property_model(*target.split(".")).unexplained
 
 
-def _foretold(env: ModelLearner, steps: int) -> tuple[list[Prediction], int]:
+def _predicted(env: ModelLearner, steps: int) -> tuple[list[Prediction], int]:
     """What is said of further steps, and of how many of them something was wrong by the values alone."""
     said, wrong = list[Prediction](), 0
     env.reset(seed=1)

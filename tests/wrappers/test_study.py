@@ -31,7 +31,7 @@ class Lottery(gym.Env[Any, Any]):
         return self.np_random.choice([0.0, 3.0, 7.0], 1), 0.0, False, False, {}
 
 
-def judged(model: WorldModel) -> dict[str, Any]:
+def evaluated(model: WorldModel) -> dict[str, Any]:
     return {str(t): model.property_model(t.type, t.property).hindsight.to_json() for t in model.targets}
 
 
@@ -42,7 +42,7 @@ def watched() -> ModelLearner:
     return env
 
 
-def test_a_learner_judges_itself(watched: ModelLearner) -> None:
+def test_a_learner_evaluates_itself(watched: ModelLearner) -> None:
     part = watched.model.property_model("self", "x")
     assert part.hindsight.spoken > 80
     assert part.unexplained
@@ -59,27 +59,27 @@ def test_the_same_seed_gives_the_same_file_and_a_file_goes_on(watched: ModelLear
     assert (tmp_path / "one").read_bytes() == (tmp_path / "other").read_bytes()
     again = ModelLearner(Lottery(), model=tmp_path / "one")
     again.reset(seed=1)
-    assert judged(again.model) == judged(watched.model)
+    assert evaluated(again.model) == evaluated(watched.model)
     assert again.model.property_model("self", "x").unexplained
 
 
-def test_who_does_not_learn_is_not_judged() -> None:
+def test_who_does_not_learn_is_not_evaluated() -> None:
     env = ModelLearner(Lottery())
     run(env, 60)
-    before = judged(env.model)
+    before = evaluated(env.model)
     env.pause()
     run(env, 30)
-    assert judged(env.model) == before
+    assert evaluated(env.model) == before
     assert env.prequential.steps == 90
 
 
-def test_who_does_not_predict_is_not_judged() -> None:
+def test_who_does_not_predict_is_not_evaluated() -> None:
     env = ModelLearner(Lottery(), predict=False)
     run(env, 60)
-    assert judged(env.model)["self.x"]["steps"] == []
+    assert evaluated(env.model)["self.x"]["steps"] == []
 
 
-def test_many_envs_judge_each_prediction() -> None:
+def test_many_envs_evaluate_each_prediction() -> None:
     envs = VectorModelLearner(gym.vector.SyncVectorEnv([Lottery, Lottery]))
     envs.reset(seed=0)
     for _ in range(60):

@@ -1,4 +1,4 @@
-"""The tasks' worlds are learned exactly, and dreams of them are judged as the worlds are."""
+"""The tasks' worlds are learned exactly, and dreams of them are evaluated as the worlds are."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from relgym.wrappers.flat import FlatView
 from relgym.wrappers.model_learner import ModelLearner
 
 
-def test_a_dream_of_pushing_is_judged_as_the_world() -> None:
+def test_a_dream_of_pushing_is_evaluated_as_the_world() -> None:
     rng = np.random.default_rng(0)
     env = gym.make("relgym/TruckPush-v0", task="push")
     learner = ModelLearner(env, predict=False)

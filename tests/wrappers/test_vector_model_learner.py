@@ -159,10 +159,10 @@ def test_what_is_no_vector_env_is_refused() -> None:
         VectorModelLearner(Slider())  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match=r"VectorModelLearner\(env\) learns one model from all"):
         ModelLearner(sliders(AutoresetMode.NEXT_STEP))
-    silent = sliders(AutoresetMode.NEXT_STEP)
-    silent.metadata = {}
+    abstained = sliders(AutoresetMode.NEXT_STEP)
+    abstained.metadata = {}
     with pytest.raises(ConfigError, match=r"expected metadata\['autoreset_mode'\].*got None"):
-        VectorModelLearner(silent)
+        VectorModelLearner(abstained)
 
 
 def test_the_last_observation_of_an_episode_may_be_bad_too() -> None:

@@ -35,7 +35,7 @@ def acting_all(
     if done.shape[1] != (known := len(schema.type_of(ACTION).properties)):
         raise ConfigError(
             f"expected {known} numbers for each action, as the action object has, got {done.shape[1]}: what a view "
-            "makes of them Lens(env).acting says, acting= of a LearnedTask"
+            "makes of them Lens(env).acting says, acting= of a LearnedRewardModel"
         )
     at = whole.offsets[whole.index(ACTION)]
     return whole, np.concatenate([vectors[:, :at], done, vectors[:, at:]], axis=1)

@@ -34,34 +34,34 @@ class DynaConfig:
         How many imagined transitions are kept, the latest. Small enough that those of old policies and
         models are soon forgotten.
     updates, updates_alone
-        Gradient steps per real step while the model is trusted, and while it isn't; the latter none: as many as
+        Gradient steps per real step while the model is accepted, and while it isn't; the latter none: as many as
         the algorithm was made for.
-    burst
-        Gradient steps at once, in fresh dreams all the while, the first time that the model is trusted and the
-        algorithm's random steps are over, and again whenever a learned judge has come to know of another reward or end
-        (`LearnedTask.verdicts`); 0: none. A model of few objects is often exact long before real steps at
+    catch_up
+        Gradient steps at once, in fresh dreams all the while, the first time that the model is accepted and the
+        algorithm's random steps are over, and again whenever a learned reward model has come to know of another reward or end
+        (`LearnedRewardModel.verdicts`); 0: none. A model of few objects is often exact long before real steps at
         `updates` each have trained a policy: raising it trades computing for real steps. Should hold `updates` *
         `every`, a round of dreams, many times.
     permute
         Whether dreams exchange the roles of objects of one type. The model licenses that, a net doesn't.
-    redraw
-        Whether dreams redraw properties of bodiless objects that no law but their own mentions, between the
+    resample
+        Whether dreams resample properties of bodiless objects that no law but their own mentions, between the
         smallest and the largest value seen at the start of episodes. The model licenses that too; where nothing has a
-        body, nothing is redrawn.
-    kick
-        Share of the dreams in which moving bodies begin with velocities redrawn, up to twice as fast as they were ever
+        body, nothing is resampled.
+    perturb_velocity
+        Share of the dreams in which moving bodies begin with velocities resampled, up to twice as fast as they were ever
         seen. So dreams get where no real step has led yet: exploring starts (Sutton & Barto 2018, §5.3), which the
         world doesn't offer and a model does. Helps where a goal lies behind what only a fast body gets over.
     shuffle
         The model learns transitions in random order, out of a stock of so many. What stays the same
         throughout an episode would otherwise pass for a law; 0: as they come.
-    open_at, shut_at
-        The model is trusted when its prequential error falls to `open_at`, until it rises to `shut_at`
-        (`TrustGate`).
+    accept_at, reject_at
+        The model is accepted when its prequential error falls to `accept_at`, until it rises to `reject_at`
+        (`ModelAcceptance`).
     renew
-        A model that was trusted and is no more gets a rival that learns the same steps from nothing, and takes its
-        place if it is trusted first (`Apprentice`); one that isn't trusted within so many real steps begins anew.
-        0: no rivals.
+        A model that was accepted and is no more gets a replacement that learns the same steps from nothing, and takes its
+        place if it is accepted first (`ModelTrainer`); one that isn't accepted within so many real steps begins anew.
+        0: no replacements.
     window, least
         Latest real steps that the error is a mean of, and how many there must be.
     seed
@@ -76,20 +76,20 @@ class DynaConfig:
     capacity: int = 20_000
     updates: int = 20
     updates_alone: int | None = None
-    burst: int = 0
+    catch_up: int = 0
     permute: bool = True
-    redraw: bool = True
-    kick: float = 0.0
+    resample: bool = True
+    perturb_velocity: float = 0.0
     shuffle: int = 150
-    open_at: float = 0.1
-    shut_at: float = 0.2
+    accept_at: float = 0.1
+    reject_at: float = 0.2
     renew: int = 1_000
     window: int = 100
     least: int = 50
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("real_ratio", "from_start", "kick"):
+        for name in ("real_ratio", "from_start", "perturb_velocity"):
             value = getattr(self, name)
             if not _number(value) or not 0.0 <= value <= 1.0:
                 raise ConfigError(f"{name}={getattr(self, name)!r}: expected a share from 0 to 1")
@@ -101,11 +101,11 @@ class DynaConfig:
                 raise ConfigError(f"{name}={value!r}: expected a whole number, at least {low}")
         if self.least > self.window:
             raise ConfigError(f"least={self.least}: expected at most window={self.window}")
-        fine = _number(self.open_at) and _number(self.shut_at)
-        if not fine or not 0.0 <= self.open_at <= self.shut_at or not math.isfinite(self.shut_at):
+        fine = _number(self.accept_at) and _number(self.reject_at)
+        if not fine or not 0.0 <= self.accept_at <= self.reject_at or not math.isfinite(self.reject_at):
             raise ConfigError(
-                f"open_at={self.open_at!r}, shut_at={self.shut_at!r}: expected 0 <= open_at <= shut_at, so that "
-                "the gate doesn't flutter"
+                f"accept_at={self.accept_at!r}, reject_at={self.reject_at!r}: expected 0 <= accept_at <= reject_at, so that "
+                "the acceptance doesn't flutter"
             )
 
 
@@ -127,7 +127,7 @@ _LEAST = {
     "capacity": 1,
     "updates": 1,
     "updates_alone": 0,
-    "burst": 0,
+    "catch_up": 0,
     "shuffle": 0,
     "renew": 0,
     "window": 1,

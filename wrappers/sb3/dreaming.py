@@ -13,20 +13,20 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.apprentice import Apprentice, check_model
 from relgym.wrappers.sb3.config import DynaConfig, checked_config
 from relgym.wrappers.sb3.imagination import Imagination
 from relgym.wrappers.sb3.lens import Lens, Observations, picked
+from relgym.wrappers.sb3.trainer import ModelTrainer, check_model
 
 __all__ = ["DreamCheckup", "DreamVecEnv", "explore"]
 
 
-def explore(apprentice: Apprentice, env: gym.Env[Any, Any], steps: int, *, seed: int) -> None:
+def explore(trainer: ModelTrainer, env: gym.Env[Any, Any], steps: int, *, seed: int) -> None:
     """Let a model watch random actions in the real world.
 
     Parameters
     ----------
-    apprentice
+    trainer
         The model and its stock of scenes; both learn.
     env
         The real env, with a `TransitionRecorder`.
@@ -43,8 +43,8 @@ def explore(apprentice: Apprentice, env: gym.Env[Any, Any], steps: int, *, seed:
     if steps < 1:
         raise ConfigError(f"steps={steps!r}: expected at least 1")
     _check_recorded(env)
-    if hasattr(apprentice.judge, "adopt"):
-        apprentice.judge.adopt(Lens(env).acting)
+    if hasattr(trainer.reward_model, "adopt"):
+        trainer.reward_model.adopt(Lens(env).acting)
     env.action_space.seed(seed)
     env.reset(seed=seed)
     for _ in range(steps):
@@ -52,8 +52,8 @@ def explore(apprentice: Apprentice, env: gym.Env[Any, Any], steps: int, *, seed:
         if terminated or truncated:
             env.reset()
         for real in env.get_wrapper_attr("take")():
-            apprentice.take_up(real)
-    apprentice.catch_up()
+            trainer.take_up(real)
+    trainer.catch_up()
 
 
 class DreamVecEnv(VecEnv):  # type: ignore[misc]
@@ -64,8 +64,8 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
 
     Parameters
     ----------
-    apprentice
-        Model, judge and stock. The stock must hold scenes (`explore`); the model is used live.
+    trainer
+        Model, reward_model and stock. The stock must hold scenes (`explore`); the model is used live.
     like
         The env that the agent is to act in, in all its wrappers, a `TransitionRecorder` among them.
     num_envs
@@ -83,7 +83,7 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
 
     def __init__(
         self,
-        apprentice: Apprentice,
+        trainer: ModelTrainer,
         like: gym.Env[Any, Any],
         *,
         num_envs: int = 64,
@@ -92,13 +92,13 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
         if num_envs < 1:
             raise ConfigError(f"num_envs={num_envs!r}: expected at least 1")
         self._lens = Lens(like)
-        check_model(apprentice.model, self._lens, at_once=True)
-        self._apprentice, self._config = apprentice, checked_config(config)
-        self._imagination = Imagination(apprentice.model, self._lens, apprentice.judge)
+        check_model(trainer.model, self._lens, at_once=True)
+        self._trainer, self._config = trainer, checked_config(config)
+        self._imagination = Imagination(trainer.model, self._lens, trainer.reward_model)
         self._rng = np.random.default_rng([self._config.seed, 3])
         self.render_mode = None
         super().__init__(num_envs, self._lens.observation_space, self._lens.action_space)
-        self._layout, self._vectors = apprentice.stock.draw(num_envs, from_start=1.0, rng=self._rng)
+        self._layout, self._vectors = trainer.stock.draw(num_envs, from_start=1.0, rng=self._rng)
         self._steps = np.zeros(num_envs, dtype=np.int64)
         self._actions: Any = None
 
@@ -115,8 +115,8 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
 
     def step_wait(self) -> Any:
         """Dream on by one decision; dreams that ended begin anew."""
-        if self._imagination.model is not self._apprentice.model:  # a rival has taken its place
-            self._imagination = Imagination(self._apprentice.model, self._lens, self._apprentice.judge)
+        if self._imagination.model is not self._trainer.model:  # a replacement has taken its place
+            self._imagination = Imagination(self._trainer.model, self._lens, self._trainer.reward_model)
         done = self._lens.actions(self._actions)
         after, rewards, ended, known = self._imagination.follow(self._layout, self._vectors, done)
         self._vectors = np.where(known[:, None], after, self._vectors)
@@ -160,7 +160,7 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
 
     # ------------------------------------------------------------------ helpers
     def _starts(self, n: int) -> NDArray[np.float64]:
-        stock, model = self._apprentice.stock, self._apprentice.model
+        stock, model = self._trainer.stock, self._trainer.model
         return stock.starts(n, model, self._config, rng=self._rng, layout=self._layout)[1]
 
     def _seen(self) -> Observations:
@@ -170,12 +170,12 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
 class DreamCheckup(BaseCallback):  # type: ignore[misc]
     """Lets an agent that trains in its dream act in the real world now and then.
 
-    The model foretells every real step, is judged by it and learns from it. Once it is trusted no more,
+    The model predicts every real step, is evaluated by it and learns from it. Once it is accepted no more,
     training stops, with a warning: what an agent learns in a dream gone wrong is worth nothing.
 
     Parameters
     ----------
-    apprentice
+    trainer
         The model at work.
     env
         The real env, in the wrappers that the dream imitates.
@@ -189,12 +189,12 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
     Attributes
     ----------
     history : list of (int, int, float, float)
-        Of every check-up: dreamed steps, real steps so far, share of successes, the gate's error.
+        Of every check-up: dreamed steps, real steps so far, share of successes, the acceptance's error.
 
     Raises
     ------
     ConfigError
-        A count below 1, an env without a recorder; or when training begins, a model that isn't trusted.
+        A count below 1, an env without a recorder; or when training begins, a model that isn't accepted.
 
     Notes
     -----
@@ -203,7 +203,7 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
 
     def __init__(
         self,
-        apprentice: Apprentice,
+        trainer: ModelTrainer,
         env: gym.Env[Any, Any],
         *,
         every: int = 5_000,
@@ -215,17 +215,17 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
             if value < 1:
                 raise ConfigError(f"{name}={value!r}: expected at least 1")
         _check_recorded(env)
-        self.apprentice, self.env = apprentice, env
+        self.trainer, self.env = trainer, env
         self.every, self.episodes = every, episodes
         self.history: list[tuple[int, int, float, float]] = []
         self._seed, self._real_steps, self._next = seed, 0, 0
 
     def _on_training_start(self) -> None:
-        gate = self.apprentice.gate
-        if not gate.open:
+        acceptance = self.trainer.acceptance
+        if not acceptance.accepted:
             raise ConfigError(
-                f"the model isn't trusted: its error is {gate.error:.3g}, it is trusted at {gate.open_at:g}, and it "
-                f"spoke of {gate.known:.0%} of the latest real steps: let it watch more of them (explore) before an "
+                f"the model isn't accepted: its error is {acceptance.error:.3g}, it is accepted at {acceptance.accept_at:g}, and it "
+                f"spoke of {acceptance.known:.0%} of the latest real steps: let it watch more of them (explore) before an "
                 "agent trains in its dreams"
             )
         if (
@@ -238,20 +238,20 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
             return True
         self._next = self.num_timesteps + self.every
         played = [self._play() for _ in range(self.episodes)]
-        gate = self.apprentice.gate
+        acceptance = self.trainer.acceptance
         success, returned = (float(np.mean(part)) for part in zip(*played, strict=True))
-        self.history.append((self.num_timesteps, self._real_steps, success, gate.error))
+        self.history.append((self.num_timesteps, self._real_steps, success, acceptance.error))
         self.logger.record("relgym/real_success", success)
         self.logger.record("relgym/real_return", returned)
         self.logger.record("relgym/real_steps", self._real_steps)
-        self.logger.record("relgym/error", gate.error)
-        if not gate.open:
+        self.logger.record("relgym/error", acceptance.error)
+        if not acceptance.accepted:
             warnings.warn(
                 f"training stops after {self.num_timesteps} dreamed steps: the model's error in the real world is "
-                f"{gate.error:.3g}, and it is trusted no more from {gate.shut_at:g} on",
+                f"{acceptance.error:.3g}, and it is accepted no more from {acceptance.reject_at:g} on",
                 stacklevel=2,
             )
-        return gate.open
+        return acceptance.accepted
 
     def _play(self) -> tuple[bool, float]:
         """One real episode with the agent's best actions: whether it succeeded, and the sum of rewards."""
@@ -266,7 +266,7 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
             seen, reward, terminated, truncated, info = self.env.step(action)
             total, over = total + float(reward), terminated or truncated
             for real in self.env.get_wrapper_attr("take")():
-                self.apprentice.take_up(real)
+                self.trainer.take_up(real)
                 self._real_steps += 1
         return bool(info.get("is_success", False)), total
 

@@ -17,25 +17,25 @@ from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.apprentice import Apprentice, check_model, checked_judge
 from relgym.wrappers.sb3.config import DynaConfig, checked_config
 from relgym.wrappers.sb3.imagination import Imagination, Imagined
-from relgym.wrappers.sb3.judges import Judge
 from relgym.wrappers.sb3.lens import Lens, Observations
 from relgym.wrappers.sb3.replay import MixedNStepReplayBuffer, Mixing
+from relgym.wrappers.sb3.reward_models import RewardModel
 from relgym.wrappers.sb3.stock import DreamModel
+from relgym.wrappers.sb3.trainer import ModelTrainer, check_model, checked_reward_model
 
-__all__ = ["Dyna", "check_algorithm", "judge_of", "lens_of"]
+__all__ = ["Dyna", "check_algorithm", "lens_of", "reward_model_of"]
 
 _SHORT: Final = 500
-"""A model that isn't trusted after fewer steps may be yet."""
+"""A model that isn't accepted after fewer steps may be yet."""
 
 
 class Dyna(BaseCallback):  # type: ignore[misc]
     """Lets SAC, TD3 or DQN train in a model that learns while they act.
 
-    At every real step the model foretells it, is judged by what happened, and learns. While its prequential
-    error is small (`TrustGate`), every few steps the policy dreams on from scenes that were seen, and batches
+    At every real step the model predicts it, is evaluated by what happened, and learns. While its prequential
+    error is small (`ModelAcceptance`), every few steps the policy dreams on from scenes that were seen, and batches
     mix what it dreamed with what was real. While it isn't, the algorithm is the one that Stable-Baselines3
     ships.
 
@@ -45,9 +45,9 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         What to learn and dream in: a `WorldModel`, a `NeuralWorldModel`, anything with their methods.
     config
         Free parameters.
-    judge
+    reward_model
         Reward and termination of dreams; default: the env's own ``task``. ``"learned"``: by what a neural model learns
-        of them with the rest, or beside any other by a `LearnedTask`.
+        of them with the rest, or beside any other by a `LearnedRewardModel`.
     like
         An env in the same wrappers as those that the agent acts in; needed where these run in other
         processes.
@@ -65,11 +65,11 @@ class Dyna(BaseCallback):  # type: ignore[misc]
 
     Notes
     -----
-    Logged: ``relgym/error``, ``relgym/known``, ``relgym/trusted``, ``relgym/imagined`` (how many so far),
-    ``relgym/dreams_known``, ``relgym/renewals`` (how often a rival took the model's place: `Apprentice`),
+    Logged: ``relgym/error``, ``relgym/known``, ``relgym/accepted``, ``relgym/imagined`` (how many so far),
+    ``relgym/dreams_known``, ``relgym/renewals`` (how often a replacement took the model's place: `ModelTrainer`),
     ``relgym/learning_seconds`` and ``relgym/dreaming_seconds``.
 
-    The model that was passed stays that of the world it learned: where a rival has taken its place, that is `world`.
+    The model that was passed stays that of the world it learned: where a replacement has taken its place, that is `world`.
 
     Examples
     --------
@@ -87,7 +87,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         model: DreamModel,
         config: DynaConfig | None = None,
         *,
-        judge: Judge | Literal["learned"] | None = None,
+        reward_model: RewardModel | Literal["learned"] | None = None,
         like: gym.Env[Any, Any] | None = None,
         verbose: int = 0,
     ) -> None:
@@ -96,30 +96,30 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self.config = checked_config(config)
         self.imagined = 0
         self.dreaming_seconds = 0.0
-        self._judge = judge
+        self._reward_model = reward_model
         self._like = like
         self._rng = np.random.default_rng([self.config.seed, 0])
         self._dreamed_at = 0
-        self._made_up = -1  # verdicts that were known when the agent was last trained in a burst
+        self._made_up = -1  # verdicts that were known when the agent was last trained in catch-up updates
         self._trained: Any = None  # the agent
         self._usual = 1  # its gradient steps
         self._lent: int | None = None  # those that it has in their place
         self._known = 0.0
         self._mixed: Any = None
-        self._apprentice: Apprentice | None = None
+        self._trainer: ModelTrainer | None = None
         self._imagination: Imagination | None = None
 
     @property
     def world(self) -> DreamModel:
-        """The model at work: the one that was given, until a rival takes its place (`Apprentice`)."""
-        return self._given if self._apprentice is None else self._apprentice.model
+        """The model at work: the one that was given, until a replacement takes its place (`ModelTrainer`)."""
+        return self._given if self._trainer is None else self._trainer.model
 
     @property
-    def apprentice(self) -> Apprentice:
-        """The model at work: gate, stock of scenes, time spent; `ConfigError` before training began."""
-        if self._apprentice is None:
+    def trainer(self) -> ModelTrainer:
+        """The model at work: acceptance, stock of scenes, time spent; `ConfigError` before training began."""
+        if self._trainer is None:
             raise ConfigError("training has not begun: call algorithm.learn(..., callback=dyna) first")
-        return self._apprentice
+        return self._trainer
 
     # ------------------------------------------------------------------ Stable-Baselines3's callback
     def _init_callback(self) -> None:
@@ -127,9 +127,9 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         lens = lens_of(self.training_env, self._like)
         _check_spaces(self.model, lens)
         check_model(self.world, lens)
-        judge = judge_of(lens, self._judge, self.world)
-        if self._apprentice is None:  # a second learn() goes on with what is known
-            self._apprentice = Apprentice(self.world, judge, self.config)
+        reward_model = reward_model_of(lens, self._reward_model, self.world)
+        if self._trainer is None:  # a second learn() goes on with what is known
+            self._trainer = ModelTrainer(self.world, reward_model, self.config)
         if self._mixed is not self.buffer:  # another agent's, or one that was loaded
             self.buffer.hold(self.config.capacity)
             self._mixed = self.buffer
@@ -137,8 +137,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         if not again:
             self._trained, self._made_up = self.model, -1
         self.buffer.real_ratio = self.config.real_ratio
-        self._imagination = Imagination(self.world, lens, self._apprentice.judge)
-        self._renewals = self._apprentice.renewals
+        self._imagination = Imagination(self.world, lens, self._trainer.reward_model)
+        self._renewals = self._trainer.renewals
         self._repeat = lens.repeat
         if again and self.model.gradient_steps == self._lent:  # training was interrupted
             self.model.gradient_steps = self._usual
@@ -148,7 +148,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     def _on_training_start(self) -> None:
         for steps in self.training_env.env_method("take"):  # made by somebody else, before; real all the same
             for real in steps:
-                self.apprentice.take_up(real)
+                self.trainer.take_up(real)
 
     def _on_rollout_start(self) -> None:
         self._give_back()  # what callbacks save between here and the end is the agent's own
@@ -163,50 +163,52 @@ class Dyna(BaseCallback):  # type: ignore[misc]
                     "does inside the TransitionRecorder"
                 )
             for real in steps:
-                self.apprentice.take_up(real)
-        if self.apprentice.renewals != self._renewals:
+                self.trainer.take_up(real)
+        if self.trainer.renewals != self._renewals:
             self._begin_anew()
-        trusted = self.apprentice.gate.open
-        if not trusted and self.buffer.imagined.size():  # what a model dreamed that is wrong is worth nothing
+        accepted = self.trainer.acceptance.accepted
+        if (
+            not accepted and self.buffer.imagined.size()
+        ):  # what a model dreamed that is wrong is worth nothing
             self.buffer.hold(self.config.capacity)
-        if trusted and not self._awake() and (self.buffer.imagined.size() == 0 or self._due()):
+        if accepted and not self._awake() and (self.buffer.imagined.size() == 0 or self._due()):
             self._dream()
-        self.buffer.trusted = trusted
-        self._catch_up(trusted)
+        self.buffer.accepted = accepted
+        self._catch_up(accepted)
         self._log()
         return True
 
     def _on_rollout_end(self) -> None:
-        self._lent = self.model.gradient_steps = self._gradient_steps(self.buffer.trusted)
+        self._lent = self.model.gradient_steps = self._gradient_steps(self.buffer.accepted)
 
     def _on_training_end(self) -> None:
-        self.apprentice.catch_up()
+        self.trainer.catch_up()
         self._complain()
         self._give_back()
-        self.buffer.trusted = False  # without this callback nobody refreshes what was dreamed
+        self.buffer.accepted = False  # without this callback nobody refreshes what was dreamed
 
     def _begin_anew(self) -> None:
         """Dream in the model that has taken the other one's place; what was dreamed before is of another world."""
         assert self._imagination is not None, "made when training begins"
-        self._imagination = Imagination(self.world, self._imagination.lens, self.apprentice.judge)
-        self._renewals, self._made_up = self.apprentice.renewals, -1
+        self._imagination = Imagination(self.world, self._imagination.lens, self.trainer.reward_model)
+        self._renewals, self._made_up = self.trainer.renewals, -1
         self.buffer.hold(self.config.capacity)
 
     def _give_back(self) -> None:
         self.model.gradient_steps, self._lent = self._usual, None
 
     def _complain(self) -> None:
-        """Warn where no dream was ever trusted, with what the learners lack: else it would go unnoticed."""
-        gate = self.apprentice.gate
-        if gate.switches or self.num_timesteps < _SHORT:
+        """Warn where no dream was ever accepted, with what the learners lack: else it would go unnoticed."""
+        acceptance = self.trainer.acceptance
+        if acceptance.switches or self.num_timesteps < _SHORT:
             return
-        parts: tuple[Any, ...] = (self.world, getattr(self.apprentice.judge, "model", None))
+        parts: tuple[Any, ...] = (self.world, getattr(self.trainer.reward_model, "model", None))
         lacks = [f"{each.target}: {each}." for p in parts if hasattr(p, "advice") for each in p.advice()]
         warnings.warn(
-            f"the model was never trusted in {self.num_timesteps:,} steps, and nothing was dreamed: its error was "
-            f"{gate.error:.2g}, to be trusted it must fall to {gate.open_at:g}, and it spoke of {gate.known:.0%} of "
+            f"the model was never accepted in {self.num_timesteps:,} steps, and nothing was dreamed: its error was "
+            f"{acceptance.error:.2g}, to be accepted it must fall to {acceptance.accept_at:g}, and it spoke of {acceptance.known:.0%} of "
             f"the latest steps. {' '.join(lacks) or 'Give it more steps.'} Features of the model are switched on in "
-            "its ModelConfig, those of reward and termination in that of judge=LearnedTask(...)",
+            "its ModelConfig, those of reward and termination in that of reward_model=LearnedRewardModel(...)",
             UserWarning,
             stacklevel=2,
         )
@@ -224,34 +226,34 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         """Whether the algorithm still gathers its first steps, and what is dreamed would be stale before use."""
         return bool(self.num_timesteps + self.config.every < self.model.learning_starts)
 
-    def _gradient_steps(self, trusted: bool) -> int:
-        each = self.config.updates if trusted else self.config.updates_alone
+    def _gradient_steps(self, accepted: bool) -> int:
+        each = self.config.updates if accepted else self.config.updates_alone
         if each is None:
             return self._usual
         return each * int(self.training_env.num_envs * self.model.train_freq.frequency)
 
-    def _catch_up(self, trusted: bool) -> None:
-        """Train at once as much as many real steps would have brought: when the model is first trusted.
+    def _catch_up(self, accepted: bool) -> None:
+        """Train at once as much as many real steps would have brought: when the model is first accepted.
 
-        And again when the judge has learned of something else that is paid for or ends episodes: what was dreamed
+        And again when the reward model has learned of something else that is paid for or ends episodes: what was dreamed
         before didn't know of it, nor does the policy that was trained in it.
         """
-        if not trusted or self.num_timesteps <= self.model.learning_starts or not self.buffer.size():
+        if not accepted or self.num_timesteps <= self.model.learning_starts or not self.buffer.size():
             return
-        known = getattr(self.apprentice.judge, "verdicts", 0)
+        known = getattr(self.trainer.reward_model, "verdicts", 0)
         if known <= self._made_up:
             return
-        if self._made_up >= 0 and self.config.burst:
+        if self._made_up >= 0 and self.config.catch_up:
             self.buffer.hold(self.config.capacity)
         self._made_up = known
         each = self.config.updates * self.config.every  # per round of dreams, as later on
-        for done in range(0, self.config.burst, each):
+        for done in range(0, self.config.catch_up, each):
             self._dream()
-            self.model.train(min(each, self.config.burst - done), batch_size=self.model.batch_size)
+            self.model.train(min(each, self.config.catch_up - done), batch_size=self.model.batch_size)
             self._aim()
 
     def _aim(self) -> None:
-        """Let DQN's target net follow: Stable-Baselines3 does so per real step, of which a burst has none."""
+        """Let DQN's target net follow: Stable-Baselines3 does so per real step, of which a round of catch-up updates has none."""
         if isinstance(self.model, DQN):
             own, target = self.model.q_net, self.model.q_net_target
             polyak_update(own.parameters(), target.parameters(), self.model.tau)
@@ -259,7 +261,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     def _dream(self) -> None:
         started = perf_counter()
         config = self.config
-        layout, vectors = self.apprentice.stock.starts(config.dreams, self.world, config, rng=self._rng)
+        layout, vectors = self.trainer.stock.starts(config.dreams, self.world, config, rng=self._rng)
         assert self._imagination is not None, "made when training begins"
         found = self._imagination.dream(layout, vectors, self._act, horizon=config.horizon)
         self._keep(found)
@@ -288,15 +290,15 @@ class Dyna(BaseCallback):  # type: ignore[misc]
 
     # ------------------------------------------------------------------ the log
     def _log(self) -> None:
-        gate = self.apprentice.gate
+        acceptance = self.trainer.acceptance
         record = self.logger.record
-        record("relgym/error", gate.error)
-        record("relgym/known", gate.known)
-        record("relgym/trusted", float(gate.open))
+        record("relgym/error", acceptance.error)
+        record("relgym/known", acceptance.known)
+        record("relgym/accepted", float(acceptance.accepted))
         record("relgym/imagined", self.imagined)
         record("relgym/dreams_known", self._known)
-        record("relgym/renewals", self.apprentice.renewals)
-        record("relgym/learning_seconds", self.apprentice.seconds)
+        record("relgym/renewals", self.trainer.renewals)
+        record("relgym/learning_seconds", self.trainer.seconds)
         record("relgym/dreaming_seconds", self.dreaming_seconds)
 
 
@@ -321,18 +323,20 @@ def lens_of(training_env: Any, like: gym.Env[Any, Any] | None) -> Lens:
     return Lens(inner.envs[0])
 
 
-def judge_of(lens: Lens, judge: Judge | Literal["learned"] | None, model: DreamModel) -> Judge:
+def reward_model_of(
+    lens: Lens, reward_model: RewardModel | Literal["learned"] | None, model: DreamModel
+) -> RewardModel:
     """Reward and termination of dreams: those given, learned ones, or else the env's own."""
-    if judge is not None:
-        return checked_judge(judge, model, lens.recorder.view.schema, lens.acting)
+    if reward_model is not None:
+        return checked_reward_model(reward_model, model, lens.recorder.view.schema, lens.acting)
     recorder = lens.recorder
     task = recorder.get_wrapper_attr("task") if recorder.has_wrapper_attr("task") else None
     if task is None:
         raise ConfigError(
-            "nothing says what a dream is worth: pass judge='learned', or judge= an object with judge(layout, before, "
+            "nothing says what a dream is worth: pass reward_model='learned', or reward_model= an object with evaluate(layout, before, "
             "actions, after), or give the env a task"
         )
-    return checked_judge(task, model, recorder.view.schema)
+    return checked_reward_model(task, model, recorder.view.schema)
 
 
 def check_algorithm(algorithm: Any) -> None:

@@ -1,4 +1,4 @@
-"""Dreams by the hundred: a policy acts in scenes that a model foretells, and a task judges."""
+"""Dreams by the hundred: a policy acts in scenes that a model predicts, and a task evaluates."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
-from relgym.wrappers.sb3.judges import Judge, check_rewards
 from relgym.wrappers.sb3.lens import Lens, Observations, picked
+from relgym.wrappers.sb3.reward_models import RewardModel, check_rewards
 from relgym.wrappers.sb3.stock import DreamModel
 
 __all__ = ["Imagination", "Imagined", "Policy"]
@@ -71,10 +71,10 @@ class Imagination:
     Parameters
     ----------
     model
-        Foretells what follows; used as it is, live.
+        Predicts what follows; used as it is, live.
     lens
         What the agent sees and does.
-    judge
+    reward_model
         Reward and termination; must be finite.
 
     Notes
@@ -84,10 +84,10 @@ class Imagination:
     dreams together.
     """
 
-    def __init__(self, model: DreamModel, lens: Lens, judge: Judge) -> None:
+    def __init__(self, model: DreamModel, lens: Lens, reward_model: RewardModel) -> None:
         self.model = model
         self.lens = lens
-        self.judge = judge
+        self.reward_model = reward_model
 
     def dream(
         self, layout: SceneLayout, vectors: Float2D, policy: Policy, *, horizon: int
@@ -170,17 +170,17 @@ class Imagination:
             if not len(going):
                 break
             before, done = after[going], actions[going]
-            following, spoke = self._foretell(layout, before, done)
-            judged = self.judge.judge(layout, before, done, following)
-            if getattr(self.judge, "learned", False):
-                spoke &= np.isfinite(judged.rewards)
-            check_rewards(judged.rewards[spoke], self.judge)
+            following, spoke = self._predict(layout, before, done)
+            evaluated = self.reward_model.evaluate(layout, before, done, following)
+            if getattr(self.reward_model, "learned", False):
+                spoke &= np.isfinite(evaluated.rewards)
+            check_rewards(evaluated.rewards[spoke], self.reward_model)
             after[going] = np.where(spoke[:, None], following, before)
-            rewards[going] += np.where(spoke, judged.rewards, 0.0)
-            ended[going], known[going] = judged.terminated & spoke, spoke
+            rewards[going] += np.where(spoke, evaluated.rewards, 0.0)
+            ended[going], known[going] = evaluated.terminated & spoke, spoke
         return after, rewards, ended, known
 
-    def _foretell(
+    def _predict(
         self, layout: SceneLayout, vectors: Float2D, actions: NDArray[Any]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         whole, joined = self.lens.acting(layout, vectors, actions)

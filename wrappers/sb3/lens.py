@@ -79,7 +79,7 @@ class Lens:
         if isinstance(layer, _REWARDING):
             raise ConfigError(
                 f"{type(layer).__name__} changes rewards outside the TransitionRecorder, where dreams would be paid "
-                "otherwise: put it inside, and pass judge='learned' or a judge that pays as it does"
+                "otherwise: put it inside, and pass reward_model='learned' or a reward model that pays as it does"
             )
         if isinstance(own, int):
             self.repeat *= own

@@ -59,13 +59,13 @@ class PermutedReplay(BaseCallback):  # type: ignore[misc]
             buffer.hold(min(self.capacity, self.copies * buffer.buffer_size))
             self._mixed = buffer
         buffer.real_ratio = 1.0 / (1.0 + self.copies)
-        buffer.trusted = True
+        buffer.accepted = True
 
     def _on_training_start(self) -> None:
         self.training_env.env_method("take")  # made by somebody else, before: not what is stored now
 
     def _on_training_end(self) -> None:
-        self.model.replay_buffer.trusted = False  # without this callback nobody adds to the renamed
+        self.model.replay_buffer.accepted = False  # without this callback nobody adds to the renamed
 
     def _on_step(self) -> bool:
         scaled, rewards, dones = (self.locals[name] for name in ("buffer_actions", "rewards", "dones"))

@@ -19,14 +19,14 @@ __all__ = ["MixedDictReplayBuffer", "MixedNStepReplayBuffer", "MixedReplayBuffer
 class Mixing:
     """Gives a replay buffer of Stable-Baselines3 a second one beside it, for imagined transitions.
 
-    What the algorithm collects goes into the buffer itself, as ever. While `trusted`, batches hold a share of
+    What the algorithm collects goes into the buffer itself, as ever. While `accepted`, batches hold a share of
     `real_ratio` of it, and the rest comes from `imagined`.
 
     Attributes
     ----------
     imagined
         A plain buffer of the same kind for a single stream: dream after dream, as one env's episodes.
-    trusted : bool
+    accepted : bool
         Whether batches are mixed.
     real_ratio : float
         Share of real transitions, 0 to 1.
@@ -37,7 +37,7 @@ class Mixing:
 
     def __init__(self, buffer_size: int, *spaces_and_device: Any, **options: Any) -> None:
         super().__init__(buffer_size, *spaces_and_device, **options)  # type: ignore[call-arg]
-        self.trusted = False
+        self.accepted = False
         self.real_ratio = 0.05
         self._device = spaces_and_device[2:3] or (options.get("device", "auto"),)
         self._spaces = spaces_and_device[:2]
@@ -50,7 +50,7 @@ class Mixing:
 
     def __getstate__(self) -> dict[str, Any]:
         """What a file or a copy keeps: what happened. What was dreamed is of the model of that hour."""
-        return {**self.__dict__, "trusted": False, "imagined": self._twin(1)}
+        return {**self.__dict__, "accepted": False, "imagined": self._twin(1)}
 
     def _twin(self, capacity: int) -> Any:
         return self.plain(capacity, *self._spaces, device=self._device[0], n_envs=1, **self._options)
@@ -69,9 +69,9 @@ class Mixing:
             )
 
     def sample(self, batch_size: int, env: Any = None) -> Any:
-        """A batch; mixed while the model is trusted and something was imagined."""
+        """A batch; mixed while the model is accepted and something was imagined."""
         real = batch_size
-        if self.trusted and self.imagined.size() > self._options.get("n_steps", 1):
+        if self.accepted and self.imagined.size() > self._options.get("n_steps", 1):
             real = round(self.real_ratio * batch_size) if super().size() else 0  # type: ignore[misc]
         if real == batch_size:
             return super().sample(batch_size, env=env)  # type: ignore[misc]

@@ -29,10 +29,10 @@ class DreamModel(Protocol):
         """Take up one real transition."""
 
     def predict_one(self, scene: Scene) -> ScenePrediction:
-        """Foretell what follows a scene with an action in it."""
+        """Predict what follows a scene with an action in it."""
 
     def predict_batch(self, layout: SceneLayout, vectors: Float2D) -> BatchPrediction:
-        """Foretell what follows n scenes with the same objects."""
+        """Predict what follows n scenes with the same objects."""
 
 
 class SceneStock:
@@ -117,14 +117,14 @@ class SceneStock:
         layout, vectors = self.draw(n, from_start=config.from_start, rng=rng, layout=layout)
         if config.permute:
             vectors = permuted(layout, vectors, model, rng=rng)
-        if config.redraw:
-            vectors = self.redrawn(layout, vectors, model, rng=rng)
-        if config.kick:
-            fast = rng.random(n) < config.kick
-            vectors[fast] = self.kicked(layout, vectors[fast], model, rng=rng)
+        if config.resample:
+            vectors = self.resampled(layout, vectors, model, rng=rng)
+        if config.perturb_velocity:
+            fast = rng.random(n) < config.perturb_velocity
+            vectors[fast] = self.perturbed(layout, vectors[fast], model, rng=rng)
         return layout, vectors
 
-    def kicked(
+    def perturbed(
         self, layout: SceneLayout, vectors: Float2D, model: DreamModel, *, rng: np.random.Generator
     ) -> NDArray[np.float64]:
         """The scenes with other velocities of the bodies that move.
@@ -146,7 +146,7 @@ class SceneStock:
             varied[:, columns] = rng.uniform(low - half, high + half, (len(varied), len(columns)))
         return varied
 
-    def redrawn(
+    def resampled(
         self, layout: SceneLayout, vectors: Float2D, model: DreamModel, *, rng: np.random.Generator
     ) -> NDArray[np.float64]:
         """The scenes with other values of what nothing else depends on (`free_properties`).

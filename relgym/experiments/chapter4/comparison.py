@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from relgym.baselines.base import Classifier, Regressor
 from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, Columns, make_classifier, make_regressor
 from relgym.baselines.features import Features, columns, features
-from relgym.experiments.blocks import Block
-from relgym.experiments.chapter4.lesson import fresh_blocks, taught_blocks
+from relgym.experiments.chapter4.lesson import fresh_episodes, taught_episodes
 from relgym.experiments.chapter4.scores import target_score
 from relgym.experiments.chapter4.testing import TARGETS, true_modes
 from relgym.experiments.chapter4.weight import weight_of
 from relgym.experiments.data import BALL_EXPERIMENTS
+from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import TOLERANCE, explicable, mode_labels
 
 __all__ = ["classify", "regress"]
@@ -36,7 +36,7 @@ def regress(
     tests: Mapping[str, Any],
     setting: int = 0,
 ) -> dict[str, Any]:
-    """Train a regressor on one batch; test after some numbers of blocks.
+    """Train a regressor on one batch; test after some numbers of episodes.
 
     Parameters
     ----------
@@ -54,25 +54,25 @@ def regress(
     Plain data: scores by checkpoint and target; seconds spent on learning and on all tests, bytes that it keeps.
     """
     known = REGRESSORS[baseline]
-    blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
-    fresh = fresh_blocks(experiment, tests)
-    seen = features(shown, blocks[0].schema, "ball")
+    episodes = list(taught_episodes(experiment, seed, order, checkpoints[-1]))
+    fresh = fresh_episodes(experiment, tests)
+    seen = features(shown, episodes[0].schema, "ball")
     velocity = columns(seen, _VELOCITY)
     rng = np.random.default_rng([seed, order])
     meaning = Columns(velocity, seen.own, seen.objects)
     model = make_regressor(baseline, known.settings[setting], columns=meaning, rng=rng)
     questions, answers = _examples(fresh, seen)
     scores, learning, asking = [], 0.0, 0.0
-    for count, block in enumerate(blocks, start=1):
+    for count, episode in enumerate(episodes, start=1):
         start = perf_counter()
-        _teach(model, *_examples([block], seen), velocity if known.change else ())
+        _teach(model, *_examples([episode], seen), velocity if known.change else ())
         learning += perf_counter() - start
         if count in checkpoints:
             start = perf_counter()
             predicted = model.predict_batch(questions)
             predicted += questions[:, list(velocity)] if known.change else 0.0
             asking += perf_counter() - start
-            scores.append({"blocks": count, "targets": _scores(predicted, answers, fresh, experiment)})
+            scores.append({"episodes": count, "targets": _scores(predicted, answers, fresh, experiment)})
     return {
         "scores": scores,
         "setting": dict(known.settings[setting]),
@@ -88,25 +88,25 @@ def _teach(model: Regressor, x: NDArray[np.float64], y: NDArray[np.float64], pre
         model.learn_one(row, value)
 
 
-def _examples(blocks: Sequence[Block], seen: Features) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _examples(episodes: Sequence[Episode], seen: Features) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Features and next velocities of all transitions."""
-    x = [seen.rows(block.layout, block.vectors[:-1]) for block in blocks]
-    y = [block.columns("ball", *_VELOCITY)[1:] for block in blocks]
+    x = [seen.rows(episode.layout, episode.vectors[:-1]) for episode in episodes]
+    y = [episode.columns("ball", *_VELOCITY)[1:] for episode in episodes]
     return np.concatenate(x), np.concatenate(y)
 
 
 def _scores(
-    predicted: NDArray[np.float64], actual: NDArray[np.float64], blocks: Sequence[Block], experiment: int
+    predicted: NDArray[np.float64], actual: NDArray[np.float64], episodes: Sequence[Episode], experiment: int
 ) -> dict[str, Any]:
     laws = BALL_EXPERIMENTS[experiment].modes()
     names = mode_labels(laws)
-    before = np.concatenate([b.columns("ball", *_VELOCITY)[:-1] for b in blocks])
-    counted = [explicable(b, laws) for b in blocks]
+    before = np.concatenate([b.columns("ball", *_VELOCITY)[:-1] for b in episodes])
+    counted = [explicable(b, laws) for b in episodes]
     found = {}
     for k, target in enumerate(TARGETS):
         found[target] = target_score(
             names[target],
-            np.concatenate([true_modes(b, target, laws) for b in blocks]),
+            np.concatenate([true_modes(b, target, laws) for b in episodes]),
             np.concatenate([c[target] for c in counted]),
             np.abs(predicted[:, k] - actual[:, k]),
             np.zeros(len(actual), dtype=np.bool_),
@@ -127,7 +127,7 @@ def classify(
     tests: Mapping[str, Any],
     setting: int = 0,
 ) -> dict[str, Any]:
-    """Train a classifier on the true modes of one batch; test after some numbers of blocks (§4.7.2).
+    """Train a classifier on the true modes of one batch; test after some numbers of episodes (§4.7.2).
 
     It is taught which mode of the analytic list holds. A prediction is right if the predicted mode explains the
     example, whichever really held: ties are forgiven. Examples that no mode explains are neither taught nor tested.
@@ -139,23 +139,23 @@ def classify(
     Plain data: examples and errors by checkpoint and target; seconds spent on learning and on all tests, bytes that it
     keeps.
     """
-    blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1]))
-    fresh = fresh_blocks(experiment, tests)
-    seen = features(shown, blocks[0].schema, "ball")
+    episodes = list(taught_episodes(experiment, seed, order, checkpoints[-1]))
+    fresh = fresh_episodes(experiment, tests)
+    seen = features(shown, episodes[0].schema, "ball")
     settings = CLASSIFIERS[baseline].settings[setting]
     models = {
         t: make_classifier(baseline, settings, rng=np.random.default_rng([seed, order])) for t in TARGETS
     }
     asked = {target: _labelled(fresh, seen, target, experiment) for target in TARGETS}
     scores, learning, asking = [], 0.0, 0.0
-    for count, block in enumerate(blocks, start=1):
+    for count, episode in enumerate(episodes, start=1):
         start = perf_counter()
         for target, model in models.items():
-            _tell(model, *_labelled([block], seen, target, experiment)[:2])
+            _tell(model, *_labelled([episode], seen, target, experiment)[:2])
         learning += perf_counter() - start
         if count in checkpoints:
             start = perf_counter()
-            scores.append({"blocks": count, "targets": {t: _errors(models[t], *asked[t]) for t in TARGETS}})
+            scores.append({"episodes": count, "targets": {t: _errors(models[t], *asked[t]) for t in TARGETS}})
             asking += perf_counter() - start
     return {
         "scores": scores,
@@ -172,14 +172,14 @@ def _tell(model: Classifier, x: NDArray[np.float64], labels: NDArray[np.int64]) 
 
 
 def _labelled(
-    blocks: Sequence[Block], seen: Features, target: str, experiment: int
+    episodes: Sequence[Episode], seen: Features, target: str, experiment: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
     """Features, true modes and which modes explain each example; of those with a true mode."""
     laws = BALL_EXPERIMENTS[experiment].modes()
-    x, _ = _examples(blocks, seen)
-    labels = np.concatenate([true_modes(b, target, laws) for b in blocks])
-    before = np.concatenate([b.columns("ball", *_VELOCITY)[:-1] for b in blocks])
-    after = np.concatenate([b.columns("ball", *_VELOCITY)[1:] for b in blocks])
+    x, _ = _examples(episodes, seen)
+    labels = np.concatenate([true_modes(b, target, laws) for b in episodes])
+    before = np.concatenate([b.columns("ball", *_VELOCITY)[:-1] for b in episodes])
+    after = np.concatenate([b.columns("ball", *_VELOCITY)[1:] for b in episodes])
     explaining = laws.explaining(target[-1], before, after, TOLERANCE)
     known = labels >= 0
     return x[known], labels[known], explaining[known]

@@ -1,4 +1,4 @@
-"""Accuracy by number of training blocks, whole and by mode (figures 4.3-4.7, 4.12-4.17, 4.27-4.29)."""
+"""Accuracy by number of training episodes, whole and by mode (figures 4.3-4.7, 4.12-4.17, 4.27-4.29)."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.scores import pooled_scores, quantile
 from relgym.model.text import Cell, table
 
-__all__ = ["accuracy_shown", "by_mode_shown", "perfect_shown", "rates_shown", "scores_by_blocks"]
+__all__ = ["accuracy_shown", "by_mode_shown", "perfect_shown", "rates_shown", "scores_by_episodes"]
 
 _QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 _Score: TypeAlias = Mapping[str, Any]
 
 
-def scores_by_blocks(runs: Sequence[Any], target: str, part: str = "all") -> dict[int, _Score]:
-    """Pooled scores of all batches by number of training blocks; `part` is ``"all"`` or ``"counted"``."""
-    numbers = [each["blocks"] for each in runs[0]["scores"]]
+def scores_by_episodes(runs: Sequence[Any], target: str, part: str = "all") -> dict[int, _Score]:
+    """Pooled scores of all batches by number of training episodes; `part` is ``"all"`` or ``"counted"``."""
+    numbers = [each["episodes"] for each in runs[0]["scores"]]
     return {
-        blocks: pooled_scores(run["scores"][k]["targets"][target][part] for run in runs)
-        for k, blocks in enumerate(numbers)
+        episodes: pooled_scores(run["scores"][k]["targets"][target][part] for run in runs)
+        for k, episodes in enumerate(numbers)
     }
 
 
@@ -45,13 +45,13 @@ def _axis(target: str) -> str:
 # ------------------------------------------------------------------ figures 4.3, 4.12, 4.16
 def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown:
     """95th percentile of the error over all test examples, and 99.9th: the former hides rare modes."""
-    heading = ["target", "learner", "blocks", "p50", "p95", "p99.9", "mean change", "wrong %"]
-    found = {t: {name: scores_by_blocks(runs, t) for name, runs in values.items()} for t in targets}
+    heading = ["target", "learner", "episodes", "p50", "p95", "p99.9", "mean change", "wrong %"]
+    found = {t: {name: scores_by_episodes(runs, t) for name, runs in values.items()} for t in targets}
     lines: list[list[Cell]] = [
-        [target, TITLES[learner], blocks, *_figures(score)]
+        [target, TITLES[learner], episodes, *_figures(score)]
         for target, learners in found.items()
         for learner, scores in learners.items()
-        for blocks, score in scores.items()
+        for episodes, score in scores.items()
     ]
 
     def draw(path: Path) -> None:
@@ -69,7 +69,7 @@ def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown
                 )
             _dash(panel, next(iter(learners.values())))
             error_axis(panel, label=panel is panels[0][0])
-            panel.set(title=f"{_axis(target)} velocity", xlabel="training blocks")
+            panel.set(title=f"{_axis(target)} velocity", xlabel="training episodes")
         handles, labels = panels[0][0].get_legend_handles_labels()
         figure.legend(
             handles, labels, loc="outside lower center", ncols=3 + 2 * (len(targets) > 1), fontsize=7
@@ -96,14 +96,14 @@ def by_mode_shown(_: Protocol, values: Values, target: str) -> Shown:
     """Errors within each true mode: boxes from quartile to quartile, whiskers from 5 to 95 %."""
     found = {learner: _by_mode(runs, target) for learner, runs in values.items()}
     names = list(dict.fromkeys(name for modes in found.values() for name in modes))
-    heading = ["mode", "learner", "blocks", "examples", "p5", "p25", "p50", "p75", "p95", "wrong %"]
+    heading = ["mode", "learner", "episodes", "examples", "p5", "p25", "p50", "p75", "p95", "wrong %"]
     lines: list[list[Cell]] = []
     for name in names:
         for learner, modes in found.items():
-            for blocks, score in modes.get(name, {}).items():
+            for episodes, score in modes.get(name, {}).items():
                 boxes = [f"{quantile(score['errors'], q):.0e}" for q in _QUANTILES]
                 wrong = round(100 * score["wrong"] / max(score["examples"], 1), 2)
-                lines.append([name, TITLES[learner], blocks, score["examples"], *boxes, wrong])
+                lines.append([name, TITLES[learner], episodes, score["examples"], *boxes, wrong])
 
     def draw(path: Path) -> None:
         columns = 4 if len(names) in (4, 7, 8) else min(3, len(names))
@@ -114,7 +114,7 @@ def by_mode_shown(_: Protocol, values: Values, target: str) -> Shown:
             panel.set_title(_short(name, names), fontsize=8)
         for panel in list(panels.flat)[len(names) :]:
             panel.set_axis_off()
-        figure.supxlabel("training blocks", fontsize=9)
+        figure.supxlabel("training episodes", fontsize=9)
         figure.supylabel(ERROR, fontsize=9)
         handles, labels = panels.flat[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=8)
@@ -132,21 +132,21 @@ def _short(name: str, names: Sequence[str]) -> str:
 
 
 def _by_mode(runs: Sequence[Any], target: str) -> dict[str, dict[int, _Score]]:
-    """Pooled scores by true mode and number of training blocks."""
+    """Pooled scores by true mode and number of training episodes."""
     found: dict[str, dict[int, list[_Score]]] = {}
     for run in runs:
         for each in run["scores"]:
             for score in each["targets"][target]["modes"]:
-                found.setdefault(score["name"], {}).setdefault(each["blocks"], []).append(score)
+                found.setdefault(score["name"], {}).setdefault(each["episodes"], []).append(score)
     return {
-        name: {blocks: pooled_scores(scores) for blocks, scores in by_blocks.items()}
-        for name, by_blocks in found.items()
+        name: {episodes: pooled_scores(scores) for episodes, scores in by_episodes.items()}
+        for name, by_episodes in found.items()
     }
 
 
 def _boxes(panel: Any, learners: Mapping[str, Mapping[int, _Score]], part: str = "errors") -> None:
-    """Boxes of several learners side by side, one group per number of blocks."""
-    numbers = sorted({blocks for scores in learners.values() for blocks in scores})
+    """Boxes of several learners side by side, one group per number of episodes."""
+    numbers = sorted({episodes for scores in learners.values() for episodes in scores})
     width = 0.8 / max(len(learners), 1)
     for k, (learner, scores) in enumerate(learners.items()):
         kept = [(numbers.index(b) + width * (k + 0.5) - 0.4, s) for b, s in scores.items() if part in s]
@@ -175,20 +175,20 @@ def _box(errors: Any) -> dict[str, Any]:
 # ------------------------------------------------------------------ figures 4.6, 4.15, 4.17
 def rates_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown:
     """Shares of wrong predictions, split: the mode wasn't learned, or it was and another one was chosen."""
-    heading = ["target", "learner", "blocks", "wrong %", "not learned %", "misclassified %"]
-    found = {t: {n: scores_by_blocks(runs, t, "counted") for n, runs in values.items()} for t in targets}
+    heading = ["target", "learner", "episodes", "wrong %", "not learned %", "misclassified %"]
+    found = {t: {n: scores_by_episodes(runs, t, "counted") for n, runs in values.items()} for t in targets}
     lines: list[list[Cell]] = [
-        [target, TITLES[learner], blocks, *_split(score)]
+        [target, TITLES[learner], episodes, *_split(score)]
         for target, learners in found.items()
         for learner, scores in learners.items()
-        for blocks, score in scores.items()
+        for episodes, score in scores.items()
     ]
 
     def draw(path: Path) -> None:
         figure, panels = canvas(5.5 * len(targets), 4.0, 1, len(targets))
         for panel, (target, learners) in zip(panels[0], found.items(), strict=True):
             _bars(panel, learners)
-            panel.set(title=f"{_axis(target)} velocity", xlabel="training blocks", ylabel="wrong, %")
+            panel.set(title=f"{_axis(target)} velocity", xlabel="training episodes", ylabel="wrong, %")
         panels[0][-1].legend(fontsize=7)
         save(figure, path)
 
@@ -235,13 +235,13 @@ def perfect_shown(_: Protocol, values: Values, target: str, mode: str) -> Shown:
             ),
             {},
         )
-    heading = ["learner", "blocks", "chosen p50", "chosen p75", "best p50", "best p75", "best p95"]
+    heading = ["learner", "episodes", "chosen p50", "chosen p75", "best p50", "best p75", "best p95"]
     lines: list[list[Cell]] = []
     for learner, scores in found.items():
-        for blocks, score in scores.items():
+        for episodes, score in scores.items():
             chosen = [f"{quantile(score['errors'], q):.0e}" for q in (0.5, 0.75)]
             best = [f"{quantile(score['best'], q):.0e}" for q in (0.5, 0.75, 0.95)]
-            lines.append([TITLES[learner], blocks, *chosen, *best])
+            lines.append([TITLES[learner], episodes, *chosen, *best])
 
     def draw(path: Path) -> None:
         figure, panels = canvas(9.0, 3.8, 1, 2, sharey=True)
@@ -249,7 +249,7 @@ def perfect_shown(_: Protocol, values: Values, target: str, mode: str) -> Shown:
             panels[0], ("errors", "best"), ("as classified", "with a perfect classifier"), strict=True
         ):
             _boxes(panel, {learner: scores for learner, scores in found.items() if scores}, part)
-            panel.set(title=title, xlabel="training blocks")
+            panel.set(title=title, xlabel="training episodes")
         error_axis(panels[0][0])
         panels[0][1].legend(fontsize=8)
         save(figure, path)

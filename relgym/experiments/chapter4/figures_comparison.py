@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS
 from relgym.experiments.chapter4.canvas import COLOURS, TITLES, above, canvas, error_axis, mean_change, save
-from relgym.experiments.chapter4.figures_accuracy import scores_by_blocks
+from relgym.experiments.chapter4.figures_accuracy import scores_by_episodes
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import CLASSIFIER_ERRORS
@@ -25,16 +25,16 @@ _STYLES: Final = ((0.95, "-"), (0.75, "--"), (0.5, ":"))
 def lwr_shown(_: Protocol, values: Values) -> Shown:
     """Quantiles of LWR's errors in the x velocity of experiment 2, and our 95th percentile."""
     target = "ball.vx"
-    found = {group: scores_by_blocks(runs, target) for group, runs in values.items()}
-    heading = ["learner", "blocks", "p50", "p75", "p95"]
+    found = {group: scores_by_episodes(runs, target) for group, runs in values.items()}
+    heading = ["learner", "episodes", "p50", "p75", "p95"]
     lines: list[list[Cell]] = [
         [
             _title(group),
-            blocks,
+            episodes,
             *(f"{quantile(score['errors'], q):.1e}" for q in (0.5, 0.75, 0.95)),
         ]
         for group, scores in found.items()
-        for blocks, score in scores.items()
+        for episodes, score in scores.items()
     ]
 
     return Shown(table(heading, lines), [heading, *lines], lambda path: _draw_lwr(path, found))
@@ -54,7 +54,7 @@ def _draw_lwr(path: Path, found: Mapping[str, Mapping[int, Any]]) -> None:
     last = list(next(iter(found.values())).values())[-1]
     mean_change(panel, last["change"] / last["examples"])
     error_axis(panel)
-    panel.set_xlabel("training blocks")
+    panel.set_xlabel("training episodes")
     figure.legend(*panel.get_legend_handles_labels(), loc="outside right center", fontsize=8)
     save(figure, path)
 
@@ -72,25 +72,25 @@ def _title(group: str) -> str:
 # ------------------------------------------------------------------ figure 4.21
 def classifiers_shown(protocol: Protocol, values: Values) -> Shown:
     """Shares of misclassified examples of experiment 2; our learners' are those of wrong predictions."""
-    heading = ["target", "classifier", "features", "blocks", "wrong %", "printed %"]
+    heading = ["target", "classifier", "features", "episodes", "wrong %", "printed %"]
     rates = {group: _rates(runs) for group, runs in values.items()}
     lines: list[list[Cell]] = []
     for target in ("ball.vx", "ball.vy"):
         for group, found in rates.items():
             name, _, seen = group.partition("/")
             printed = CLASSIFIER_ERRORS.get("FOIL" if name == "thesis" else name, {})
-            for blocks, rate in found[target].items():
-                shown = printed.get(blocks) if target == "ball.vx" and seen != "contact" else None
+            for episodes, rate in found[target].items():
+                shown = printed.get(episodes) if target == "ball.vx" and seen != "contact" else None
                 percent = "" if shown is None else f"{100 * shown:g}"
                 lines.append(
-                    [target, TITLES.get(name, name), seen or "-", blocks, round(100 * rate, 3), percent]
+                    [target, TITLES.get(name, name), seen or "-", episodes, round(100 * rate, 3), percent]
                 )
 
     def draw(path: Path) -> None:
         figure, panels = canvas(13.0, 4.6, 1, 2, sharey=True)
         for panel, target in zip(panels[0], ("ball.vx", "ball.vy"), strict=True):
             _lines(panel, {group: found[target] for group, found in rates.items()})
-            panel.set(title=f"{target[-1]} velocity", xlabel="training blocks")
+            panel.set(title=f"{target[-1]} velocity", xlabel="training episodes")
         panels[0][0].set_ylabel("wrong, %")
         handles, labels = panels[0][0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside right center", fontsize=7)
@@ -100,14 +100,14 @@ def classifiers_shown(protocol: Protocol, values: Values) -> Shown:
 
 
 def _rates(runs: Sequence[Any]) -> dict[str, dict[int, float]]:
-    """Share of errors by target and number of training blocks, over all batches."""
+    """Share of errors by target and number of training episodes, over all batches."""
     found: dict[str, dict[int, float]] = {}
     for target in ("ball.vx", "ball.vy"):
         for k, each in enumerate(runs[0]["scores"]):
             parts = [run["scores"][k]["targets"][target] for run in runs]
             counts = [part.get("counted", part) for part in parts]
             rate = sum(c["wrong"] for c in counts) / sum(c["examples"] for c in counts)
-            found.setdefault(target, {})[each["blocks"]] = rate
+            found.setdefault(target, {})[each["episodes"]] = rate
     return found
 
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from relgym.envs.ball_box_ramp import configurations
 from relgym.experiments.analytic import contact_law
-from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.canvas import canvas, save
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.tables_modes import best_run
-from relgym.experiments.data import ball_blocks, truck_blocks
+from relgym.experiments.data import ball_episodes, truck_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.seeds import TRAINING_SEEDS
 from relgym.model.text import Cell, table
 
@@ -28,16 +28,16 @@ __all__ = [
 ]
 
 
-def _picture(panel: Any, block: Block, row: int, title: str, *, path: bool = False) -> None:
+def _picture(panel: Any, episode: Episode, row: int, title: str, *, path: bool = False) -> None:
     from relgym.envs.rendering import render_scene, scene_view
 
-    scene = block.scene(row)
+    scene = episode.scene(row)
     view = scene_view(scene)
     size = (480, max(1, round(480 * view.height / view.width)))
     right, top = view.left + view.width, view.bottom + view.height
     panel.imshow(render_scene(scene, size=size, view=view), extent=(view.left, right, view.bottom, top))
     if path:
-        places = block.columns("ball", "px", "py")
+        places = episode.columns("ball", "px", "py")
         panel.scatter(*places.T, c=np.arange(len(places)), cmap="plasma", s=4, linewidths=0)
     panel.set(xlim=(view.left, right), ylim=(view.bottom, top), xticks=[], yticks=[])
     panel.set_title(title, fontsize=8)
@@ -46,20 +46,20 @@ def _picture(panel: Any, block: Block, row: int, title: str, *, path: bool = Fal
 # ------------------------------------------------------------------ figure 3.1
 def layouts_shown(_: Protocol, __: Values) -> Shown:
     """The box pushing domain's four configurations."""
-    blocks = {
-        b.configuration["layout"]: b for b in truck_blocks(seed=TRAINING_SEEDS[0], repeats=1, order=None)
+    episodes = {
+        b.configuration["layout"]: b for b in truck_episodes(seed=TRAINING_SEEDS[0], repeats=1, order=None)
     }
-    names = sorted(blocks)
+    names = sorted(episodes)
     heading = ["configuration", "stacks, from the truck on"]
-    lines: list[list[Cell]] = [[name, str(blocks[name].truth.mode_names["truck.vx"])] for name in names]
+    lines: list[list[Cell]] = [[name, str(episodes[name].truth.mode_names["truck.vx"])] for name in names]
     for line, name in zip(lines, names, strict=True):
-        truth = blocks[name].truth
+        truth = episodes[name].truth
         line[1] = truth.mode_names["truck.vx"][int(truth.mode["truck.vx"][0])]
 
     def draw(path: Path) -> None:
         figure, panels = canvas(3.2 * len(names), 2.6, 1, len(names))
         for panel, name in zip(panels[0], names, strict=True):
-            _picture(panel, blocks[name], 0, f"configuration {name}")
+            _picture(panel, episodes[name], 0, f"configuration {name}")
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)
@@ -89,17 +89,17 @@ def parameters_shown(_: Protocol, __: Values) -> Shown:
 
 def configurations_shown(_: Protocol, __: Values) -> Shown:
     """Some initial configurations, with the paths that follow."""
-    blocks = list(ball_blocks(1, seed=TRAINING_SEEDS[0], blocks=40, order=None))[::7]
+    episodes = list(ball_episodes(1, seed=TRAINING_SEEDS[0], episodes=40, order=None))[::7]
     heading = ["ramp", "touching", "ball", "direction"]
-    lines: list[list[Cell]] = [[str(b.configuration[name]) for name in heading] for b in blocks]
+    lines: list[list[Cell]] = [[str(b.configuration[name]) for name in heading] for b in episodes]
 
     def draw(path: Path) -> None:
         figure, panels = canvas(12.0, 5.6, 2, 3)
-        for panel, block in zip(panels.flat, blocks, strict=True):
-            c = block.configuration
+        for panel, episode in zip(panels.flat, episodes, strict=True):
+            c = episode.configuration
             near = "touching" if c["touching"] else "apart"
             title = f"ramp {c['ramp']}, {near}, ball {c['ball']}, {c['direction']}"
-            _picture(panel, block, 0, title, path=True)
+            _picture(panel, episode, 0, title, path=True)
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)
@@ -130,10 +130,10 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
 
     def draw(path: Path) -> None:
         figure, panels = canvas(11.0, 4.0, 1, 2, width_ratios=(1, 1))
-        *_, block = ball_blocks(
-            1, seed=TRAINING_SEEDS[0], blocks=8, order=None
+        *_, episode = ball_episodes(
+            1, seed=TRAINING_SEEDS[0], episodes=8, order=None
         )  # the ball begins above an object
-        _picture(panels[0][0], block, 0, "path, coloured by time", path=True)
+        _picture(panels[0][0], episode, 0, "path, coloured by time", path=True)
         panels[0][1].set_axis_off()
         said = (" | ".join(clauses[m["mode"]])[:80] or "otherwise" for m in learned["modes"])
         text = "\n\n".join(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relgym.experiments.chapter4.canvas import FLOOR, TITLES, canvas, save
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
-from relgym.experiments.chapter4.rolled import trial_blocks
+from relgym.experiments.chapter4.rolled import trial_episodes
 from relgym.experiments.seeds import TEST_SEEDS
 from relgym.model.text import Cell, table
 from relgym.scene.objects import Scene
@@ -104,13 +104,13 @@ def _distance(trial: Mapping[str, Any]) -> float:
 def _draw_failure(path: Path, trial: Mapping[str, Any], number: int, text: str) -> None:
     from relgym.envs.rendering import render_scene, scene_view
 
-    block = trial_blocks(1, TEST_SEEDS[:2], number + 1)[number]
+    episode = trial_episodes(1, TEST_SEEDS[:2], number + 1)[number]
     begins, last = trial["begins"], len(trial["real"]) - 1
     steps = sorted({max(0, begins - 8), begins, min(last, begins + 6), (begins + last) // 2, last})
     figure, panels = canvas(3.4 * len(steps), 2.9, 1, len(steps))
-    radius = 0.5 * float(block.columns("ball", "sx")[0, 0])
+    radius = 0.5 * float(episode.columns("ball", "sx")[0, 0])
     for panel, step in zip(panels[0], steps, strict=True):
-        scene = Scene(block.schema, block.layout, block.vectors[step].copy())
+        scene = Scene(episode.schema, episode.layout, episode.vectors[step].copy())
         view = scene_view(scene)
         picture = render_scene(scene, size=(800, max(1, round(800 * view.height / view.width))), view=view)
         right, top = view.left + view.width, view.bottom + view.height

@@ -37,13 +37,13 @@ def trees_shown(_: Protocol, values: Values, number: str) -> Shown:
         found = [
             t
             for t in run["trees"]
-            if t["target"] == target and {rows.get(t["mode"]), rows.get(t["rival"])} == {first, second}
+            if t["target"] == target and {rows.get(t["mode"]), rows.get(t["other"])} == {first, second}
         ]
         if not found:
             texts.append(f"{TITLES[learner]}: {_without(rows, first, second)}")
             continue
         chosen = max(found, key=lambda t: sum(t["tree"]["positive"][:1]) + sum(t["tree"]["negative"][:1]))
-        trees[learner] = chosen | {"yes": rows[chosen["mode"]], "no": rows[chosen["rival"]]}
+        trees[learner] = chosen | {"yes": rows[chosen["mode"]], "no": rows[chosen["other"]]}
         tree = DecisionTree.from_dict(chosen["tree"])
         texts.append(
             f'{TITLES[learner]}, behind "{chosen["stage"]}"; yes: mode {trees[learner]["yes"]}\n{tree}'

@@ -12,18 +12,18 @@ import numpy as np
 
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
-from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.testing import TARGETS, confusions, scores_of
 from relgym.experiments.chapter4.weight import weight_of
-from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_blocks
+from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_episodes
+from relgym.experiments.episodes import Episode
 from relgym.model.report import report
 from relgym.model.text import plain
 from relgym.model.world_model import WorldModel
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["config_of", "fresh_blocks", "lesson", "taught_blocks"]
+__all__ = ["config_of", "fresh_episodes", "lesson", "taught_episodes"]
 
-_BLOCKS_PER_SEED: Final = 40
+_EPISODES_PER_SEED: Final = 40
 """Every configuration once (Table 4.1)."""
 
 
@@ -64,7 +64,7 @@ def lesson(
     tests: Mapping[str, Any],
     stages: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Train on one batch; test after some numbers of blocks.
+    """Train on one batch; test after some numbers of episodes.
 
     Parameters
     ----------
@@ -73,11 +73,11 @@ def lesson(
     experiment
         1, 2 or 3.
     seed, order
-        Of the training blocks.
+        Of the training episodes.
     checkpoints
-        After how many blocks to test; the last one ends the training.
+        After how many episodes to test; the last one ends the training.
     tests
-        ``seeds`` of the test scenes, and how many ``blocks`` in all.
+        ``seeds`` of the test scenes, and how many ``episodes`` in all.
     stages
         For transfer (§4.9): which object stands in the room, stage after stage of equal length, instead of both.
 
@@ -87,19 +87,19 @@ def lesson(
     spent on learning, bytes that it keeps.
     """
     laws = BALL_EXPERIMENTS[experiment].modes()
-    blocks = list(taught_blocks(experiment, seed, order, checkpoints[-1], stages))
-    fresh = fresh_blocks(experiment, tests)
-    model = WorldModel(blocks[0].schema, config_of(learner))
+    episodes = list(taught_episodes(experiment, seed, order, checkpoints[-1], stages))
+    fresh = fresh_episodes(experiment, tests)
+    model = WorldModel(episodes[0].schema, config_of(learner))
     scores, seconds = [], 0.0
-    for number, block in enumerate(blocks, start=1):
+    for number, episode in enumerate(episodes, start=1):
         start = perf_counter()
-        for transition in block.transitions():
+        for transition in episode.transitions():
             model.learn_one(transition)
         if number in checkpoints:
             model.finish()
         seconds += perf_counter() - start
         if number in checkpoints:
-            scores.append({"blocks": number, "targets": scores_of(model, fresh, laws)})
+            scores.append({"episodes": number, "targets": scores_of(model, fresh, laws)})
     return {
         "scores": scores,
         "report": plain(report(model)),
@@ -107,22 +107,22 @@ def lesson(
         "text": _text(model, BALL_EXPERIMENTS[experiment].incline),
         "trees": _trees(model),
         "confusions": confusions(model, fresh, laws),
-        "training": _mode_examples(blocks),
+        "training": _mode_examples(episodes),
         "seconds": seconds,
         "bytes": weight_of(model),
-        "corner_blocks": float(np.mean([b.truth.corner.any() for b in fresh])),
+        "corner_episodes": float(np.mean([b.truth.corner.any() for b in fresh])),
     }
 
 
-def taught_blocks(
+def taught_episodes(
     experiment: int, seed: int, order: int, count: int, stages: Sequence[str] = ()
-) -> Iterator[Block]:
-    """Training blocks; with stages, those of each kind of room, in the schema of the whole room."""
+) -> Iterator[Episode]:
+    """Training episodes; with stages, those of each kind of room, in the schema of the whole room."""
     if not stages:
-        yield from ball_blocks(experiment, seed=seed, blocks=count, order=order)
+        yield from ball_episodes(experiment, seed=seed, episodes=count, order=order)
         return
     setting = BALL_EXPERIMENTS[experiment]
-    whole = next(ball_blocks(experiment, seed=seed, blocks=1)).schema
+    whole = next(ball_episodes(experiment, seed=seed, episodes=1)).schema
     for k, kind in enumerate(stages):
         each = count // len(stages) + (k < count % len(stages))
         yield from _only(setting, kind, seed, order, each, whole)
@@ -130,21 +130,21 @@ def taught_blocks(
 
 def _only(
     setting: BallExperiment, kind: str, seed: int, order: int, count: int, whole: SceneSchema
-) -> Iterator[Block]:
-    rooms = ball_blocks(replace(setting, objects=(kind,)), seed=seed, blocks=count, order=order)
+) -> Iterator[Episode]:
+    rooms = ball_episodes(replace(setting, objects=(kind,)), seed=seed, episodes=count, order=order)
     for room in rooms:
         yield replace(room, schema=whole, layout=whole.layout(room.layout.names))
 
 
-def fresh_blocks(experiment: int, tests: Mapping[str, Any]) -> list[Block]:
-    """Test blocks: from every seed equally many of the configurations, all 40 when there are enough (§4.3.3)."""
+def fresh_episodes(experiment: int, tests: Mapping[str, Any]) -> list[Episode]:
+    """Test episodes: from every seed equally many of the configurations, all 40 when there are enough (§4.3.3)."""
     seeds = tests["seeds"]
-    each = -(-int(tests["blocks"]) // len(seeds))
-    cycle = max(each, _BLOCKS_PER_SEED)
+    each = -(-int(tests["episodes"]) // len(seeds))
+    cycle = max(each, _EPISODES_PER_SEED)
     return [
-        block
+        episode
         for seed in seeds
-        for block in islice(ball_blocks(experiment, seed=seed, blocks=cycle, test=True), each)
+        for episode in islice(ball_episodes(experiment, seed=seed, episodes=cycle, test=True), each)
     ]
 
 
@@ -185,22 +185,22 @@ def _trees(model: WorldModel) -> list[dict[str, Any]]:
             continue
         functions = {mode.id: mode.formula(3) for mode in part.modes}
         for pair in part.classifier.classifiers:
-            rival = pair.i if pair.positive == pair.j else pair.j
+            other = pair.i if pair.positive == pair.j else pair.j
             stages = [*map(str, pair.definition.clauses), "otherwise"]
             for stage, tree in zip(stages, (*pair.clause_trees, pair.fall_through_tree), strict=True):
                 if tree is not None:
-                    about = {"target": target, "mode": pair.positive, "rival": rival, "stage": stage}
-                    sides = {"yes": functions.get(pair.positive, ""), "no": functions.get(rival, "")}
+                    about = {"target": target, "mode": pair.positive, "other": other, "stage": stage}
+                    sides = {"yes": functions.get(pair.positive, ""), "no": functions.get(other, "")}
                     found.append({**about, **sides, "tree": tree.to_dict()})
     return found
 
 
-def _mode_examples(blocks: Sequence[Block]) -> dict[str, dict[str, int]]:
+def _mode_examples(episodes: Sequence[Episode]) -> dict[str, dict[str, int]]:
     """Training examples of every true mode, by target."""
     found: dict[str, dict[str, int]] = {}
     for target in TARGETS:
-        names = blocks[0].truth.mode_names[target]
-        truth = np.concatenate([b.truth.mode[target] for b in blocks])
+        names = episodes[0].truth.mode_names[target]
+        truth = np.concatenate([b.truth.mode[target] for b in episodes])
         found[target] = {name: int((truth == k).sum()) for k, name in enumerate(names)}
         found[target]["several contacts or a corner"] = int((truth < 0).sum())
     return found

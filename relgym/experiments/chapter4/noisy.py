@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from relgym.config import ModelConfig
-from relgym.experiments.chapter4.lesson import config_of, fresh_blocks, taught_blocks
+from relgym.experiments.chapter4.lesson import config_of, fresh_episodes, taught_episodes
 from relgym.experiments.noise import corrupted, shortfall
 from relgym.experiments.online import learned
 
@@ -22,7 +22,7 @@ def lesson(
     true: float,
     seed: int,
     order: int,
-    blocks: int,
+    episodes: int,
     tests: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Train and test on experiment 1 through noise.
@@ -34,7 +34,7 @@ def lesson(
         estimates it; ``"default"``: relgym as it comes.
     true
         Variance of the noise.
-    seed, order, blocks, tests
+    seed, order, episodes, tests
         As of `relgym.experiments.chapter4.lesson.lesson`.
 
     Returns
@@ -42,9 +42,9 @@ def lesson(
     Plain data: by target the mode-averaged median error, and the number of modes.
     """
     rng = np.random.default_rng([seed, order])
-    taught = [corrupted(b, true, rng=rng) for b in taught_blocks(1, seed, order, blocks)]
+    taught = [corrupted(b, true, rng=rng) for b in taught_episodes(1, seed, order, episodes)]
     model = learned(taught, config=_config(expected))
-    fresh = [corrupted(b, true, rng=rng) for b in fresh_blocks(1, tests)]
+    fresh = [corrupted(b, true, rng=rng) for b in fresh_episodes(1, tests)]
     return {
         "errors": {str(t): shortfall(model, fresh, str(t)) for t in model.targets},
         "modes": {str(t): len(model.modes(t.type, t.property)) for t in model.targets},

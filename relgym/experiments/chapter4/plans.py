@@ -64,7 +64,7 @@ def ablations(protocol: Protocol) -> Plan:
     plan: dict[str, list[Task]] = {}
     for experiment in (1, 2):
         last = {experiment: protocol.after(experiment)[-1:]}
-        whole = replace(protocol, test_blocks=WHOLE_TEST, checkpoints=last)
+        whole = replace(protocol, test_episodes=WHOLE_TEST, checkpoints=last)
         for learner in ABLATIONS:
             plan[f"{experiment}/{learner}"] = [_lesson(whole, experiment, learner, run) for run in runs]
     return plan
@@ -101,7 +101,7 @@ def rollouts(protocol: Protocol) -> Plan:
         "experiment": 1,
         "seed": run.seed,
         "order": run.order,
-        "blocks": protocol.after(1)[-1],
+        "episodes": protocol.after(1)[-1],
         "tests": list(TEST_SEEDS[:2]),
         "trials": protocol.trials,
     }
@@ -123,7 +123,7 @@ def noise(protocol: Protocol) -> Plan:
                     "true": true,
                     "seed": run.seed,
                     "order": run.order,
-                    "blocks": protocol.after(1)[-1],
+                    "episodes": protocol.after(1)[-1],
                     "tests": protocol.tests(),
                 }
                 task = Task(f"{_ROOM}.noisy:lesson", arguments, f"expected {expected}")
@@ -184,8 +184,8 @@ def tunings(protocol: Protocol) -> Plan:
                         "experiment": 2,
                         "seed": TUNING_SEEDS[0],
                         "order": 0,
-                        "checkpoints": [protocol.tuning_blocks],
-                        "tests": {"seeds": [TUNING_TEST_SEED], "blocks": 12},
+                        "checkpoints": [protocol.tuning_episodes],
+                        "tests": {"seeds": [TUNING_TEST_SEED], "episodes": 12},
                         "setting": number,
                     }
                     task = Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}")

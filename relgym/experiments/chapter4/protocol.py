@@ -12,10 +12,10 @@ from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS
 __all__ = ["ABLATIONS", "LEARNERS", "WHOLE_TEST", "Batch", "Protocol"]
 
 ORDERS: Final = 10
-"""Block orders of the thesis; with its five seeds they make 50 batches (§4.2)."""
+"""Episode orders of the thesis; with its five seeds they make 50 batches (§4.2)."""
 
 WHOLE_TEST: Final = 120
-"""Blocks of the thesis' test set: 24,000 examples (§4.3.3)."""
+"""Episodes of the thesis' test set: 24,000 examples (§4.3.3)."""
 
 LEARNERS: Final[Mapping[str, str]] = {
     "original": "the thesis' program: ModelConfig.original()",
@@ -50,10 +50,10 @@ class Protocol:
     ----------
     batches
         Trainings per learner, of at most 50 (§4.2); the first ones differ in both seed and order.
-    test_blocks
-        Blocks of 200 examples tested on, from three other seeds in equal parts; 120 in the thesis (24,000 examples).
+    test_episodes
+        Episodes of 200 examples tested on, from three other seeds in equal parts; 120 in the thesis (24,000 examples).
     checkpoints
-        Per ball experiment: after how many blocks to test. The last number is the length of the training.
+        Per ball experiment: after how many episodes to test. The last number is the length of the training.
     noise_batches
         Trainings per cell of the noise sweep; 15 in the thesis (§4.6).
     variances
@@ -66,12 +66,12 @@ class Protocol:
         Trainings per learner in experiment 3, whose trainings are the longest.
     comparison_batches
         Trainings per baseline.
-    tuning_blocks
-        Blocks on which settings of baselines are compared, with tuning seeds.
+    tuning_episodes
+        Episodes on which settings of baselines are compared, with tuning seeds.
     """
 
     batches: int = 50
-    test_blocks: int = WHOLE_TEST
+    test_episodes: int = WHOLE_TEST
     checkpoints: Mapping[int, tuple[int, ...]] | None = None
     noise_batches: int = 15
     variances: tuple[float, ...] = (1e-20, 1e-15, 1e-10, 1e-8, 1e-5)
@@ -79,7 +79,7 @@ class Protocol:
     trials: int = 80
     long_batches: int = 50
     comparison_batches: int = 50
-    tuning_blocks: int = 40
+    tuning_episodes: int = 40
 
     @classmethod
     def thesis(cls, batches: int = 50) -> Protocol:
@@ -106,18 +106,18 @@ class Protocol:
         _check(batches)
         return cls(
             batches,
-            test_blocks=12,
+            test_episodes=12,
             checkpoints={1: (16, 80), 2: (16, 80, 160), 3: (80, 160)},
             noise_batches=1,
             variances=(1e-15, 1e-10, 1e-5),
             transfer_batches=min(batches, 2),
             long_batches=1,
             comparison_batches=1,
-            tuning_blocks=8,
+            tuning_episodes=8,
         )
 
     def after(self, experiment: int) -> tuple[int, ...]:
-        """After how many blocks a ball experiment tests."""
+        """After how many episodes a ball experiment tests."""
         if self.checkpoints is not None:
             return self.checkpoints[experiment]
         whole = {1: 80, 2: 160, 3: 480}[experiment]
@@ -134,7 +134,7 @@ class Protocol:
 
     def tests(self) -> dict[str, Any]:
         """Arguments that say which examples to test on."""
-        return {"seeds": list(TEST_SEEDS), "blocks": self.test_blocks}
+        return {"seeds": list(TEST_SEEDS), "episodes": self.test_episodes}
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

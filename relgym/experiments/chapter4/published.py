@@ -161,24 +161,24 @@ CLASSIFIER_ERRORS: Final[Mapping[str, Mapping[int, float]]] = {
     "svm": {32: 0.177, 160: 0.082},
     "knn-10": {32: 0.307, 160: 0.259},
 }
-"""Figure 4.21 as its text gives it (§4.7.2): misclassified x modes of experiment 2 after so many blocks."""
+"""Figure 4.21 as its text gives it (§4.7.2): misclassified x modes of experiment 2 after so many episodes."""
 
 REMARKS: Final[Mapping[str, str]] = {
     "table-4.4": 'headed "Mode 1 vs. 2", but its text and counts are of modes 2 and 3',
-    "figure-4.3": "95 % of all errors below 1e-12 from 16 blocks on",
-    "figure-4.4": "bounces and ramp with high errors for many blocks, low ones after 80",
+    "figure-4.3": "95 % of all errors below 1e-12 from 16 episodes on",
+    "figure-4.4": "bounces and ramp with high errors for many episodes, low ones after 80",
     "figure-4.5": "the same; the third quartile of floor bounces never improves",
-    "figure-4.6": "y: 2 % after 80 blocks by the text (1.1 % by Table 4.8), mostly misclassified; x 0.5 % by Table 4.7",
-    "figure-4.7": "essentially zero after 32 blocks if the right mode is always chosen",
+    "figure-4.6": "y: 2 % after 80 episodes by the text (1.1 % by Table 4.8), mostly misclassified; x 0.5 % by Table 4.7",
+    "figure-4.7": "essentially zero after 32 episodes if the right mode is always chosen",
     "figure-4.12": "as in experiment 1, most modes are learned very quickly",
     "figure-4.13": "the halt's errors stay high throughout",
     "figure-4.14": "floor bounces' errors stay high throughout",
-    "figure-4.15": "x 3.6 %, y 1.3 % after 160 blocks",
+    "figure-4.15": "x 3.6 %, y 1.3 % after 160 episodes",
     "figure-4.16": "no number; the extra modes are accommodated",
     "figure-4.17": "slightly higher than in experiment 2",
     "figure-4.18": "expecting too little, modes are lost once the noise exceeds it (none learned at 1e-5); expecting "
     "1e-5, they are overgeneral",
-    "figure-4.19": "median above our 95th percentile until 128 blocks, then a drop; the third quartile never below the "
+    "figure-4.19": "median above our 95th percentile until 128 episodes, then a drop; the third quartile never below the "
     "change",
     "figure-4.20": "uncentred: all three worse than in Figure 4.19",
     "figure-4.22": "26 of 80 trials with a significant error",
@@ -205,7 +205,7 @@ class PublishedPair:
     """A section of Table 4.3: the modes, whether it is marked "Negated", and its training performance."""
 
     mode: int
-    rival: int
+    other: int
     negated: bool
     performance: float
     clauses: tuple[PublishedClause, ...]
@@ -224,11 +224,11 @@ def published_pairs(table: str) -> tuple[PublishedPair, ...]:
             clauses.append(PublishedClause(clause, int(correct), int(incorrect), tree == "yes"))
             pairs[-1] = PublishedPair(*_head(pairs[-1]), tuple(clauses))
         else:
-            mode, rival, sign, performance = line.split()
+            mode, other, sign, performance = line.split()
             clauses = []
-            pairs.append(PublishedPair(int(mode), int(rival), sign == "negated", float(performance), ()))
+            pairs.append(PublishedPair(int(mode), int(other), sign == "negated", float(performance), ()))
     return tuple(pairs)
 
 
 def _head(pair: PublishedPair) -> tuple[int, int, bool, float]:
-    return pair.mode, pair.rival, pair.negated, pair.performance
+    return pair.mode, pair.other, pair.negated, pair.performance

@@ -8,7 +8,7 @@ from typing import Any
 from relgym.config import ModelConfig
 from relgym.experiments.analytic import truck_modes
 from relgym.experiments.chapter4.lesson import config_of
-from relgym.experiments.data import truck_blocks
+from relgym.experiments.data import truck_episodes
 from relgym.experiments.online import learned
 from relgym.experiments.truck_check import truck_mode_of
 from relgym.model.report import report
@@ -25,7 +25,7 @@ def lesson(*, learner: str, seed: int, repeats: int = 2) -> dict[str, Any]:
     learner
         Name of a configuration (`relgym.experiments.chapter4.protocol.LEARNERS`).
     seed
-        Of the training blocks.
+        Of the training episodes.
     repeats
         How often each permutation is shown; 2 in the thesis (1,920 examples).
 
@@ -33,7 +33,7 @@ def lesson(*, learner: str, seed: int, repeats: int = 2) -> dict[str, Any]:
     -------
     Plain data: the model's report, and which row of Table 3.1 each mode states (-1: none).
     """
-    model = learned(truck_blocks(seed=seed, repeats=repeats), config=_config(learner))
+    model = learned(truck_episodes(seed=seed, repeats=repeats), config=_config(learner))
     laws = truck_modes(3)
     part = model.property_model("truck", "vx")
     known = {law: row for row, law in enumerate(laws)}

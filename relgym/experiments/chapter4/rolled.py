@@ -10,14 +10,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.lesson import config_of
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
+from relgym.experiments.episodes import Episode
 from relgym.experiments.online import learned
 from relgym.experiments.rollouts import STRAY
 from relgym.model.world_model import WorldModel
 
-__all__ = ["CAUSES", "cause_of", "imagine", "trial_blocks"]
+__all__ = ["CAUSES", "cause_of", "imagine", "trial_episodes"]
 
 CAUSES: Final = (
     "bad collision resolution, vertical",
@@ -50,13 +50,13 @@ _RECENT: Final = 3
 
 
 def imagine(
-    *, learner: str, experiment: int, seed: int, order: int, blocks: int, tests: Sequence[int], trials: int
+    *, learner: str, experiment: int, seed: int, order: int, episodes: int, tests: Sequence[int], trials: int
 ) -> dict[str, Any]:
     """Train on one batch, then imagine whole episodes from their first scenes.
 
     Parameters
     ----------
-    learner, experiment, seed, order, blocks
+    learner, experiment, seed, order, episodes
         The training (`relgym.experiments.chapter4.lesson`).
     tests
         Seeds of the scenes, each shown in all 40 configurations as long as there are trials left.
@@ -67,32 +67,34 @@ def imagine(
     -------
     Plain data: errors of both coordinates by trial and step, paths, cause of every failure, counts of the bounces.
     """
-    model = learned(ball_blocks(experiment, seed=seed, order=order, blocks=blocks), config=config_of(learner))
-    real = trial_blocks(experiment, tests, trials)
+    model = learned(
+        ball_episodes(experiment, seed=seed, order=order, episodes=episodes), config=config_of(learner)
+    )
+    real = trial_episodes(experiment, tests, trials)
     dreamed, steps = _dreams(model, real)
     bounces = Counter[str]()
-    for block in real:
-        bounces.update(_surfaces(block, experiment))
+    for episode in real:
+        bounces.update(_surfaces(episode, experiment))
     tried = [_trial(*each, experiment) for each in zip(real, dreamed, steps, strict=True)]
     return {"trials": tried, "bounces": dict(sorted(bounces.items()))}
 
 
-def trial_blocks(experiment: int, tests: Sequence[int], trials: int) -> list[Block]:
+def trial_episodes(experiment: int, tests: Sequence[int], trials: int) -> list[Episode]:
     """What really happens in the trials: number k shows configuration ``k mod 40``, one seed after the other."""
-    found: list[Block] = []
+    found: list[Episode] = []
     for seed in tests:
         count = min(_CONFIGURATIONS, trials - len(found))
-        rooms = ball_blocks(experiment, seed=seed, blocks=_CONFIGURATIONS, order=None, test=True)
+        rooms = ball_episodes(experiment, seed=seed, episodes=_CONFIGURATIONS, order=None, test=True)
         found += islice(rooms, count)
     return found
 
 
-def _dreams(model: WorldModel, real: Sequence[Block]) -> tuple[NDArray[np.float64], list[int]]:
+def _dreams(model: WorldModel, real: Sequence[Episode]) -> tuple[NDArray[np.float64], list[int]]:
     """All roll-outs side by side, shape ``(trials, steps + 1, width)``, and how many steps of each were predicted.
 
     One that stopped repeats its last scene.
     """
-    truth = np.stack([block.vectors for block in real])
+    truth = np.stack([episode.vectors for episode in real])
     dreamed, steps = np.repeat(truth[:, :1], truth.shape[1], axis=1), [truth.shape[1] - 1] * len(truth)
     going = np.arange(len(truth))
     for k in range(1, truth.shape[1]):
@@ -104,21 +106,21 @@ def _dreams(model: WorldModel, real: Sequence[Block]) -> tuple[NDArray[np.float6
     return dreamed, steps
 
 
-def _trial(block: Block, dreamed: NDArray[np.float64], steps: int, experiment: int) -> dict[str, Any]:
-    ball = block.layout.index("ball")
-    places = [block.layout.column(ball, prop) for prop in ("px", "py")]
-    off = np.abs(dreamed[:, places] - block.vectors[:, places])
+def _trial(episode: Episode, dreamed: NDArray[np.float64], steps: int, experiment: int) -> dict[str, Any]:
+    ball = episode.layout.index("ball")
+    places = [episode.layout.column(ball, prop) for prop in ("px", "py")]
+    off = np.abs(dreamed[:, places] - episode.vectors[:, places])
     off[steps + 1 :] = np.inf  # it said nothing there
     failed = bool((off > STRAY).any())
     begins = int(np.argmax((off > _SIGNIFICANT).any(axis=1))) if failed else -1
     return {
         "errors": [[_finite(v) for v in column] for column in off.T.tolist()],
-        "corner": bool(block.truth.corner.any()),
+        "corner": bool(episode.truth.corner.any()),
         "failed": failed,
-        "stopped": steps < len(block),
+        "stopped": steps < len(episode),
         "begins": begins,
-        "cause": cause_of(block, begins - 1, experiment) if failed else "",
-        "real": block.vectors[:, places].tolist(),
+        "cause": cause_of(episode, begins - 1, experiment) if failed else "",
+        "real": episode.vectors[:, places].tolist(),
         "imagined": dreamed[:, places].tolist(),
     }
 
@@ -128,24 +130,24 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def cause_of(block: Block, step: int, experiment: int) -> str:
+def cause_of(episode: Episode, step: int, experiment: int) -> str:
     """Which row of Table 4.18 a failure belongs to, by what really happened in the step that went wrong.
 
     Nothing is read from the model: it erred there, and the engine's own log says what it should have predicted.
 
     Parameters
     ----------
-    block
+    episode
         What really happened.
     step
         The first transition whose result is off.
     experiment
         1 or 2.
     """
-    surfaces = _surface_names(block, experiment)
-    if block.truth.corner[step]:
+    surfaces = _surface_names(episode, experiment)
+    if episode.truth.corner[step]:
         return "bounce against a corner"
-    if block.truth.active[step] > 1:
+    if episode.truth.active[step] > 1:
         return "several contacts at once"
     if surfaces[step] in ("vertical", "slope"):
         return "misclassified ramp bounce"
@@ -159,22 +161,22 @@ def cause_of(block: Block, step: int, experiment: int) -> str:
     return "other"
 
 
-def _surfaces(block: Block, experiment: int) -> Mapping[str, int]:
+def _surfaces(episode: Episode, experiment: int) -> Mapping[str, int]:
     """How many bounces there were against which kind of surface."""
-    names = _surface_names(block, experiment)
+    names = _surface_names(episode, experiment)
     return Counter(name for name in names if name in ("vertical", "slope", "level"))
 
 
-def _surface_names(block: Block, experiment: int) -> list[str]:
+def _surface_names(episode: Episode, experiment: int) -> list[str]:
     """Per transition: what the ball was pushed by; ``none``, ``slide``, ``level``, ``vertical``, ``slope``, ``?``."""
     modes = BALL_EXPERIMENTS[experiment].modes()
     kinds = []
     for listed, axis in ((modes.x, "ball.vx"), (modes.y, "ball.vy")):
         options = [{_kind(case.surface, case.sliding) for case in mode.cases} for mode in listed]
-        kinds.append([options[k] if k >= 0 else {"?"} for k in block.truth.mode[axis].tolist()])
+        kinds.append([options[k] if k >= 0 else {"?"} for k in episode.truth.mode[axis].tolist()])
     return [
         "none" if active == 0 else next(iter(sorted((x & y) - {"none"})), "?")
-        for x, y, active in zip(*kinds, block.truth.active.tolist(), strict=True)
+        for x, y, active in zip(*kinds, episode.truth.active.tolist(), strict=True)
     ]
 
 

@@ -65,7 +65,7 @@ def quantile(errors: Histogram, share: float) -> float:
 
 
 def mode_score(
-    name: str, residual: _Floats, silent: _Bools, best: _Floats | None, change: _Floats
+    name: str, residual: _Floats, abstained: _Bools, best: _Floats | None, change: _Floats
 ) -> dict[str, Any]:
     """Score of the examples of one true mode, or of all.
 
@@ -75,19 +75,19 @@ def mode_score(
         The mode's.
     residual
         Absolute errors, shape ``(n,)``.
-    silent
+    abstained
         Which ones no mode predicted.
     best
         Least absolute error of any learned mode; none for learners without modes.
     change
         How much the value really changed.
     """
-    wrong = (residual > TOLERANCE) | silent
+    wrong = (residual > TOLERANCE) | abstained
     score: dict[str, Any] = {
         "name": name,
         "examples": len(residual),
         "wrong": int(wrong.sum()),
-        "silent": int(silent.sum()),
+        "abstained": int(abstained.sum()),
         "change": float(np.abs(change).sum()),
         "sum": float(residual.sum()),
         "errors": histogram(residual),
@@ -97,8 +97,8 @@ def mode_score(
         score |= {
             "unlearned": int((wrong & ~known).sum()),
             "misclassified": int((wrong & known).sum()),
-            "strict": int((silent | (residual > best + TOLERANCE)).sum()),
-            "literal": int((silent | (residual > best)).sum()),
+            "strict": int((abstained | (residual > best + TOLERANCE)).sum()),
+            "literal": int((abstained | (residual > best)).sum()),
             "best": histogram(best),
         }
     return score
@@ -109,7 +109,7 @@ def target_score(
     truth: NDArray[np.int64],
     counted: _Bools,
     residual: _Floats,
-    silent: _Bools,
+    abstained: _Bools,
     best: _Floats | None,
     change: _Floats,
 ) -> dict[str, Any]:
@@ -123,13 +123,13 @@ def target_score(
         Number of each example's true mode, -1 where no single one applies.
     counted
         Which examples some linear law explains (`relgym.experiments.evaluate.explicable`).
-    residual, silent, best, change
+    residual, abstained, best, change
         As of `mode_score`.
     """
 
     def score(name: str, part: _Bools) -> dict[str, Any]:
         mine = None if best is None else best[part]
-        return mode_score(name, residual[part], silent[part], mine, change[part])
+        return mode_score(name, residual[part], abstained[part], mine, change[part])
 
     numbers = sorted(set(np.unique(truth[counted]).tolist()), key=lambda k: (k < 0, k))
     modes = [

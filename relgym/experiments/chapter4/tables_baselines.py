@@ -28,7 +28,7 @@ _MEASURES: Final = ("p50", "p95", "p99.9", "mean", "modes")
 
 def headline_shown(_: Protocol, values: Values) -> Shown:
     """Every baseline against our learner that saw the same: who errs less, by training size and measure."""
-    heading = ["baseline", "features", "target", "blocks", *_MEASURES, "lost"]
+    heading = ["baseline", "features", "target", "episodes", *_MEASURES, "lost"]
     lines: list[list[Cell]] = []
     counts = {seen: Counter[str]() for seen in _OURS}
     losses: list[list[Cell]] = []
@@ -38,14 +38,14 @@ def headline_shown(_: Protocol, values: Values) -> Shown:
             lines += [[TITLES[name], seen, target, b, *_texts(m), ""] for b, m in known[seen].items()]
         for group in (group for group in values if "/" in group):
             baseline, seen = group.split("/")
-            for blocks, found in _measures(values[group], target).items():
-                cells = list(zip(_MEASURES, found, known[seen][blocks], strict=True))
+            for episodes, found in _measures(values[group], target).items():
+                cells = list(zip(_MEASURES, found, known[seen][episodes], strict=True))
                 counts[seen].update(_result(theirs, ours) for _, theirs, ours in cells)
                 lost = [(m, theirs, ours) for m, theirs, ours in cells if _result(theirs, ours) == "behind"]
-                about = [REGRESSORS[baseline].title, seen, target, blocks]
+                about = [REGRESSORS[baseline].title, seen, target, episodes]
                 lines.append([*about, *_texts(found), " ".join(m for m, *_ in lost)])
                 losses += [
-                    [*about, m, *_texts([ours, theirs]), _cause(values[_OURS[seen]], target, blocks, m)]
+                    [*about, m, *_texts([ours, theirs]), _cause(values[_OURS[seen]], target, episodes, m)]
                     for m, theirs, ours in lost
                 ]
     parts = [_score(counts), table(heading, lines), _NOTE, _losses(losses), _cost(values)]
@@ -73,7 +73,7 @@ def _losses(losses: Sequence[Sequence[Cell]]) -> str:
         "lost to",
         "features",
         "target",
-        "blocks",
+        "episodes",
         "measure",
         "ours",
         "theirs",
@@ -82,9 +82,9 @@ def _losses(losses: Sequence[Sequence[Cell]]) -> str:
     return f"{table(heading, losses)}\n\nnot learned: no learned mode explains the example; others are misclassified."
 
 
-def _cause(runs: Sequence[Any], target: str, blocks: int, measure: str) -> str:
+def _cause(runs: Sequence[Any], target: str, episodes: int, measure: str) -> str:
     """The true mode that our learner's error is mostly of, and whether it was learned."""
-    parts = [s["targets"][target] for run in runs for s in run["scores"] if s["blocks"] == blocks]
+    parts = [s["targets"][target] for run in runs for s in run["scores"] if s["episodes"] == episodes]
     modes = _pooled_modes(parts)
     worth = {m["name"]: quantile(m["errors"], 0.5) if measure == "modes" else m["sum"] for m in modes}
     corners = sum(p["all"]["sum"] - p["counted"]["sum"] for p in parts)
@@ -132,7 +132,7 @@ def _measures(runs: Sequence[Any], target: str) -> dict[int, list[float]]:
         every = pooled_scores(part["all"] for part in parts)
         medians = [quantile(mode["errors"], 0.5) for mode in _pooled_modes(parts)]
         quantiles = [quantile(every["errors"], q) for q in (0.5, 0.95, 0.999)]
-        found[each["blocks"]] = [*quantiles, every["sum"] / every["examples"], mean(medians)]
+        found[each["episodes"]] = [*quantiles, every["sum"] / every["examples"], mean(medians)]
     return found
 
 

@@ -63,28 +63,28 @@ def _renamed(run: Mapping[str, Any], target: str, rows: Mapping[int, int]) -> _P
     found = next(t for t in run["report"]["targets"] if t["target"] == target)
     pairs = {}
     for pair in found["pairs"]:
-        mode, rival = rows.get(pair["mode"], 0), rows.get(pair["rival"], 0)
-        if mode and rival:
-            pairs[frozenset((mode, rival))] = pair | {"mode": mode, "rival": rival}
+        mode, other = rows.get(pair["mode"], 0), rows.get(pair["other"], 0)
+        if mode and other:
+            pairs[frozenset((mode, other))] = pair | {"mode": mode, "other": other}
     return pairs
 
 
 def _pairs_shown(sections: Sequence[PublishedPair], named: Mapping[str, _Pairs]) -> Shown:
     texts: list[str] = []
-    data: list[list[Cell]] = [["learner", "mode", "rival", *_HEADING]]
+    data: list[list[Cell]] = [["learner", "mode", "other", *_HEADING]]
     for section in sections:
         lines: list[list[Cell]] = [
             [c.clause, c.correct, c.incorrect, "yes" if c.tree else "no"] for c in section.clauses
         ]
         parts = [
             (
-                f"{PRINTED}: mode {section.mode} vs. {section.rival} (train perf. {section.performance:.4f})",
+                f"{PRINTED}: mode {section.mode} vs. {section.other} (train perf. {section.performance:.4f})",
                 lines,
             )
         ]
-        data += [[PRINTED, section.mode, section.rival, *line] for line in lines]
+        data += [[PRINTED, section.mode, section.other, *line] for line in lines]
         for learner, pairs in named.items():
-            pair = pairs.get(frozenset((section.mode, section.rival)))
+            pair = pairs.get(frozenset((section.mode, section.other)))
             if pair is None:
                 parts.append((f"{TITLES[learner]}: has not both modes", []))
                 continue
@@ -92,9 +92,9 @@ def _pairs_shown(sections: Sequence[PublishedPair], named: Mapping[str, _Pairs])
             right, wrong = sum(r["correct"] for r in pair["rows"]), sum(r["incorrect"] for r in pair["rows"])
             share = right / max(right + wrong, 1)
             parts.append(
-                (f"{TITLES[learner]}: mode {pair['mode']} rather than {pair['rival']} ({share:.4f})", own)
+                (f"{TITLES[learner]}: mode {pair['mode']} rather than {pair['other']} ({share:.4f})", own)
             )
-            data += [[learner, pair["mode"], pair["rival"], *line] for line in own]
+            data += [[learner, pair["mode"], pair["other"], *line] for line in own]
         texts.append(_section(parts))
     note = "Modes are numbered as in the thesis. The default learner needs no clauses where laws of contacts govern."
     return Shown("\n\n".join([*texts, note]), data)

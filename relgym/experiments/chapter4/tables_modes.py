@@ -63,7 +63,7 @@ def modes_shown(_: Protocol, values: Values, experiment: int) -> Shown:
         rows += [[axis, *line] for line in lines]
     note = (
         "A dash: no learned mode states this function. Each column is the batch that errs least; "
-        f"printed: of {amount(BALL_EXPERIMENTS[experiment].blocks * 200, 'example')}.\n"
+        f"printed: of {amount(BALL_EXPERIMENTS[experiment].episodes * 200, 'example')}.\n"
         "The default learner has laws of contacts instead of these modes; the functions that follow from them:"
     )
     law_text = next((run["text"] for name, run in runs.items() if name == "default"), "")

@@ -1,4 +1,4 @@
-"""Tests of a model on fresh blocks: errors by true mode, and which modes are taken for which (§4.3.3, §4.3.4)."""
+"""Tests of a model on fresh episodes: errors by true mode, and which modes are taken for which (§4.3.3, §4.3.4)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from relgym.clustering.roles import bind
 from relgym.experiments.analytic import AnalyticModes
-from relgym.experiments.blocks import Block
 from relgym.experiments.chapter4.scores import target_score
+from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import TOLERANCE, explicable, mode_labels
 from relgym.model.perception import Perception
 from relgym.model.prediction import OUTCOMES, Outcome
@@ -24,27 +24,27 @@ TARGETS: Final = ("ball.vx", "ball.vy")
 _SPOKE: Final = OUTCOMES.index(Outcome.PREDICTED)
 
 
-def scores_of(model: WorldModel, blocks: Sequence[Block], laws: AnalyticModes) -> dict[str, Any]:
-    """Errors of a model on blocks, by target, as plain data (`relgym.experiments.chapter4.scores`)."""
+def scores_of(model: WorldModel, episodes: Sequence[Episode], laws: AnalyticModes) -> dict[str, Any]:
+    """Errors of a model on episodes, by target, as plain data (`relgym.experiments.chapter4.scores`)."""
     names = mode_labels(laws)
     found: dict[str, list[tuple[NDArray[Any], ...]]] = {target: [] for target in TARGETS}
-    for part in _alike(blocks):
+    for part in _alike(episodes):
         for target, columns in _columns(model, part, laws).items():
             found[target].append(columns)
     return {target: target_score(names[target], *_joined(parts)) for target, parts in found.items()}
 
 
 def _joined(parts: Sequence[tuple[NDArray[Any], ...]]) -> tuple[Any, ...]:
-    truth, counted, residual, silent, best, change = (
+    truth, counted, residual, abstained, best, change = (
         np.concatenate(column) for column in zip(*parts, strict=True)
     )
-    return truth, counted, residual, silent, (None if np.isnan(best).all() else best), change
+    return truth, counted, residual, abstained, (None if np.isnan(best).all() else best), change
 
 
 def _columns(
-    model: WorldModel, part: Sequence[Block], laws: AnalyticModes
+    model: WorldModel, part: Sequence[Episode], laws: AnalyticModes
 ) -> dict[str, tuple[NDArray[Any], ...]]:
-    """Per target: truth, counted, residual, silent, best residual of a learned mode (NaN if there are laws), change."""
+    """Per target: truth, counted, residual, abstained, best residual of a learned mode (NaN if there are laws), change."""
     layout = part[0].layout
     before = np.concatenate([b.vectors[:-1] for b in part])
     after = np.concatenate([b.vectors[1:] for b in part])
@@ -72,14 +72,14 @@ def _columns(
     return found
 
 
-def true_modes(block: Block, target: str, laws: AnalyticModes) -> NDArray[np.int64]:
+def true_modes(episode: Episode, target: str, laws: AnalyticModes) -> NDArray[np.int64]:
     """Number of each transition's analytic mode; where several contacts act at once, of the simplest that explains it.
 
     A ball that slides into a wall is touched twice, and each coordinate follows one of the two. Shape ``(n,)``; -1
     where no mode explains the step.
     """
-    numbers = block.truth.mode[target].copy()
-    v = block.columns("ball", "vx", "vy")
+    numbers = episode.truth.mode[target].copy()
+    v = episode.columns("ball", "vx", "vy")
     explaining = laws.explaining(target[-1], v[:-1], v[1:], TOLERANCE)
     unlabelled = (numbers < 0) & explaining.any(axis=1)
     sizes = [
@@ -91,7 +91,7 @@ def true_modes(block: Block, target: str, laws: AnalyticModes) -> NDArray[np.int
 
 
 def _mode_values(
-    model: WorldModel, part: Sequence[Block], target: str, before: NDArray[np.float64]
+    model: WorldModel, part: Sequence[Episode], target: str, before: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """What every learned mode would predict, shape ``(n, modes)``; NaN where its roles are open."""
     known = model.property_model(*target.split("."))
@@ -107,17 +107,17 @@ def _mode_values(
     return values
 
 
-def _alike(blocks: Iterable[Block]) -> Iterator[list[Block]]:
-    """Blocks with the same objects together, some thousand examples at a time."""
-    groups: dict[tuple[str, ...], list[Block]] = {}
-    for block in blocks:
-        groups.setdefault(block.layout.names, []).append(block)
+def _alike(episodes: Iterable[Episode]) -> Iterator[list[Episode]]:
+    """Episodes with the same objects together, some thousand examples at a time."""
+    groups: dict[tuple[str, ...], list[Episode]] = {}
+    for episode in episodes:
+        groups.setdefault(episode.layout.names, []).append(episode)
     for group in groups.values():
         for k in range(0, len(group), 20):
             yield group[k : k + 20]
 
 
-def confusions(model: WorldModel, blocks: Sequence[Block], laws: AnalyticModes) -> dict[str, Any]:
+def confusions(model: WorldModel, episodes: Sequence[Episode], laws: AnalyticModes) -> dict[str, Any]:
     """Tables 4.7, 4.8, 4.15 and 4.16: predicted against correct mode, by target that modes predict.
 
     The correct mode is the one with the least error; whoever is within the tolerance of it is as correct (the thesis
@@ -130,7 +130,7 @@ def confusions(model: WorldModel, blocks: Sequence[Block], laws: AnalyticModes) 
         if model.governs(part.target) or not ids:
             continue
         table = np.zeros((len(ids) + 1, len(ids)), dtype=np.int64)
-        for group in _alike(blocks):
+        for group in _alike(episodes):
             table += _confusion(model, group, target, laws, ids)
         formulas = [mode.formula(3) for mode in part.modes]
         found[target] = {"modes": ids, "functions": formulas, "table": table.tolist()}
@@ -138,7 +138,7 @@ def confusions(model: WorldModel, blocks: Sequence[Block], laws: AnalyticModes) 
 
 
 def _confusion(
-    model: WorldModel, part: Sequence[Block], target: str, laws: AnalyticModes, ids: Sequence[int]
+    model: WorldModel, part: Sequence[Episode], target: str, laws: AnalyticModes, ids: Sequence[int]
 ) -> NDArray[np.int64]:
     """Counts by predicted mode (the last row: none) and correct one, shape ``(modes + 1, modes)``."""
     layout = part[0].layout

@@ -1,4 +1,4 @@
-"""How long will the rest take? Judged by what tasks of the same kind took, and silent before any did."""
+"""How long will the rest take? Evaluated by what tasks of the same kind took, and abstained before any did."""
 
 from __future__ import annotations
 

@@ -94,11 +94,11 @@ def test_what_comes_while_another_goes_gets_a_name_of_its_own() -> None:
 
 def test_the_cheapest_assignment_by_hand() -> None:
     rows, expected = np.array([[0.0], [1.0], [5.0]]), np.array([[1.1], [0.2]])
-    assert matched(rows, expected, gate=1.0).tolist() == [1, 0, -1]
+    assert matched(rows, expected, farthest=1.0).tolist() == [1, 0, -1]
     # Greedy would give row 0 to object 0 (0.1 away) and leave row 1 alone.
-    assert matched(np.array([[0.0], [0.9]]), np.array([[0.1], [-0.5]]), gate=1.0).tolist() == [1, 0]
-    assert matched(np.empty((0, 1)), expected, gate=1.0).tolist() == []
-    assert matched(rows, np.empty((0, 1)), gate=1.0).tolist() == [-1, -1, -1]
+    assert matched(np.array([[0.0], [0.9]]), np.array([[0.1], [-0.5]]), farthest=1.0).tolist() == [1, 0]
+    assert matched(np.empty((0, 1)), expected, farthest=1.0).tolist() == []
+    assert matched(rows, np.empty((0, 1)), farthest=1.0).tolist() == [-1, -1, -1]
 
 
 def test_a_single_row_is_one_object_however_far_it_moves() -> None:

@@ -22,7 +22,7 @@ def test_the_first_batches_differ_in_both() -> None:
 def test_the_thesis_own_numbers() -> None:
     whole = Protocol.thesis()
     assert whole.after(1) == (1, 16, 32, 48, 64, 80) and whole.after(2)[-1] == 160
-    assert whole.tests() == {"seeds": list(TEST_SEEDS), "blocks": 120}  # 24,000 examples
+    assert whole.tests() == {"seeds": list(TEST_SEEDS), "episodes": 120}  # 24,000 examples
     assert (whole.noise_batches, whole.transfer_batches, whole.trials) == (15, 20, 80)
     assert whole.variances == (1e-20, 1e-15, 1e-10, 1e-8, 1e-5)
 
@@ -30,7 +30,7 @@ def test_the_thesis_own_numbers() -> None:
 def test_the_fast_one() -> None:
     fast = Protocol.fast()
     assert [fast.after(k) for k in (1, 2)] == [(16, 80), (16, 80, 160)]
-    assert fast.test_blocks * 200 == 2400 and len(fast.variances) == 3
+    assert fast.test_episodes * 200 == 2400 and len(fast.variances) == 3
 
 
 def test_tuning_and_reporting_are_apart() -> None:

@@ -62,7 +62,7 @@ def test_clauses() -> None:
     assert [len(pairs) for pairs in every.values()] == [3, 3, 1, 6, 1, 7, 8, 5, 8, 2]
     # 6 modes have 15 pairs (§3.4.3), in x as in y.
     for tables in (("4.10", "4.11"), ("4.12", "4.13", "4.14")):
-        assert len({frozenset((p.mode, p.rival)) for t in tables for p in every[t]}) == 15
+        assert len({frozenset((p.mode, p.other)) for t in tables for p in every[t]}) == 15
     assert every["3.2"][0].clauses[0].clause == "y-greater-than(B, A) ∧ on-top(C, B)"
     assert [p.negated for p in every["4.3"]] == [False, False, True]
     assert every["4.5"][1].clauses[-1].tree

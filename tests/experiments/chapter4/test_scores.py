@@ -38,12 +38,12 @@ def test_ends_of_the_scale() -> None:
 
 
 def test_what_went_wrong_by_hand() -> None:
-    #          right  silent  other mode known  none known  tied
+    #          right  abstained  other mode known  none known  tied
     residual = np.array([0.0, 0.5, 0.5, 0.5, 1e-10])
-    silent = np.array([False, True, False, False, False])
+    abstained = np.array([False, True, False, False, False])
     best = np.array([0.0, 0.0, 0.0, 0.4, 0.0])
-    score = mode_score("floor", residual, silent, best, np.full(5, -2.0))
-    assert (score["examples"], score["wrong"], score["silent"]) == (5, 3, 1)
+    score = mode_score("floor", residual, abstained, best, np.full(5, -2.0))
+    assert (score["examples"], score["wrong"], score["abstained"]) == (5, 3, 1)
     assert (score["unlearned"], score["misclassified"], score["strict"]) == (1, 2, 3)
     assert score["literal"] == 4  # the tie counts, too
     assert score["change"] == 10.0 and score["sum"] == pytest.approx(1.5)
@@ -54,8 +54,8 @@ def test_what_went_wrong_by_hand() -> None:
 def test_only_what_a_law_explains_is_counted_by_mode() -> None:
     truth = np.array([0, 0, 1, -1, -1])
     counted = np.array([True, True, True, True, False])
-    residual, silent = np.array([0.0, 1.0, 0.0, 1.0, 1.0]), np.zeros(5, dtype=bool)
-    score = target_score(("fly", "floor"), truth, counted, residual, silent, None, np.ones(5))
+    residual, abstained = np.array([0.0, 1.0, 0.0, 1.0, 1.0]), np.zeros(5, dtype=bool)
+    score = target_score(("fly", "floor"), truth, counted, residual, abstained, None, np.ones(5))
     assert [(m["name"], m["examples"], m["wrong"]) for m in score["modes"]] == [
         ("fly", 2, 1),
         ("floor", 1, 0),

@@ -14,7 +14,7 @@ from relgym.experiments.chapter4.lesson import lesson
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.jobs.task import Task
 
-TESTS = {"seeds": [110], "blocks": 2}
+TESTS = {"seeds": [110], "episodes": 2}
 BATCH = {"seed": 100, "order": 0}
 PROTOCOL = Protocol.fast(1)
 
@@ -29,9 +29,9 @@ def stand_ins() -> Mapping[str, Any]:
     }
     found["pushing"] = pushing.lesson(learner="thesis", seed=100, repeats=1)
     found["imagine"] = rolled.imagine(
-        learner="world", experiment=1, **BATCH, blocks=2, tests=[10, 11], trials=6
+        learner="world", experiment=1, **BATCH, episodes=2, tests=[10, 11], trials=6
     )
-    found["noise"] = noisy.lesson(expected=1e-10, true=1e-10, **BATCH, blocks=2, tests=TESTS)
+    found["noise"] = noisy.lesson(expected=1e-10, true=1e-10, **BATCH, episodes=2, tests=TESTS)
     common = {"shown": "contact", "experiment": 1, **BATCH, **points}
     found["regress"] = comparison.regress(baseline="rls", **common)
     found["classify"] = comparison.classify(baseline="knn-1", **common)

@@ -25,7 +25,7 @@ def _run(floor: float, corner: float, best: float | None = None) -> dict[str, An
         known,
         np.ones(11),
     )
-    return {"scores": [{"blocks": 16, "targets": {"ball.vx": score, "ball.vy": score}}], "asking": 0.1}
+    return {"scores": [{"episodes": 16, "targets": {"ball.vx": score, "ball.vy": score}}], "asking": 0.1}
 
 
 def test_cells_are_won_level_or_lost_and_every_loss_has_its_cause() -> None:

@@ -10,13 +10,13 @@ import pytest
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.chapter4 import comparison, pushing, rolled
-from relgym.experiments.chapter4.lesson import config_of, fresh_blocks, lesson, taught_blocks
+from relgym.experiments.chapter4.lesson import config_of, fresh_episodes, lesson, taught_episodes
 from relgym.experiments.chapter4.protocol import ABLATIONS
-from relgym.experiments.chapter4.rolled import CAUSES, cause_of, trial_blocks
+from relgym.experiments.chapter4.rolled import CAUSES, cause_of, trial_episodes
 from relgym.experiments.chapter4.testing import true_modes
 from relgym.experiments.data import BALL_EXPERIMENTS
 
-TESTS = {"seeds": [110], "blocks": 3}
+TESTS = {"seeds": [110], "episodes": 3}
 BATCH = {"experiment": 1, "seed": 100, "order": 0}
 
 
@@ -26,7 +26,7 @@ def taught() -> dict[str, Any]:
 
 
 def test_a_lesson_is_tested_on_the_way(taught: dict[str, Any]) -> None:
-    assert [each["blocks"] for each in taught["scores"]] == [1, 3]
+    assert [each["episodes"] for each in taught["scores"]] == [1, 3]
     for each in taught["scores"]:
         for score in each["targets"].values():
             assert score["all"]["examples"] == 600
@@ -43,9 +43,9 @@ def test_confusions_count_what_the_scores_count(taught: dict[str, Any]) -> None:
         counts = np.array(found["table"])
         score = taught["scores"][-1]["targets"][target]["counted"]
         assert counts.sum() == score["examples"]
-        assert counts[-1].sum() == score["silent"]
+        assert counts[-1].sum() == score["abstained"]
         off = counts[:-1].sum() - np.trace(counts[:-1])
-        assert off + score["silent"] == score["strict"]
+        assert off + score["abstained"] == score["strict"]
 
 
 def test_training_examples_are_counted_by_what_really_happened(taught: dict[str, Any]) -> None:
@@ -68,16 +68,16 @@ def test_the_same_batch_gives_the_same_result(taught: dict[str, Any]) -> None:
 
 
 def test_stages_of_transfer_show_one_object_after_the_other() -> None:
-    rooms = list(taught_blocks(1, 100, 0, 5, ("box", "ramp")))
+    rooms = list(taught_episodes(1, 100, 0, 5, ("box", "ramp")))
     assert ["box" in room.layout.names for room in rooms] == [True, True, True, False, False]
     assert ["ramp" in room.layout.names for room in rooms] == [False, False, False, True, True]
-    assert {room.schema for room in rooms} == {next(taught_blocks(1, 100, 0, 1)).schema}
+    assert {room.schema for room in rooms} == {next(taught_episodes(1, 100, 0, 1)).schema}
 
 
-def test_test_blocks_come_from_every_seed_in_equal_parts() -> None:
-    blocks = fresh_blocks(1, {"seeds": [110, 111], "blocks": 4})
-    assert len(blocks) == 4
-    assert len({str(sorted(b.configuration.items())) for b in blocks}) == 4
+def test_test_episodes_come_from_every_seed_in_equal_parts() -> None:
+    episodes = fresh_episodes(1, {"seeds": [110, 111], "episodes": 4})
+    assert len(episodes) == 4
+    assert len({str(sorted(b.configuration.items())) for b in episodes}) == 4
 
 
 def test_ablations_take_one_cause_away_each() -> None:
@@ -129,7 +129,7 @@ def test_classifiers_are_right_where_the_mode_explains() -> None:
 
 
 def test_roll_outs_and_why_they_fail() -> None:
-    found = rolled.imagine(learner="world", **BATCH, blocks=3, tests=[110], trials=4)
+    found = rolled.imagine(learner="world", **BATCH, episodes=3, tests=[110], trials=4)
     assert len(found["trials"]) == 4
     for trial in found["trials"]:
         errors = np.array([[np.inf if e is None else e for e in axis] for axis in trial["errors"]])
@@ -141,16 +141,16 @@ def test_roll_outs_and_why_they_fail() -> None:
 
 def test_causes_come_from_what_really_happened() -> None:
     causes: dict[str, list[str]] = {}
-    for block in trial_blocks(1, [110], 16):
-        names = block.truth.mode_names["ball.vx"]
-        for step in range(len(block)):
-            cause = cause_of(block, step, 1)
-            if block.truth.corner[step]:
+    for episode in trial_episodes(1, [110], 16):
+        names = episode.truth.mode_names["ball.vx"]
+        for step in range(len(episode)):
+            cause = cause_of(episode, step, 1)
+            if episode.truth.corner[step]:
                 assert cause == "bounce against a corner"
-            elif block.truth.active[step] > 1:
+            elif episode.truth.active[step] > 1:
                 assert cause == "several contacts at once"
-            elif block.truth.active[step] == 1:
-                causes.setdefault(names[block.truth.mode["ball.vx"][step]], []).append(cause)
+            elif episode.truth.active[step] == 1:
+                causes.setdefault(names[episode.truth.mode["ball.vx"][step]], []).append(cause)
     assert set(causes["bounce, left face"]) == set(causes["bounce, slope"]) == {"misclassified ramp bounce"}
     assert set(causes["fly"]) == {"misclassified contact with a level surface"}
 
@@ -158,12 +158,12 @@ def test_causes_come_from_what_really_happened() -> None:
 def test_several_contacts_at_once_belong_to_the_simplest_mode_that_explains_them() -> None:
     laws = BALL_EXPERIMENTS[1].modes()
     found = 0
-    for block in trial_blocks(1, [110], 12):
+    for episode in trial_episodes(1, [110], 12):
         for target in ("ball.vx", "ball.vy"):
-            logged, labels = block.truth.mode[target], true_modes(block, target, laws)
+            logged, labels = episode.truth.mode[target], true_modes(episode, target, laws)
             np.testing.assert_array_equal(labels[logged >= 0], logged[logged >= 0])
-            v = block.columns("ball", "vx", "vy")
-            names = block.truth.mode_names[target]
+            v = episode.columns("ball", "vx", "vy")
+            names = episode.truth.mode_names[target]
             for step in np.flatnonzero((logged < 0) & (labels >= 0)):
                 mode = (laws.x if target == "ball.vx" else laws.y)[labels[step]]
                 assert abs(mode.predict(v[[step]])[0] - v[step + 1, int(target == "ball.vy")]) <= 1e-9

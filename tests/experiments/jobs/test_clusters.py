@@ -22,7 +22,7 @@ TASKS = [
             "seed": 100,
             "order": 0,
             "checkpoints": [1, 2],
-            "tests": {"seeds": [110], "blocks": 2},
+            "tests": {"seeds": [110], "episodes": 2},
         },
     )
     for learner in ("world", "default")

@@ -11,23 +11,23 @@ from dyna_worlds import Flat, LineEnv, LineModel, LineTask
 
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.wrappers.sb3.apprentice import Apprentice
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.sb3.trainer import ModelTrainer
 
 pytestmark = pytest.mark.sb3
 
-QUICK = DynaConfig(horizon=3, least=5, window=10, shuffle=5, from_start=1.0, permute=False, redraw=False)
+QUICK = DynaConfig(horizon=3, least=5, window=10, shuffle=5, from_start=1.0, permute=False, resample=False)
 
 
 def world() -> gym.Env[Any, Any]:
     return Flat(TransitionRecorder(gym.wrappers.TimeLimit(LineEnv(), 8)))
 
 
-def apprentice(**model: float) -> Apprentice:
+def trainer(**model: float) -> ModelTrainer:
     from relgym.wrappers.sb3.dreaming import explore
 
-    found = Apprentice(LineModel(**model), LineTask(), QUICK)
+    found = ModelTrainer(LineModel(**model), LineTask(), QUICK)
     explore(found, world(), 40, seed=0)
     return found
 
@@ -35,7 +35,7 @@ def apprentice(**model: float) -> Apprentice:
 def dreams(num_envs: int = 4, **model: float) -> Any:
     from relgym.wrappers.sb3.dreaming import DreamVecEnv
 
-    return DreamVecEnv(apprentice(**model), world(), num_envs=num_envs, config=QUICK)
+    return DreamVecEnv(trainer(**model), world(), num_envs=num_envs, config=QUICK)
 
 
 def test_dreams_go_on_and_begin_anew() -> None:
@@ -79,7 +79,7 @@ def test_ppo_trains_in_the_dream_and_is_checked_in_the_world() -> None:
     from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
 
     torch.set_num_threads(1)
-    model = apprentice()
+    model = trainer()
     seen = len(model.stock)
     env = DreamVecEnv(model, world(), num_envs=4, config=QUICK)
     check = DreamCheckup(model, world(), every=60, episodes=2)
@@ -88,28 +88,28 @@ def test_ppo_trains_in_the_dream_and_is_checked_in_the_world() -> None:
     assert agent.num_timesteps == 256
     assert [at for at, *_ in check.history] == [4, 64, 124, 184, 244]
     assert check.history[-1][1] == len(model.stock) - seen
-    assert model.gate.open
+    assert model.acceptance.accepted
 
 
-def test_training_stops_when_the_model_is_trusted_no_more() -> None:
+def test_training_stops_when_the_model_is_accepted_no_more() -> None:
     from stable_baselines3 import PPO
 
     from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
 
-    model = apprentice()
-    assert model.gate.open
+    model = trainer()
+    assert model.acceptance.accepted
     check = DreamCheckup(model, world(), every=32, episodes=3)
     env = DreamVecEnv(model, world(), num_envs=4, config=QUICK)
     model.model.off = 2.0  # type: ignore[attr-defined]  # the world is another now
     agent = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
     with pytest.warns(
-        UserWarning, match=r"training stops after \d+ dreamed steps: .* trusted no more from 0.2"
+        UserWarning, match=r"training stops after \d+ dreamed steps: .* accepted no more from 0.2"
     ):
         agent.learn(1_000, callback=check)
     assert agent.num_timesteps < 100
-    assert not model.gate.open
+    assert not model.acceptance.accepted
     with pytest.raises(
-        ConfigError, match=r"the model isn't trusted: .*let it watch more of them \(explore\)"
+        ConfigError, match=r"the model isn't accepted: .*let it watch more of them \(explore\)"
     ):
         agent.learn(1_000, callback=check)
 
@@ -120,7 +120,7 @@ def test_check_ups_see_what_the_agent_was_trained_on() -> None:
 
     from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
 
-    model = apprentice()
+    model = trainer()
     dreamed = VecNormalize(DreamVecEnv(model, world(), num_envs=4, config=QUICK))
     agent = PPO("MlpPolicy", dreamed, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
     shown: list[Any] = []
@@ -138,7 +138,7 @@ def test_check_ups_are_made_again_in_a_second_training() -> None:
 
     from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv
 
-    model = apprentice()
+    model = trainer()
     check = DreamCheckup(model, world(), every=100, episodes=1)
     env = DreamVecEnv(model, world(), num_envs=4, config=QUICK)
     agent = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
@@ -151,14 +151,14 @@ def test_check_ups_are_made_again_in_a_second_training() -> None:
 
 def test_dreams_are_of_the_model_at_work() -> None:
     class Taught(LineModel):
-        """Rivals of its own know the world as it is."""
+        """Replacements of its own know the world as it is."""
 
         def untaught(self) -> LineModel:
             return LineModel()
 
     from relgym.wrappers.sb3.dreaming import DreamVecEnv, explore
 
-    found = Apprentice(Taught(), LineTask(), QUICK)
+    found = ModelTrainer(Taught(), LineTask(), QUICK)
     explore(found, world(), 40, seed=0)
     env = DreamVecEnv(found, world(), num_envs=4, config=QUICK)
     found.model.off = 3.0  # type: ignore[attr-defined]  # as if the world had changed
@@ -170,36 +170,36 @@ def test_dreams_are_of_the_model_at_work() -> None:
 
 
 def test_what_was_explored_has_all_been_learned() -> None:
-    found = apprentice()
+    found = trainer()
     assert len(found.model.learned) == 40  # type: ignore[attr-defined]
 
 
 def test_a_task_can_be_learned_while_exploring() -> None:
     from relgym.wrappers.sb3.dreaming import explore
-    from relgym.wrappers.sb3.judges import LearnedTask
+    from relgym.wrappers.sb3.reward_models import LearnedRewardModel
 
-    found = Apprentice(LineModel(), "learned", QUICK)
-    assert isinstance(found.judge, LearnedTask)
+    found = ModelTrainer(LineModel(), "learned", QUICK)
+    assert isinstance(found.reward_model, LearnedRewardModel)
     explore(found, world(), 40, seed=0)
-    assert found.judge.model.seen == 40
+    assert found.reward_model.model.seen == 40
 
 
 def test_refusals_name_the_remedy() -> None:
     from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv, explore
 
     with pytest.raises(ConfigError, match="no scenes to dream on from"):
-        DreamVecEnv(Apprentice(LineModel(), LineTask(), QUICK), world())
+        DreamVecEnv(ModelTrainer(LineModel(), LineTask(), QUICK), world())
     with pytest.raises(ConfigError, match="num_envs=0: expected at least 1"):
-        DreamVecEnv(apprentice(), world(), num_envs=0)
+        DreamVecEnv(trainer(), world(), num_envs=0)
     with pytest.raises(ConfigError, match="steps=0: expected at least 1"):
-        explore(apprentice(), world(), 0, seed=0)
+        explore(trainer(), world(), 0, seed=0)
     with pytest.raises(ConfigError, match="every=0: expected at least 1"):
-        DreamCheckup(apprentice(), world(), every=0)
+        DreamCheckup(trainer(), world(), every=0)
     with pytest.raises(ConfigError, match="has no TransitionRecorder: put one directly round the bare env"):
-        explore(apprentice(), Flat(LineEnv()), 5, seed=0)
+        explore(trainer(), Flat(LineEnv()), 5, seed=0)
     with pytest.raises(ConfigError, match="has no TransitionRecorder: put one directly round the bare env"):
-        DreamCheckup(apprentice(), Flat(LineEnv()))
-    blank = Apprentice(WorldModel(LineEnv().schema), LineTask(), QUICK)
+        DreamCheckup(trainer(), Flat(LineEnv()))
+    blank = ModelTrainer(WorldModel(LineEnv().schema), LineTask(), QUICK)
     blank.stock.add(
         LineEnv().schema.scene({"cart": [0.0, 1.0], "other": [1.0, 2.0], "mark": [0.5]}), first=True
     )

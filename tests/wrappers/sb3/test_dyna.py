@@ -14,7 +14,7 @@ from dyna_worlds import Flat, LineEnv, LineModel
 from gymnasium import spaces
 
 import relgym
-from relgym.envs.tasks import Judgement
+from relgym.envs.tasks import TaskOutcome
 from relgym.envs.views import NumbersView
 from relgym.errors import ConfigError, QueryError
 from relgym.wrappers.sb3.config import DynaConfig
@@ -77,16 +77,16 @@ def agent(name: str, env: Any, **options: Any) -> Any:
         ("DQN", lambda: Steering(flat()), {"train_freq": 1}),
     ],
 )
-def test_trusted_dreams_are_exact_transitions(name: str, make: Any, options: dict[str, Any]) -> None:
+def test_accepted_dreams_are_exact_transitions(name: str, make: Any, options: dict[str, Any]) -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
     world, env = LineModel(), make()
     dyna = Dyna(world, DynaConfig(**QUICK))
     algorithm = agent(name, env, **options)
     algorithm.learn(60, callback=dyna)
-    gate = dyna.apprentice.gate
-    assert (gate.open, gate.known) == (True, 1.0)
-    assert gate.error < 1e-6  # observations are float32
+    acceptance = dyna.trainer.acceptance
+    assert (acceptance.accepted, acceptance.known) == (True, 1.0)
+    assert acceptance.error < 1e-6  # observations are float32
     assert dyna.imagined > 100
     assert len(world.learned) == 60  # in the end those too that were waiting for their turn
     pool = algorithm.replay_buffer.imagined
@@ -116,13 +116,13 @@ def test_batches_hold_the_share_that_was_asked_for() -> None:
     algorithm.learn(40, callback=dyna)
     buffer = algorithm.replay_buffer
     buffer.rewards[:] = 7.0  # as if the world paid this, and only the world
-    buffer.trusted = True  # as while it learned
+    buffer.accepted = True  # as while it learned
     batch = buffer.sample(64)
     assert int((batch.rewards == 7.0).sum()) == 16
     assert batch.observations.shape == (64, 1)
-    buffer.trusted = False
+    buffer.accepted = False
     assert bool((buffer.sample(64).rewards == 7.0).all())
-    buffer.trusted, buffer.real_ratio = True, 0.0
+    buffer.accepted, buffer.real_ratio = True, 0.0
     assert not bool((buffer.sample(64).rewards == 7.0).any())
     buffer.real_ratio = 1.0
     assert bool((buffer.sample(64).rewards == 7.0).all())
@@ -134,11 +134,11 @@ def test_without_the_callback_nothing_stale_is_drawn() -> None:
     algorithm = agent("SAC", flat())
     algorithm.learn(40, callback=Dyna(LineModel(), DynaConfig(**QUICK)))
     buffer = algorithm.replay_buffer
-    assert buffer.imagined.size() > 0 and not buffer.trusted
-    buffer.trusted = True
+    assert buffer.imagined.size() > 0 and not buffer.accepted
+    buffer.accepted = True
     kept = pickle.loads(pickle.dumps(buffer))
-    assert (kept.size(), kept.imagined.size(), kept.trusted) == (40, 0, False)
-    assert buffer.trusted and buffer.imagined.size() > 0  # keeping it changed nothing
+    assert (kept.size(), kept.imagined.size(), kept.accepted) == (40, 0, False)
+    assert buffer.accepted and buffer.imagined.size() > 0  # keeping it changed nothing
 
 
 def test_what_others_save_while_it_learns_is_the_agents_own(tmp_path: Any) -> None:
@@ -212,20 +212,20 @@ def test_an_interrupted_training_leaves_the_agent_its_own_gradient_steps() -> No
     assert algorithm.gradient_steps == 3
 
 
-def test_in_bursts_the_target_net_of_dqn_follows() -> None:
+def test_in_catch_up_the_target_net_of_dqn_follows() -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
     algorithm = agent("DQN", Steering(flat()), train_freq=1)
     before = [part.detach().clone() for part in algorithm.q_net_target.parameters()]
-    algorithm.learn(20, callback=Dyna(LineModel(), DynaConfig(**QUICK, burst=30)))
+    algorithm.learn(20, callback=Dyna(LineModel(), DynaConfig(**QUICK, catch_up=30)))
     after = list(algorithm.q_net_target.parameters())
     assert any(not bool((a == b).all()) for a, b in zip(before, after, strict=True))
 
 
-def test_a_burst_waits_for_a_real_step() -> None:
+def test_a_catch_up_waits_for_a_real_step() -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
-    dyna = Dyna(LineModel(), DynaConfig(**{**QUICK, "least": 1}, burst=30))
+    dyna = Dyna(LineModel(), DynaConfig(**{**QUICK, "least": 1}, catch_up=30))
     algorithm = agent("SAC", flat(), learning_starts=0)
     algorithm.learn(5, callback=dyna)
     assert algorithm._n_updates >= 30
@@ -256,7 +256,7 @@ def test_a_decision_lasts_as_long_in_dreams() -> None:
 
 
 def test_a_wrong_model_is_never_dreamed_in() -> None:
-    """No harm: with the gate shut, training is Stable-Baselines3's own, to the last weight."""
+    """No harm: with the acceptance shut, training is Stable-Baselines3's own, to the last weight."""
     from stable_baselines3.common.callbacks import BaseCallback
 
     from relgym.wrappers.sb3.dyna import Dyna
@@ -272,7 +272,7 @@ def test_a_wrong_model_is_never_dreamed_in() -> None:
         algorithm.learn(60, callback=callback)
         weights.append([part.detach().numpy() for part in algorithm.policy.parameters()])
     assert dyna.imagined == 0
-    assert dyna.apprentice.gate.error > 0.5
+    assert dyna.trainer.acceptance.error > 0.5
     for mine, theirs in zip(*weights, strict=True):
         np.testing.assert_array_equal(mine, theirs)
 
@@ -287,29 +287,29 @@ def test_when_the_world_changes_the_dreams_are_thrown_away() -> None:
     assert algorithm.replay_buffer.imagined.size() > 0
     world.off = 3.0  # the model is as wrong as if the world had changed
     algorithm.learn(40, callback=dyna, reset_num_timesteps=False)
-    assert not dyna.apprentice.gate.open
+    assert not dyna.trainer.acceptance.accepted
     assert algorithm.replay_buffer.imagined.size() == 0
-    assert not algorithm.replay_buffer.trusted
+    assert not algorithm.replay_buffer.accepted
 
 
-def test_when_the_world_changes_a_rival_is_dreamed_in() -> None:
+def test_when_the_world_changes_a_replacement_is_dreamed_in() -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
     class Taught(LineModel):
-        """Rivals of its own know the world as it is."""
+        """Replacements of its own know the world as it is."""
 
         def untaught(self) -> LineModel:
             return LineModel()
 
     world = Taught()
-    dyna = Dyna(world, DynaConfig(**QUICK, burst=30))
+    dyna = Dyna(world, DynaConfig(**QUICK, catch_up=30))
     algorithm = agent("SAC", flat())
     algorithm.learn(20, callback=dyna)
     assert dyna.world is world
     world.off = 3.0
     before = algorithm._n_updates
     algorithm.learn(40, callback=dyna, reset_num_timesteps=False)
-    assert dyna.world is not world and dyna.apprentice.renewals == 1
+    assert dyna.world is not world and dyna.trainer.renewals == 1
     assert algorithm._n_updates - before >= 40 + 30  # it makes up for lost time once more
     buffer = algorithm.replay_buffer
     pool, last = buffer.imagined, buffer.imagined.size()
@@ -345,14 +345,14 @@ def test_the_log_tells(tmp_path: Any) -> None:
     for name in (
         "error",
         "known",
-        "trusted",
+        "accepted",
         "imagined",
         "dreams_known",
         "learning_seconds",
         "dreaming_seconds",
     ):
         assert f"relgym/{name}" in head
-    assert rows[-1].split(",")[head.split(",").index("relgym/trusted")] == "1.0"
+    assert rows[-1].split(",")[head.split(",").index("relgym/accepted")] == "1.0"
 
 
 def test_several_envs_teach_one_model() -> None:
@@ -387,12 +387,12 @@ def test_updates_are_counted_per_real_step() -> None:
     assert counts == [64, 24]
 
 
-def test_what_a_trusted_model_could_have_taught_is_made_up_for_once() -> None:
+def test_what_a_accepted_model_could_have_taught_is_made_up_for_once() -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
     world, counts = LineModel(), []
     algorithm = agent("SAC", flat())
-    dyna = Dyna(world, DynaConfig(**QUICK, burst=30))
+    dyna = Dyna(world, DynaConfig(**QUICK, catch_up=30))
     for off, steps in (
         (0.0, 20),
         (3.0, 30),
@@ -401,12 +401,12 @@ def test_what_a_trusted_model_could_have_taught_is_made_up_for_once() -> None:
         world.off = off
         before = getattr(algorithm, "_n_updates", 0)
         algorithm.learn(steps, callback=dyna, reset_num_timesteps=False)
-        counts.append((algorithm._n_updates - before, dyna.apprentice.gate.switches))
+        counts.append((algorithm._n_updates - before, dyna.trainer.acceptance.switches))
     assert counts[0] == (10 * 2 + 30, 1)  # the first 10 steps are random
     assert [switches for _, switches in counts] == [1, 2, 3]
-    assert counts[2][0] <= 30 * 2  # the gate opened again, and nothing was made up for
+    assert counts[2][0] <= 30 * 2  # the acceptance opened again, and nothing was made up for
     shut = agent("SAC", flat())
-    shut.learn(20, callback=Dyna(LineModel(off=1.0), DynaConfig(**QUICK, burst=30)))
+    shut.learn(20, callback=Dyna(LineModel(off=1.0), DynaConfig(**QUICK, catch_up=30)))
     assert shut._n_updates == 10
     world.off, other = 0.0, agent("SAC", flat())  # another agent has been taught nothing yet
     other.learn(20, callback=dyna)
@@ -417,22 +417,22 @@ def test_it_trains_again_when_more_has_become_known_of_the_task() -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
     env, counts = flat(), []
-    judge = SimpleNamespace(judge=env.get_wrapper_attr("task").judge, verdicts=2)
+    reward_model = SimpleNamespace(evaluate=env.get_wrapper_attr("task").evaluate, verdicts=2)
     algorithm = agent("SAC", env)
-    dyna = Dyna(LineModel(), DynaConfig(**QUICK, burst=30), judge=judge)
+    dyna = Dyna(LineModel(), DynaConfig(**QUICK, catch_up=30), reward_model=reward_model)
     for verdicts in (2, 3, 3, 2):
-        judge.verdicts = verdicts
+        reward_model.verdicts = verdicts
         before, steps = getattr(algorithm, "_n_updates", 0), 20 if not counts else 10
         algorithm.learn(steps, callback=dyna, reset_num_timesteps=False)
         counts.append(algorithm._n_updates - before)
     assert counts == [10 * 2 + 30, 10 * 2 + 30, 10 * 2, 10 * 2]
 
 
-def test_a_model_that_was_never_trusted_is_complained_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_that_was_never_accepted_is_complained_of(monkeypatch: pytest.MonkeyPatch) -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
     monkeypatch.setattr("relgym.wrappers.sb3.dyna._SHORT", 30)
-    with pytest.warns(UserWarning, match=r"never trusted in 40 steps.*its error was 0.*Give it more steps"):
+    with pytest.warns(UserWarning, match=r"never accepted in 40 steps.*its error was 0.*Give it more steps"):
         agent("SAC", flat()).learn(40, callback=Dyna(LineModel(off=1.0), DynaConfig(**QUICK)))
 
 
@@ -464,9 +464,9 @@ def test_refusals_name_the_remedy() -> None:
     ignorant.frozen = True
     with pytest.raises(QueryError, match="the model knows none of its targets"):
         refused(flat(), ignorant)
-    for judge in ("foo", abs):
-        with pytest.raises(ConfigError, match="expected 'learned', or an object with judge"):
-            refused(flat(), judge=judge)
+    for reward_model in ("foo", abs):
+        with pytest.raises(ConfigError, match="expected 'learned', or an object with evaluate"):
+            refused(flat(), reward_model=reward_model)
     with pytest.raises(ConfigError, match=r"TransformReward changes rewards outside .* put it inside"):
         refused(gym.wrappers.TransformReward(flat(), lambda reward: 100.0 * reward))
     other = agent("SAC", flat(), n_steps=3, gamma=0.5)
@@ -482,17 +482,17 @@ def test_refusals_name_the_remedy() -> None:
         with pytest.raises(ConfigError, match=f"n_steps={steps}: expected a whole number"):
             agent("SAC", flat(), n_steps=steps)
     with pytest.raises(ConfigError, match="training has not begun"):
-        _ = Dyna(LineModel()).apprentice
+        _ = Dyna(LineModel()).trainer
 
 
 def test_a_reward_that_is_no_number_is_said_to_be_none() -> None:
     class Odd:
-        def judge(self, layout: Any, before: Any, actions: Any, after: Any) -> Judgement:
+        def evaluate(self, layout: Any, before: Any, actions: Any, after: Any) -> TaskOutcome:
             never = np.zeros(len(after), dtype=bool)
-            return Judgement(np.full(len(after), np.nan), never, never)
+            return TaskOutcome(np.full(len(after), np.nan), never, never)
 
     with pytest.raises(ConfigError, match=r"Odd gave a reward of nan: .*mend the reward function"):
-        refused(flat(), judge=Odd())
+        refused(flat(), reward_model=Odd())
 
 
 def test_a_second_agent_gets_the_dreams_too() -> None:
@@ -545,7 +545,7 @@ def test_any_env_will_do() -> None:
     from relgym.wrappers.sb3.dyna import Dyna
 
     env = TransitionRecorder(gym.wrappers.TimeLimit(Drift(), 12))
-    dyna = Dyna(relgym.WorldModel(env.view.schema), DynaConfig(**QUICK), judge="learned")
+    dyna = Dyna(relgym.WorldModel(env.view.schema), DynaConfig(**QUICK), reward_model="learned")
     algorithm = agent("DQN", env, learning_starts=10, train_freq=1, exploration_fraction=1.0)
     algorithm.learn(500, callback=dyna)
     assert dyna.imagined > 100

@@ -11,7 +11,7 @@ import pytest
 from dyna_worlds import SCHEMA, Flat, LineEnv, LineModel, LineTask
 
 from relgym.envs.actions import acting
-from relgym.envs.tasks import Judgement
+from relgym.envs.tasks import TaskOutcome
 from relgym.errors import ConfigError
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.sb3.acting import acting_all
@@ -32,9 +32,11 @@ def forwards(seen: Any) -> Any:
     return np.full((n, 1), 0.5, dtype=np.float32), np.full((n, 1), 0.25, dtype=np.float32)
 
 
-def imagination(env: gym.Env[Any, Any] | None = None, judge: Any = None, **model: float) -> Imagination:
+def imagination(
+    env: gym.Env[Any, Any] | None = None, reward_model: Any = None, **model: float
+) -> Imagination:
     lens = Lens(Flat(TransitionRecorder(LineEnv())) if env is None else env)
-    return Imagination(LineModel(**model), lens, judge or LineTask())
+    return Imagination(LineModel(**model), lens, reward_model or LineTask())
 
 
 def test_two_dreams_by_hand() -> None:
@@ -60,7 +62,7 @@ def test_actions_mean_what_they_mean_in_the_env_that_the_agent_acts_in() -> None
     assert found.next_observations["cart"][:, 0].tolist() == [4.0]  # type: ignore[call-overload,index]
 
 
-def test_where_the_model_is_silent_the_step_before_is_cut_off() -> None:
+def test_where_the_model_abstains_the_step_before_is_cut_off() -> None:
     found = imagination(mute_from=1.5).dream(LAYOUT, vectors(0.0, 3.0), forwards, horizon=5)
     assert found is not None
     np.testing.assert_allclose(found.next_observations, [[0.5], [1.0]])
@@ -103,8 +105,8 @@ def test_actions_in_scenes_are_the_single_ones(rng: np.random.Generator) -> None
 
 
 class _Broken:
-    def judge(self, layout: Any, before: Any, actions: Any, after: Any) -> Judgement:
-        return Judgement(
+    def evaluate(self, layout: Any, before: Any, actions: Any, after: Any) -> TaskOutcome:
+        return TaskOutcome(
             np.full(len(before), np.nan), np.zeros(len(before), bool), np.zeros(len(before), bool)
         )
 
@@ -113,7 +115,7 @@ def test_errors_name_the_remedy() -> None:
     with pytest.raises(ConfigError, match="horizon=0: expected at least 1 decision"):
         imagination().dream(LAYOUT, vectors(0.0), forwards, horizon=0)
     with pytest.raises(ConfigError, match=r"_Broken gave a reward of nan.*mend the reward function"):
-        imagination(judge=_Broken()).dream(LAYOUT, vectors(0.0), forwards, horizon=1)
+        imagination(reward_model=_Broken()).dream(LAYOUT, vectors(0.0), forwards, horizon=1)
     with pytest.raises(ConfigError, match="has no TransitionRecorder: put one directly round the bare env"):
         Lens(Flat(LineEnv()))
 

@@ -73,7 +73,7 @@ def test_rewards_are_normalised_once_and_steps_made_before_are_left_out() -> Non
     agent = SAC("MlpPolicy", envs, learning_starts=100, buffer_size=500, device="cpu", seed=0, **mixing)
     agent.learn(20, callback=PermutedReplay(copies=1, seed=0))
     buffer = agent.replay_buffer
-    assert not buffer.trusted
+    assert not buffer.accepted
     np.testing.assert_array_equal(buffer.imagined.rewards[:20, 0], buffer.rewards[:20, 0])
     np.testing.assert_array_equal(
         np.sort(buffer.imagined.observations[:20, 0]), np.sort(buffer.observations[:20, 0])

@@ -1,4 +1,4 @@
-"""Scenes to dream on from: drawn, permuted and redrawn without leaving what the model licenses."""
+"""Scenes to dream on from: drawn, permuted and resampled without leaving what the model licenses."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def taught(rng: np.random.Generator, *, minding_the_mark: bool) -> WorldModel:
     return model
 
 
-def test_only_what_no_law_mentions_is_redrawn(rng: np.random.Generator) -> None:
+def test_only_what_no_law_mentions_is_resampled(rng: np.random.Generator) -> None:
     free, minding = (taught(rng, minding_the_mark=minds) for minds in (False, True))
     assert free_properties(free) == {("mark", "at")}
     assert free_properties(minding) == frozenset()
@@ -106,18 +106,18 @@ def test_only_what_no_law_mentions_is_redrawn(rng: np.random.Generator) -> None:
     for at in (1.0, 3.0):
         stock.add(scene(0.5, at), first=True)
     layout, vectors = stock.draw(40, from_start=1.0, rng=rng)
-    varied = stock.redrawn(layout, vectors, free, rng=rng)
+    varied = stock.resampled(layout, vectors, free, rng=rng)
     np.testing.assert_array_equal(varied[:, :4], vectors[:, :4])
     assert ((varied[:, 4] >= 1.0) & (varied[:, 4] <= 3.0)).all()
     assert len(set(varied[:, 4])) == 40
-    np.testing.assert_array_equal(stock.redrawn(layout, vectors, minding, rng=rng), vectors)
+    np.testing.assert_array_equal(stock.resampled(layout, vectors, minding, rng=rng), vectors)
 
 
 def blocks(speed: float) -> Scene:
     return BLOCKS.scene({f"block{k}": [*np.arange(9.0), speed + k, 5.0] for k in range(3)})
 
 
-def test_kicked_bodies_have_up_to_twice_the_speed_ever_seen_and_are_where_they_were(
+def test_perturbed_bodies_have_up_to_twice_the_speed_ever_seen_and_are_where_they_were(
     rng: np.random.Generator,
 ) -> None:
     stock = SceneStock()
@@ -125,41 +125,41 @@ def test_kicked_bodies_have_up_to_twice_the_speed_ever_seen_and_are_where_they_w
         stock.add(blocks(speed), first=True)
     layout, vectors = stock.draw(400, from_start=1.0, rng=rng)
     kept = vectors.copy()
-    kicked = stock.kicked(layout, vectors, WorldModel(BLOCKS), rng=rng)
+    perturbed = stock.perturbed(layout, vectors, WorldModel(BLOCKS), rng=rng)
     np.testing.assert_array_equal(vectors, kept)
     speeds = [layout.column(k, "vx") for k in range(3)]
-    np.testing.assert_array_equal(np.delete(kicked, speeds, axis=1), np.delete(kept, speeds, axis=1))
+    np.testing.assert_array_equal(np.delete(perturbed, speeds, axis=1), np.delete(kept, speeds, axis=1))
     for k, column in enumerate(speeds):  # seen: -1 to 3, and k more
-        drawn = kicked[:, column] - k
+        drawn = perturbed[:, column] - k
         assert drawn.min() >= -3.0 and drawn.max() <= 5.0
         assert drawn.min() < -2.0 and drawn.max() > 4.0
 
 
-def test_what_no_law_moves_gets_no_kick(rng: np.random.Generator) -> None:
+def test_what_no_law_moves_is_not_perturbed(rng: np.random.Generator) -> None:
     still = WorldModel(BLOCKS, targets=(Target("block", "weight"),))
     stock = SceneStock()
     stock.add(blocks(1.0), first=True)
     stock.add(blocks(2.0), first=True)
     layout, vectors = stock.draw(20, from_start=1.0, rng=rng)
-    np.testing.assert_array_equal(stock.kicked(layout, vectors, still, rng=rng), vectors)
+    np.testing.assert_array_equal(stock.perturbed(layout, vectors, still, rng=rng), vectors)
 
 
-def test_so_many_starts_are_kicked_as_was_asked_for(rng: np.random.Generator) -> None:
+def test_so_many_starts_are_perturbed_as_was_asked_for(rng: np.random.Generator) -> None:
     stock = SceneStock()
     for speed in (-1.0, 1.0, 3.0):
         stock.add(blocks(speed), first=True)
     model = WorldModel(BLOCKS)
-    plain = DynaConfig(permute=False, redraw=False)
+    plain = DynaConfig(permute=False, resample=False)
     same = stock.starts(1_000, model, plain, rng=np.random.default_rng(5))[1]
     np.testing.assert_array_equal(
         same, stock.draw(1_000, from_start=plain.from_start, rng=np.random.default_rng(5))[1]
     )
-    varied = stock.starts(1_000, model, replace(plain, kick=0.25), rng=rng)[1]
+    varied = stock.starts(1_000, model, replace(plain, perturb_velocity=0.25), rng=rng)[1]
     whole = np.isin(varied[:, stock.draw(1, from_start=1.0, rng=rng)[0].column(0, "vx")], (-1.0, 1.0, 3.0))
     assert 0.2 < (~whole).mean() < 0.3
 
 
-def test_where_nothing_has_a_body_nothing_is_redrawn(rng: np.random.Generator) -> None:
+def test_where_nothing_has_a_body_nothing_is_resampled(rng: np.random.Generator) -> None:
     """Position and speed of a flat env are no goal that may lie anywhere: they go with one another."""
     schema = SceneSchema((ObjectType("self", ("x", "v")),), (("self", "self"),))
     model = WorldModel(schema)
@@ -170,7 +170,7 @@ def test_where_nothing_has_a_body_nothing_is_redrawn(rng: np.random.Generator) -
     assert model.modes("self", "v") and free_properties(model) == frozenset()
 
 
-def test_what_the_law_of_another_property_of_its_type_mentions_is_not_redrawn(
+def test_what_the_law_of_another_property_of_its_type_mentions_is_not_resampled(
     rng: np.random.Generator,
 ) -> None:
     schema = SceneSchema(

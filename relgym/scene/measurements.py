@@ -14,7 +14,7 @@ from relgym.scene.contacts import APPROACH_EPS
 from relgym.scene.geometry.arrays import ArrayGeometry, Geometry, Measured, pairs_of
 from relgym.scene.geometry.vectors import FloatArray, dot
 
-__all__ = ["Pairs", "Plan", "Sight", "square"]
+__all__ = ["Measurements", "Pairs", "Plan", "square"]
 
 _CLEAR = 1e-6
 _LENGTHS = [0, 1, 2, 6, 7, 8]  # of a pose: place and size; angles are no lengths
@@ -60,7 +60,7 @@ class Plan:
     offsets: bool = False  # whether contact features hold them
 
 
-class Sight:
+class Measurements:
     """Geometry of n scenes, pair by pair and as it is asked for; what was measured is kept.
 
     A pair's numbers are the same bits whenever and however they are come by. All arrays have scenes last.

@@ -1,4 +1,4 @@
-"""Blocks of consecutive transitions, with the truth about what happened in each."""
+"""Episodes of consecutive transitions, with the truth about what happened in each."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from relgym.scene.objects import Float2D, Scene, SceneLayout, Transition
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["Block", "Truth"]
+__all__ = ["Episode", "Truth"]
 
 Int1D: TypeAlias = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What really happened in each of a block's n transitions.
+    """What really happened in each of an episode's n transitions.
 
     Attributes
     ----------
@@ -41,13 +41,13 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Block:
+class Episode:
     """One episode: n consecutive transitions (§4.2).
 
     Attributes
     ----------
     schema, layout
-        What the scenes are made of; all blocks of a data set share the schema.
+        What the scenes are made of; all episodes of a data set share the schema.
     vectors : float array of shape ``(n + 1, layout.width)``
         State vectors. Row i with its action is the scene before transition i, row i + 1 the scene after.
         The last row's action is 0: none was chosen there.
@@ -71,7 +71,7 @@ class Block:
         return Scene(self.schema, self.layout, self.vectors[index])
 
     def transitions(self) -> Iterator[Transition]:
-        """The block's transitions in order."""
+        """The episode's transitions in order."""
         scenes = [self.scene(i) for i in range(len(self.vectors))]
         return (Transition(before, after) for before, after in pairwise(scenes))
 

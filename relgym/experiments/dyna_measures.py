@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Final, TypeAlias
 
-from relgym.experiments.bar import Measure, measured
+from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.dyna import ENOUGH, STEPS, Run
 from relgym.experiments.dyna_arms import ARMS, COURSES
 from relgym.experiments.dyna_report import draw_runs, reached, summary
@@ -40,7 +40,7 @@ _MISLED_STEPS: Final = 6_000
 _BALL_STEPS: Final = 16_000
 
 _TRUCK_ARMS: Final = ("sac", "sac40", "sac-permuted", "ensemble", "relgym", "relgym-given")
-_BALL_RIVALS: Final = ("sac", "sac5", "sac20")
+_BALL_BASELINES: Final = ("sac", "sac5", "sac20")
 """Agents without a model; those who dream update forty times a decision there."""
 
 
@@ -102,8 +102,8 @@ def _learning(
 # ------------------------------------------------------------------ rows 1 and 3: real steps to success
 def _truck(found: Found) -> Shown:
     runs = _runs(found)
-    rivals = (("sac", 20.0), ("sac-permuted", 5.0), ("ensemble", 2.0))
-    measures = [m for arm, bar in rivals for m in _fewer(runs, arm, bar)]
+    baselines = (("sac", 20.0), ("sac-permuted", 5.0), ("ensemble", 2.0))
+    measures = [m for arm, limit in baselines for m in _fewer(runs, arm, limit)]
     own = [run.seconds for run in runs if run.arm == "relgym"]
     measures += [measured("Dyna, relgym: seconds of one core", 600, own)] if own else []
     return _compared(runs, measures)
@@ -111,7 +111,7 @@ def _truck(found: Found) -> Shown:
 
 def _ball(found: Found) -> Shown:
     runs = _runs(found)
-    steps = {arm: median(map(reached, own)) for arm in _BALL_RIVALS if (own := _of(runs, arm))}
+    steps = {arm: median(map(reached, own)) for arm in _BALL_BASELINES if (own := _of(runs, arm))}
     best = min(steps, key=lambda arm: steps[arm], default="sac")
     return _compared(runs, _fewer(runs, best, 4.0))
 
@@ -121,14 +121,14 @@ def _compared(runs: Sequence[Run], measures: Sequence[Measure]) -> Shown:
     return Shown(measures, [summary(runs)], lambda path: draw_runs(path, runs, title))
 
 
-def _fewer(runs: Sequence[Run], rival: str, times: float) -> list[Measure]:
+def _fewer(runs: Sequence[Run], baseline: str, times: float) -> list[Measure]:
     """How many times fewer real steps relgym needs, by the medians; none where an arm is missing."""
-    ours, theirs = _of(runs, "relgym"), _of(runs, rival)
+    ours, theirs = _of(runs, "relgym"), _of(runs, baseline)
     if not (ours and theirs):
         return []
     ratio = median(map(reached, theirs)) / median(map(reached, ours))
     least = "" if all(run.solved_at for run in theirs) else " (at least)"
-    return [measured(f"{ARMS[rival].title}: times as many real steps{least}", times, [ratio], ">=")]
+    return [measured(f"{ARMS[baseline].title}: times as many real steps{least}", times, [ratio], ">=")]
 
 
 def _runs(found: Found) -> list[Run]:
@@ -176,7 +176,9 @@ def _no_harm(found: Found) -> Shown:
 
 def _course(run: Run, what: str) -> str:
     curve = " ".join(str(good) for _, good in run.curve)
-    return f"{ARMS[run.arm].title}, {what or 'as ever'}, seed {run.seed}, trusted {run.trusted:.0%}: {curve}"
+    return (
+        f"{ARMS[run.arm].title}, {what or 'as ever'}, seed {run.seed}, accepted {run.accepted:.0%}: {curve}"
+    )
 
 
 # ------------------------------------------------------------------ rows 5 and 6
@@ -219,7 +221,7 @@ ROWS: Final[Mapping[int, Row]] = {
     ),
     3: Row(
         "BallGoal: real decisions to success",
-        _learning("ball", ("relgym", "relgym-given", *_BALL_RIVALS), _BALL_STEPS),
+        _learning("ball", ("relgym", "relgym-given", *_BALL_BASELINES), _BALL_STEPS),
         _ball,
     ),
     4: Row(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.baselines.changes import ONLINE, rivals, titles
+from relgym.baselines.changes import ONLINE, predicted_changes, titles
 from relgym.config import ModelConfig
 from relgym.envs.views import TableView
 from relgym.experiments.recording import Recording
@@ -197,7 +197,7 @@ def stream(name: str, rows: Rows, *, verbose: bool, batch: bool) -> Iterator[tup
     columns = rows.columns()
     late = np.arange(len(columns["step"])) >= len(columns["step"]) // 2
     kinds = {"all steps": late, "the episode goes on": late & ~columns["ended"].astype(bool)}
-    told = rivals(columns["seen"], columns["change"], once=batch, last=columns["last"])
+    told = predicted_changes(columns["seen"], columns["change"], once=batch, last=columns["last"])
     said = {"relgym": columns["said"]} | told
     lines: list[list[Cell]] = []
     for kind, keep in kinds.items():

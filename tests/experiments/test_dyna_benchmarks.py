@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from relgym.errors import StoreError
-from relgym.experiments import dyna_bars
-from relgym.experiments.bar import Measure
+from relgym.experiments import dyna_benchmarks
+from relgym.experiments.criterion import Measure
 from relgym.experiments.dyna import Run, solved_at
 from relgym.experiments.dyna_arms import ARMS
-from relgym.experiments.dyna_rows import ROWS, Shown
+from relgym.experiments.dyna_measures import ROWS, Shown
 from relgym.experiments.jobs.store import Result, ResultStore
 
 
@@ -23,10 +23,10 @@ def value(arm: str, seed: int, *successes: int, course: str = "truck", steps: in
 
 
 def by_name(shown: Shown) -> dict[str, Measure]:
-    return {m.bar.what: m for m in shown.measures}
+    return {m.criterion.what: m for m in shown.measures}
 
 
-def test_ratios_are_of_medians_and_lower_bounds_where_a_rival_failed() -> None:
+def test_ratios_are_of_medians_and_lower_bounds_where_a_baseline_failed() -> None:
     runs = [value("relgym", s, *([0] * s), 90, 90) for s in range(3)]  # 500, 750, 1,000
     runs += [value("sac", 0, 1, 2), value("ensemble", 0, 0, 0, 0, 0, 95, 95)]
     found = by_name(ROWS[1].show([({}, run) for run in runs]))
@@ -36,7 +36,7 @@ def test_ratios_are_of_medians_and_lower_bounds_where_a_rival_failed() -> None:
     assert len(found) == 3  # none of the arm that wasn't run
 
 
-def test_the_better_rival_counts() -> None:
+def test_the_better_baseline_counts() -> None:
     runs = [value("relgym", 0, 90, 90, course="ball"), value("sac", 0, 1, 1, 1, 90, 90, course="ball")]
     runs.append(value("sac20", 0, 1, 90, 90, course="ball"))
     (ratio,) = ROWS[3].show([({}, run) for run in runs]).measures
@@ -74,12 +74,12 @@ def test_dreamt_policies_and_speeds() -> None:
 def test_finished_runs_are_not_run_again_and_make_the_page(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    task = dyna_bars.wanted(ROWS[1], seeds=1, arms=["sac"])
+    task = dyna_benchmarks.wanted(ROWS[1], seeds=1, arms=["sac"])
     assert [t.arguments["arm"] for t in task] == ["sac"]
     ResultStore(tmp_path / "cache").put(task[0], Result(value("sac", 0, 42), 3.0))
     monkeypatch.setattr(type(task[0]), "run", None)  # nothing may be computed
     page = tmp_path / "docs" / "dream.md"
-    dyna_bars.main(["1", "--arms", "sac", "--seeds", "1", "--out", str(tmp_path), "--page", str(page)])
+    dyna_benchmarks.main(["1", "--arms", "sac", "--seeds", "1", "--out", str(tmp_path), "--page", str(page)])
     assert "> 60,000" in capsys.readouterr().out
     text = page.read_text()
     assert "row-1: TruckPush: real steps to success" in text and "(./dream-1.png)" in text
@@ -94,26 +94,26 @@ def test_a_page_keeps_what_was_made_elsewhere_and_what_was_written_by_hand(tmp_p
         task = next(t for t in ROWS[number].tasks if t.arguments.get("arm", "sac") == "sac")
         store.put(task, Result(result, 3.0))
     for number, folder in ((2, "a"), (1, "b")):
-        dyna_bars.shown(number, store, tmp_path / folder, "again")
-    dyna_bars.page(tmp_path / "a", page)
+        dyna_benchmarks.shown(number, store, tmp_path / folder, "again")
+    dyna_benchmarks.page(tmp_path / "a", page)
     second = page.read_text().split("\n## ")[1]
     remark = "\nAll in one night.\n\n```text\nand day\n```\n\nReally.\n"
     page.write_text(page.read_text() + remark)
-    dyna_bars.page(tmp_path / "b", page)
+    dyna_benchmarks.page(tmp_path / "b", page)
     head, row_1, row_2 = page.read_text().split("\n## ")
     assert "Not made yet: row-3, BallGoal" in head and row_1.startswith("row-1: ")
     assert row_2 == f"{second}{remark}"
-    dyna_bars.page(tmp_path / "a", page)
+    dyna_benchmarks.page(tmp_path / "a", page)
     assert page.read_text().split("\n## ") == [head, row_1, row_2]
 
 
 def test_a_row_of_which_nothing_is_known_says_so(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="nothing is known of row 5"):
-        dyna_bars.shown(5, ResultStore(tmp_path), tmp_path, "")
+        dyna_benchmarks.shown(5, ResultStore(tmp_path), tmp_path, "")
 
 
 def test_every_task_can_be_asked_for() -> None:
     for row in ROWS.values():
-        every = dyna_bars.wanted(row, seeds=5, arms=list(ARMS))
+        every = dyna_benchmarks.wanted(row, seeds=5, arms=list(ARMS))
         assert every == list(row.tasks)
-        assert dyna_bars.wanted(replace(row, tasks=()), seeds=5, arms=["sac"]) == []
+        assert dyna_benchmarks.wanted(replace(row, tasks=()), seeds=5, arms=["sac"]) == []

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scenes import random_vectors, schema_of
 
 from relgym.scene import Extractor
-from relgym.scene.sight import Pairs
+from relgym.scene.measurements import Pairs
 
 KINDS = ("ball", "box", "ramp", "hull", "box", "ball")
 

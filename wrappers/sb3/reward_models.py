@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig, ModelConfig
-from relgym.envs.tasks import Judgement, Judging
+from relgym.envs.tasks import RewardFunctions, TaskOutcome
 from relgym.errors import ConfigError, ModelFileError, SchemaError
 from relgym.model.prediction import BatchPrediction
 from relgym.model.storage import schema_from_json, schema_to_json
@@ -21,14 +21,14 @@ from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, ObjectType, Sce
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.sb3.acting import acting_all
 
-__all__ = ["Acting", "Judge", "LearnedTask", "NeuralModel", "NeuralTask", "check_rewards"]
+__all__ = ["Acting", "LearnedRewardModel", "NeuralModel", "NeuralRewardModel", "RewardModel", "check_rewards"]
 
 Acting: TypeAlias = Callable[[SceneLayout, Float2D, Any], tuple[SceneLayout, NDArray[np.float64]]]
 """From layout, state vectors and actions of the bare env to layout and state vectors with the actions in them."""
 
 _NOW, _NEXT = "now", "next"
 _TOLD: Final = ("reward", "terminated")
-_FILE: Final = "learned_task"  # under this name the rest of a judge stands in a model's file
+_FILE: Final = "learned_task"  # under this name the rest of a reward model stands in a model's file
 _RIGHT: Final = 1e-6  # how far a right verdict may be off
 
 _EXACT: Final = ModelConfig(
@@ -46,30 +46,30 @@ _REVIEW: Final = 10
 """Real steps between two such reviews while the modes stay the same ones: a review costs some milliseconds."""
 
 
-class Judge(Protocol):
+class RewardModel(Protocol):
     """Reward and termination of n steps; a `relgym.envs.tasks.Task` is one.
 
     One that learns says so (``learned = True``): where it doesn't know, its rewards are NaN. Of any other NaN is an
     error.
     """
 
-    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
-        """Judge n steps; scenes without actions, actions in the units of the bare env's space."""
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
+        """Evaluate n steps; scenes without actions, actions in the units of the bare env's space."""
 
 
-def check_rewards(rewards: NDArray[np.float64], judge: Judge) -> None:
-    """Raise `ConfigError` unless all rewards that a judge gave are finite."""
+def check_rewards(rewards: NDArray[np.float64], reward_model: RewardModel) -> None:
+    """Raise `ConfigError` unless all rewards that a reward model gave are finite."""
     if not np.isfinite(rewards).all():
         bad = rewards[~np.isfinite(rewards)][0]
         raise ConfigError(
-            f"{type(judge).__name__} gave a reward of {bad}: expected finite numbers; mend the reward function"
+            f"{type(reward_model).__name__} gave a reward of {bad}: expected finite numbers; mend the reward function"
         )
 
 
-class LearnedTask(Judging):
+class LearnedRewardModel(RewardFunctions):
     """Learns reward and termination as properties of the bodiless object `task`, with modes and clauses.
 
-    They are functions of the scene, the action and the next scene, so the judge's own little world has no
+    They are functions of the scene, the action and the next scene, so the reward model's own little world has no
     bodies: an object ``now`` with the properties of all objects that are the only one of their type, an object
     ``next`` with those of them that change, the action, and the task.
 
@@ -82,26 +82,26 @@ class LearnedTask(Judging):
     config
         Free parameters of the model; laws of motion have nothing to say here.
     acting
-        Puts actions into scenes; default: as the env does in which `Dyna` or `explore` let it judge, else by the
+        Puts actions into scenes; default: as the env does in which `Dyna` or `explore` let it predict rewards, else by the
         schema's affine maps.
 
     Attributes
     ----------
     model : WorldModel
-        What was learned: ``print(judge.model.describe())``.
+        What was learned: ``print(reward_model.model.describe())``.
 
     Notes
     -----
     What depends on one among several objects of a type can't be learned so.
 
-    It judges as an env's task does: dreams may be judged by it (`LearnedModelEnv`, argument ``task``). Where nothing is
+    It evaluates as an env's task does: dreams may be evaluated by it (`LearnedModelEnv`, argument ``task``). Where nothing is
     known, rewards are NaN.
 
     The reward may depend on whether the step ends the episode, as a bonus for success does: it is learned given that.
 
-    Policies seek out what a judge is wrong about. Where the bonus is a mode of its own, its clauses' thresholds and
+    Policies seek out what a reward model is wrong about. Where the bonus is a mode of its own, its clauses' thresholds and
     those of termination differ by a hair: in between, it would be paid without an end, again and again. So where the
-    two modes never were right of one and the same real step, the judge doesn't know.
+    two modes never were right of one and the same real step, the reward model doesn't know.
     """
 
     learned: Final = True
@@ -139,9 +139,9 @@ class LearnedTask(Judging):
         self._acting = self._acting or acting
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the judge to one file, atomically, with all that further learning needs; `load` reads it.
+        """Write the reward model to one file, atomically, with all that further learning needs; `load` reads it.
 
-        The file is a model's, of the judge's own little world: `relgym.WorldModel.load` reads that alone.
+        The file is a model's, of the reward model's own little world: `relgym.WorldModel.load` reads that alone.
         """
         remembered = {"ends": self._ends, "latest": self._latest, "earlier": self._earlier}
         data: dict[str, Any] = {name: [v.tolist() for v in part] for name, part in remembered.items()}
@@ -156,8 +156,8 @@ class LearnedTask(Judging):
         self.model.save(path, history=True, extra={**self.model.extra, _FILE: data})
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], *, acting: Acting | None = None) -> LearnedTask:
-        """Read what `save` wrote: it judges and learns on as if it had never been saved.
+    def load(cls, path: str | os.PathLike[str], *, acting: Acting | None = None) -> LearnedRewardModel:
+        """Read what `save` wrote: it evaluates and learns on as if it had never been saved.
 
         Parameters
         ----------
@@ -169,31 +169,31 @@ class LearnedTask(Judging):
         Raises
         ------
         ModelFileError
-            No file of a judge, a damaged one, or one of another version.
+            No file of a reward model, a damaged one, or one of another version.
         """
         model, extra = WorldModel.load_with_extra(path)
         if _FILE not in extra:
             raise ModelFileError(
-                f"{path} holds a model but no learned task: expected what LearnedTask.save wrote"
+                f"{path} holds a model but no learned task: expected what LearnedRewardModel.save wrote"
             )
         data = extra[_FILE]
         try:
-            judge = cls(
+            reward_model = cls(
                 schema_from_json(data["schema"]), {(t, p) for t, p in data["changing"]}, acting=acting
             )
-            judge._ends.extend(map(np.array, data["ends"]))
-            judge._latest.extend(map(np.array, data["latest"]))
-            judge._earlier.extend(map(np.array, data["earlier"]))
-            judge._passed, judge._rng.bit_generator.state = int(data["passed"]), data["rng"]
-            judge._together = {(int(r), int(e)) for r, e in data["together"]}
+            reward_model._ends.extend(map(np.array, data["ends"]))
+            reward_model._latest.extend(map(np.array, data["latest"]))
+            reward_model._earlier.extend(map(np.array, data["earlier"]))
+            reward_model._passed, reward_model._rng.bit_generator.state = int(data["passed"]), data["rng"]
+            reward_model._together = {(int(r), int(e)) for r, e in data["together"]}
             seen, modes = data["reviewed"]
-            judge._reviewed = (int(seen), tuple(modes))
+            reward_model._reviewed = (int(seen), tuple(modes))
         except (KeyError, TypeError, ValueError, SchemaError) as error:
             raise ModelFileError(
                 f"{path}: a part of the learned task is missing or malformed ({error!r}); save it again"
             ) from None
-        judge.model, model.extra = model, {name: part for name, part in extra.items() if name != _FILE}
-        return judge
+        reward_model.model, model.extra = model, {name: part for name, part in extra.items() if name != _FILE}
+        return reward_model
 
     def _small_schema(self) -> SceneSchema:
         kinds = {name: self.schema.type(t) for name, t in self.schema.objects}
@@ -252,7 +252,7 @@ class LearnedTask(Judging):
         elif place < _REMEMBERED:
             self._earlier[place] = oldest
 
-    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         """What the modes say; NaN where none does."""
         small = self.model.schema.layout()
         vectors = np.zeros((len(before), small.width))
@@ -263,7 +263,7 @@ class LearnedTask(Judging):
         known = found.ok & self._ever_together(found)
         rewards = np.where(known, found.vectors[:, small.column(task, "reward")], np.nan)
         ended = found.vectors[:, small.column(task, "terminated")] > 0.5
-        return Judgement(rewards, ended & known, np.zeros(len(before), dtype=bool))
+        return TaskOutcome(rewards, ended & known, np.zeros(len(before), dtype=bool))
 
     def _ever_together(self, found: BatchPrediction) -> NDArray[np.bool_]:
         """Where reward and termination come from modes that were right of one and the same real step."""
@@ -290,7 +290,7 @@ class LearnedTask(Judging):
     def _part(
         self, name: str, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
     ) -> NDArray[np.float64]:
-        """The properties of one of the judge's objects, shape ``(n, …)``."""
+        """The properties of one of the reward model's objects, shape ``(n, …)``."""
         if name == TASK:
             return np.zeros((len(before), 2))
         if name == ACTION:
@@ -309,25 +309,25 @@ def _pairs(found: BatchPrediction) -> list[tuple[int, int]]:
 
 
 class NeuralModel(Protocol):
-    """A model that foretells rewards and ends beside scenes, such as `relgym.baselines.NeuralWorldModel`."""
+    """A model that predicts rewards and ends beside scenes, such as `relgym.baselines.NeuralWorldModel`."""
 
     schema: SceneSchema
 
-    def judge_all(
+    def predict_rewards(
         self, layout: SceneLayout, vectors: Float2D
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Rewards and ends of n scenes with actions in them."""
 
 
-class NeuralTask:
-    """Lets a model judge that foretells rewards and ends itself.
+class NeuralRewardModel:
+    """A model that predicts rewards and ends itself, as a reward model.
 
     Parameters
     ----------
     model
         The model; it learns the task together with the scenes.
     acting
-        Puts actions into scenes; default: as of `LearnedTask`.
+        Puts actions into scenes; default: as of `LearnedRewardModel`.
     """
 
     learned: Final = True
@@ -337,11 +337,11 @@ class NeuralTask:
         self._acting = acting
 
     def adopt(self, acting: Acting) -> None:
-        """As of `LearnedTask`."""
+        """As of `LearnedRewardModel`."""
         self._acting = self._acting or acting
 
-    def judge(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Judgement:
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         """What the model says; the next scene doesn't matter to it."""
         acting = self._acting or partial(acting_all, self.model.schema)
-        rewards, ended = self.model.judge_all(*acting(layout, before, actions))
-        return Judgement(rewards, ended, np.zeros(len(before), dtype=bool))
+        rewards, ended = self.model.predict_rewards(*acting(layout, before, actions))
+        return TaskOutcome(rewards, ended, np.zeros(len(before), dtype=bool))

@@ -1,6 +1,6 @@
 """Issue "Chapter III whole": what must be shown, row by row, measured against its bar.
 
-``python -m relgym.experiments.bars 1 2 --json bars.json`` measures rows 1 and 2 and writes the figures down as well.
+``python -m relgym.experiments.thesis_benchmarks 1 2 --json bars.json`` measures rows 1 and 2 and writes the figures down as well.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
-from relgym.experiments.accuracy import AXES, Outcome, accuracy, ball_bars
-from relgym.experiments.bar import Measure, report
-from relgym.experiments.cost import query_bars, query_cost, step_bars, step_cost
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_blocks
+from relgym.experiments.accuracy import AXES, Outcome, accuracy, ball_measures
+from relgym.experiments.cost import query_cost, query_measures, step_cost, step_measures
+from relgym.experiments.criterion import Measure, report
+from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.noise import (
     SIGMAS,
     VARIANCES,
     NoiseOutcome,
     Sigma,
     best_sigmas,
-    noise_bars,
+    noise_measures,
     noise_outcomes,
 )
 from relgym.experiments.online import follow, last, learned
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
-from relgym.experiments.stream import box_then_ramp, prequential_bars, same_model, stream_bars
-from relgym.experiments.truck import bystander_bars, bystanders, counts, per_block, per_block_bars
+from relgym.experiments.stream import box_then_ramp, prequential_measures, same_model, stream_measures
+from relgym.experiments.truck import bystander_measures, bystanders, counts, per_episode, per_episode_measures
 
 __all__ = ["main"]
 
@@ -51,7 +51,7 @@ def _ball(experiment: int) -> Callable[[Request], Section]:
         for outcome in accuracy(experiment, training=request.training, tests=request.tests):
             outcomes.append(outcome)
             print("\n".join(_lines(outcome)), flush=True)
-        return f"experiment {experiment}", ball_bars(experiment, outcomes), []
+        return f"experiment {experiment}", ball_measures(experiment, outcomes), []
 
     return measure
 
@@ -79,47 +79,47 @@ def _lines(outcome: Outcome) -> list[str]:
 
 
 def _steps(request: Request) -> Section:
-    runs = [step_cost(ball_blocks(1, seed=seed)) for seed in request.training]
+    runs = [step_cost(ball_episodes(1, seed=seed)) for seed in request.training]
     notes = [
         f"total {run.total:.1f} s, of which resets {run.resets:.2f} s; by the clock {run.clock:.1f} s; "
         f"the engine alone {run.engine:.2f} s"
         for run in runs
     ]
-    return "cost per transition, experiment 1", step_bars(runs), notes
+    return "cost per transition, experiment 1", step_measures(runs), notes
 
 
 def _queries(request: Request) -> Section:
-    model = learned(ball_blocks(1, seed=request.training[0]))
-    costs = [query_cost(model, list(ball_blocks(1, seed=test, test=True))) for test in request.tests]
-    return "cost per query, experiment 1", query_bars(costs), []
+    model = learned(ball_episodes(1, seed=request.training[0]))
+    costs = [query_cost(model, list(ball_episodes(1, seed=test, test=True))) for test in request.tests]
+    return "cost per query, experiment 1", query_measures(costs), []
 
 
 def _prequential(request: Request) -> Section:
     laws = BALL_EXPERIMENTS[1].modes()
-    courses = [last(follow(ball_blocks(1, seed=seed), laws=laws)) for seed in request.training]
-    return "errors while learning, experiment 1", prequential_bars(courses), []
+    courses = [last(follow(ball_episodes(1, seed=seed), laws=laws)) for seed in request.training]
+    return "errors while learning, experiment 1", prequential_measures(courses), []
 
 
 def _stream(request: Request) -> Section:
-    same = [same_model(ball_blocks(1, seed=seed, blocks=16), 8) for seed in request.training]
+    same = [same_model(ball_episodes(1, seed=seed, episodes=16), 8) for seed in request.training]
     kinds = [box_then_ramp(seed=seed, test=request.tests[0]) for seed in request.training]
     notes = [f"box-only scenes wrong before {each.before}, after {each.after}" for each in kinds]
-    return "what later blocks may not change", stream_bars(same, kinds), notes
+    return "what later episodes may not change", stream_measures(same, kinds), notes
 
 
-def _per_block(request: Request) -> Section:
-    outcomes = [per_block(seed=seed, test=request.tests[0]) for seed in request.training]
+def _per_episode(request: Request) -> Section:
+    outcomes = [per_episode(seed=seed, test=request.tests[0]) for seed in request.training]
     exact = sum(outcome.found == 3 and not outcome.spurious for outcome in outcomes)
     notes = [f"exactly three modes: {exact} of {len(outcomes)} seeds"]
     notes += [f"other modes: {each.spurious}; noise: {each.noise}" for each in outcomes if each.spurious]
-    return "truck-push, constants per block", per_block_bars(outcomes), notes
+    return "truck-push, constants per episode", per_episode_measures(outcomes), notes
 
 
 def _bystanders(request: Request) -> Section:
     test = request.tests[0]
     beside = [bystanders(seed=seed, test=test) for seed in request.training]
     counted = [counts(seed=seed, test=test) for seed in request.training]
-    return "truck-push, bystanders and 2, 3 and 4 boxes", bystander_bars(beside, counted), []
+    return "truck-push, bystanders and 2, 3 and 4 boxes", bystander_measures(beside, counted), []
 
 
 def _heard(outcomes: Iterable[NoiseOutcome]) -> Iterator[NoiseOutcome]:
@@ -139,7 +139,7 @@ def _noise(request: Request) -> Section:
         chosen = sigmas.setdefault(variance, ["auto"])
         chosen += [sigma] if sigma not in chosen else []
     outcomes = list(_heard(noise_outcomes(training=request.training, test=request.tests[0], sigmas=sigmas)))
-    return "noise, experiment 1", noise_bars(outcomes, best), []
+    return "noise, experiment 1", noise_measures(outcomes, best), []
 
 
 ROWS: Final[Mapping[int, Callable[[Request], Section]]] = {
@@ -150,7 +150,7 @@ ROWS: Final[Mapping[int, Callable[[Request], Section]]] = {
     6: _stream,
     7: _steps,
     8: _queries,
-    9: _per_block,
+    9: _per_episode,
     10: _bystanders,
     11: _noise,
 }

@@ -16,10 +16,10 @@ from relgym.envs.scripted import ball_home, push_knowing
 from relgym.errors import ConfigError, ModelFileError
 from relgym.scene.objects import ObjectType, Target, Transition
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.sb3.apprentice import Apprentice
-from relgym.wrappers.sb3.judges import LearnedTask
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
+from relgym.wrappers.sb3.reward_models import LearnedRewardModel
 from relgym.wrappers.sb3.stock import changing
+from relgym.wrappers.sb3.trainer import ModelTrainer
 
 MOVING = {("truck", "vx"), ("truck", "px"), ("goal", "ahead"), ("box", "px")}
 
@@ -40,8 +40,8 @@ def pushes(n: int, knowing: float, rng: np.random.Generator) -> list[Experience]
     return found
 
 
-def verdicts(judge: Any, steps: list[Experience]) -> Any:
-    return judge.judge(
+def verdicts(reward_model: Any, steps: list[Experience]) -> Any:
+    return reward_model.evaluate(
         steps[0].start.layout,
         np.stack([s.start.vector for s in steps]),
         np.stack([s.action for s in steps]),
@@ -51,13 +51,13 @@ def verdicts(judge: Any, steps: list[Experience]) -> Any:
 
 def test_the_push_task_is_learned_from_what_it_says(rng: np.random.Generator) -> None:
     steps = [*pushes(300, 0.0, rng), *pushes(700, 0.9, rng)]
-    judge = LearnedTask(steps[0].start.schema, MOVING)
+    reward_model = LearnedRewardModel(steps[0].start.schema, MOVING)
     for k in rng.permutation(len(steps)):
-        judge.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
-    assert "reward' = 0.1 next.truck_vx - 0.02" in judge.model.describe()
-    assert "reward' = 1.98" in judge.model.describe()
+        reward_model.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
+    assert "reward' = 0.1 next.truck_vx - 0.02" in reward_model.model.describe()
+    assert "reward' = 1.98" in reward_model.model.describe()
     fresh = pushes(300, 0.9, rng)
-    said = verdicts(judge, fresh)
+    said = verdicts(reward_model, fresh)
     known = np.isfinite(said.rewards)
     assert known.mean() > 0.99
     off = np.abs(said.rewards - [s.reward for s in fresh])[known]
@@ -67,9 +67,9 @@ def test_the_push_task_is_learned_from_what_it_says(rng: np.random.Generator) ->
 
 def test_it_knows_no_verdict_whose_parts_never_went_together(rng: np.random.Generator) -> None:
     steps = [*pushes(200, 0.0, rng), *pushes(400, 0.9, rng)]
-    judge = LearnedTask(steps[0].start.schema, MOVING)
+    reward_model = LearnedRewardModel(steps[0].start.schema, MOVING)
     for step in steps:
-        judge.learn_step(step.transition, step.reward, terminated=step.terminated)
+        reward_model.learn_step(step.transition, step.reward, terminated=step.terminated)
     # On the goal, slower and slower. Only a stop is paid for, and a stop is an end.
     goal = steps[0].start.schema.type_of("goal")
     start = steps[0].start.replace({("goal", "ahead"): 0.3, ("truck", "vx"): 0.2})
@@ -77,7 +77,7 @@ def test_it_knows_no_verdict_whose_parts_never_went_together(rng: np.random.Gene
     speeds = np.concatenate([np.linspace(0.0, 0.1, 2_001), [0.0]])
     after = np.stack([start.replace({("truck", "vx"): v, ("goal", "ahead"): 0.3 - v}).vector for v in speeds])
     before = np.tile(start.vector, (len(speeds), 1))
-    said = judge.judge(start.layout, before, np.zeros((len(speeds), 1)), after)
+    said = reward_model.evaluate(start.layout, before, np.zeros((len(speeds), 1)), after)
     paid = np.nan_to_num(said.rewards) > 1.0
     assert paid[0] and said.terminated[0]
     assert (said.terminated[paid]).all()
@@ -86,14 +86,14 @@ def test_it_knows_no_verdict_whose_parts_never_went_together(rng: np.random.Gene
 def test_ends_are_not_forgotten_among_many_steps_that_end_nothing(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("relgym.wrappers.sb3.judges._REMEMBERED", 100)
+    monkeypatch.setattr("relgym.wrappers.sb3.reward_models._REMEMBERED", 100)
     steps = [*pushes(200, 0.0, rng), *pushes(400, 0.9, rng)]
-    judge = LearnedTask(steps[0].start.schema, MOVING)
+    reward_model = LearnedRewardModel(steps[0].start.schema, MOVING)
     others = [step for step in steps if not step.terminated]
     for step in [*steps, *others[:150]]:
-        judge.learn_step(step.transition, step.reward, terminated=step.terminated)
+        reward_model.learn_step(step.transition, step.reward, terminated=step.terminated)
     paid = [step for step in steps if step.terminated and step.reward > 1.0]
-    said = verdicts(judge, paid)
+    said = verdicts(reward_model, paid)
     assert np.isfinite(said.rewards).mean() > 0.9
     assert said.terminated.mean() > 0.9
 
@@ -101,25 +101,25 @@ def test_ends_are_not_forgotten_among_many_steps_that_end_nothing(
 def test_what_is_paid_for_elsewhere_is_not_forgotten(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("relgym.wrappers.sb3.judges._REMEMBERED", 50)
+    monkeypatch.setattr("relgym.wrappers.sb3.reward_models._REMEMBERED", 50)
     car = ObjectType("car", ("x",))
     schema = SceneSchema((car,), (("car", "car"),), targets=(Target("car", "x"),))
-    judge = LearnedTask(schema, {("car", "x")})
+    reward_model = LearnedRewardModel(schema, {("car", "x")})
 
     def step(x: float) -> Transition:
         return Transition(schema.scene({"car": [x - 0.1]}), schema.scene({"car": [x]}))
 
     for x in [*rng.uniform(-1.0, 1.0, 200), *rng.uniform(0.0, 1.0, 300)]:  # it lives on one side in the end
-        judge.learn_step(step(x), abs(x), terminated=False)
+        reward_model.learn_step(step(x), abs(x), terminated=False)
     there = np.linspace(-0.9, -0.1, 9)[:, None]
-    said = judge.judge(schema.layout(), there - 0.1, np.zeros((9, 0)), there)
+    said = reward_model.evaluate(schema.layout(), there - 0.1, np.zeros((9, 0)), there)
     assert said.rewards == pytest.approx(-there[:, 0])
 
 
 def test_it_says_nothing_before_it_was_told(rng: np.random.Generator) -> None:
     steps = pushes(5, 0.0, rng)
-    judge = LearnedTask(steps[0].start.schema, MOVING)
-    said = verdicts(judge, steps)
+    reward_model = LearnedRewardModel(steps[0].start.schema, MOVING)
+    said = verdicts(reward_model, steps)
     assert np.isnan(said.rewards).all()
     assert not said.terminated.any()
 
@@ -146,13 +146,15 @@ def homecomings(seeds: range) -> list[list[Experience]]:
 def test_a_few_ends_show_what_an_end_is_paid_for() -> None:
     # Dozens of numbers might say when; the law of progress is the same as ever, and the bonus comes on top.
     taught, fresh = homecomings(range(7)), homecomings(range(100, 106))
-    judge = LearnedTask(taught[0][0].start.schema, changing(relgym.WorldModel(taught[0][0].start.schema)))
+    reward_model = LearnedRewardModel(
+        taught[0][0].start.schema, changing(relgym.WorldModel(taught[0][0].start.schema))
+    )
     for episode in taught:
         for step in episode:
-            judge.learn_step(step.transition, step.reward, terminated=step.terminated)
-    assert "2 terminated'" in judge.model.describe()
-    assert "terminated' = 1" in judge.model.describe()
-    said = [verdicts(judge, episode) for episode in fresh]
+            reward_model.learn_step(step.transition, step.reward, terminated=step.terminated)
+    assert "2 terminated'" in reward_model.model.describe()
+    assert "terminated' = 1" in reward_model.model.describe()
+    said = [verdicts(reward_model, episode) for episode in fresh]
     right = [abs(v.rewards[-1] - e[-1].reward) < 1e-6 for v, e in zip(said, fresh, strict=True)]
     assert len(fresh) >= 5
     assert np.mean(right) > 0.5
@@ -161,48 +163,50 @@ def test_a_few_ends_show_what_an_end_is_paid_for() -> None:
 
 def test_saved_and_loaded_it_goes_on_as_if_never_saved(rng: np.random.Generator, tmp_path: Path) -> None:
     steps = [*pushes(200, 0.0, rng), *pushes(500, 0.9, rng)]
-    judge = LearnedTask(steps[0].start.schema, MOVING)
+    reward_model = LearnedRewardModel(steps[0].start.schema, MOVING)
     for step in steps[:600]:
-        judge.learn_step(step.transition, step.reward, terminated=step.terminated)
-    judge.save(tmp_path / "task.relgym")
-    again = LearnedTask.load(tmp_path / "task.relgym")
-    for each in (judge, again):
+        reward_model.learn_step(step.transition, step.reward, terminated=step.terminated)
+    reward_model.save(tmp_path / "task.relgym")
+    again = LearnedRewardModel.load(tmp_path / "task.relgym")
+    for each in (reward_model, again):
         for step in steps[600:]:
             each.learn_step(step.transition, step.reward, terminated=step.terminated)
     fresh = pushes(100, 0.9, rng)
-    one, two = verdicts(judge, fresh), verdicts(again, fresh)
+    one, two = verdicts(reward_model, fresh), verdicts(again, fresh)
     assert np.isfinite(one.rewards).any()
     np.testing.assert_array_equal(one.rewards, two.rewards)
     np.testing.assert_array_equal(one.terminated, two.terminated)
-    for number, each in enumerate((judge, again)):
+    for number, each in enumerate((reward_model, again)):
         each.save(tmp_path / f"{number}.relgym")
     assert (tmp_path / "0.relgym").read_bytes() == (tmp_path / "1.relgym").read_bytes()
-    assert relgym.WorldModel.load(tmp_path / "0.relgym").describe() == judge.model.describe()
+    assert relgym.WorldModel.load(tmp_path / "0.relgym").describe() == reward_model.model.describe()
 
 
 def test_other_files_are_no_learned_task(tmp_path: Path) -> None:
     schema = gym.make("relgym/TruckPush-v0").unwrapped.schema  # type: ignore[attr-defined]
     relgym.WorldModel(schema).save(tmp_path / "world.relgym")
-    with pytest.raises(ModelFileError, match=r"no learned task: expected what LearnedTask\.save wrote"):
-        LearnedTask.load(tmp_path / "world.relgym")
-    judge = LearnedTask(schema, MOVING)
-    judge.model.save(tmp_path / "half.relgym", history=True, extra={"learned_task": {"ends": []}})
+    with pytest.raises(
+        ModelFileError, match=r"no learned task: expected what LearnedRewardModel\.save wrote"
+    ):
+        LearnedRewardModel.load(tmp_path / "world.relgym")
+    reward_model = LearnedRewardModel(schema, MOVING)
+    reward_model.model.save(tmp_path / "half.relgym", history=True, extra={"learned_task": {"ends": []}})
     with pytest.raises(ModelFileError, match="a part of the learned task is missing or malformed"):
-        LearnedTask.load(tmp_path / "half.relgym")
+        LearnedRewardModel.load(tmp_path / "half.relgym")
 
 
-def test_dreams_are_judged_by_what_was_learned(rng: np.random.Generator) -> None:
-    """As the world judges them; and where nothing is known they are cut off, one by one and in batches alike."""
+def test_dreams_are_evaluated_by_what_was_learned(rng: np.random.Generator) -> None:
+    """As the world evaluates them; and where nothing is known they are cut off, one by one and in batches alike."""
     real = gym.make("relgym/TruckPush-v0", disable_env_checker=True)
     steps = [*pushes(200, 0.0, rng), *pushes(400, 0.9, rng)]
     model = relgym.WorldModel(steps[0].start.schema)
-    judge = LearnedTask(model.schema, MOVING)
+    reward_model = LearnedRewardModel(model.schema, MOVING)
     for k in rng.permutation(len(steps)):
         model.learn_one(steps[k].transition)
-        judge.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
+        reward_model.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
     model.finish()
-    dream = LearnedModelEnv(model, like=real, task=judge)
-    dreams = LearnedModelVectorEnv(model, 1, like=real, task=judge, autoreset_mode="Disabled")
+    dream = LearnedModelEnv(model, like=real, task=reward_model)
+    dreams = LearnedModelVectorEnv(model, 1, like=real, task=reward_model, autoreset_mode="Disabled")
     task, right = real.get_wrapper_attr("task"), []
     for episode in range(16):
         _, info = real.reset(seed=episode)
@@ -222,11 +226,11 @@ def test_dreams_are_judged_by_what_was_learned(rng: np.random.Generator) -> None
             right.append((pytest.approx(reward, abs=1e-6), over) == expected)
     assert len(right) > 40
     assert np.mean(right) > 0.95
-    nothing = LearnedTask(model.schema, MOVING)
+    nothing = LearnedRewardModel(model.schema, MOVING)
     unsure = LearnedModelEnv(model, like=real, task=nothing)
     unsure.reset(seed=0)
     _, reward, over, cut, told = unsure.step(np.array([0.5]))
-    assert (reward, over, cut, told["cause"]) == (0.0, False, True, "unjudged")
+    assert (reward, over, cut, told["cause"]) == (0.0, False, True, "no_reward")
     assert "nothing that was learned of the task" in told["reason"]
 
 
@@ -241,20 +245,20 @@ def test_dyna_learns_the_task_beside_the_world() -> None:
     torch.set_num_threads(1)
     env = FlatView(TransitionRecorder(gym.make("relgym/TruckPush-v0", task="push", disable_env_checker=True)))
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
-    dyna = Dyna(model, DynaConfig(updates=1, shuffle=20), judge="learned")
+    dyna = Dyna(model, DynaConfig(updates=1, shuffle=20), reward_model="learned")
     agent = SAC(
         "MlpPolicy", env, learning_starts=10_000, device="cpu", **replay_options(env.observation_space)
     )
     agent.learn(250, callback=dyna)
-    judge = dyna.apprentice.judge
-    assert isinstance(judge, LearnedTask)
-    assert (model.seen, judge.model.seen) == (250, 250)
-    assert 0.0 < dyna.apprentice.gate.error < 1.0
+    reward_model = dyna.trainer.reward_model
+    assert isinstance(reward_model, LearnedRewardModel)
+    assert (model.seen, reward_model.model.seen) == (250, 250)
+    assert 0.0 < dyna.trainer.acceptance.error < 1.0
 
 
 @pytest.mark.sb3
 def test_actions_come_into_scenes_as_the_env_has_them() -> None:
-    """Three choices are a number and three indicators in its scenes: a judge of one's own learns that from the env."""
+    """Three choices are a number and three indicators in its scenes: a reward model of one's own learns that from the env."""
     from relgym.wrappers.sb3.dreaming import explore
 
     class Paying(gym.Env[Any, Any]):
@@ -272,10 +276,10 @@ def test_actions_come_into_scenes_as_the_env_has_them() -> None:
 
     env = TransitionRecorder(Paying())
     schema = env.view.schema
-    judge = LearnedTask(schema, {("self", "x")})
+    reward_model = LearnedRewardModel(schema, {("self", "x")})
     bare, nothing, choices = schema.layout(("self",)), np.zeros((3, 1)), np.arange(3)
-    explore(Apprentice(relgym.WorldModel(schema), judge), env, 120, seed=0)
-    told = judge.judge(bare, nothing, choices, np.array([[0.0], [1.0], [0.0]]))
+    explore(ModelTrainer(relgym.WorldModel(schema), reward_model), env, 120, seed=0)
+    told = reward_model.evaluate(bare, nothing, choices, np.array([[0.0], [1.0], [0.0]]))
     np.testing.assert_allclose(told.rewards, [0.0, 1.0, 0.0], atol=1e-6)
     with pytest.raises(ConfigError, match=r"expected 4 numbers for each action.*Lens\(env\)\.acting"):
-        LearnedTask(schema, {("self", "x")}).judge(bare, nothing, choices, nothing)
+        LearnedRewardModel(schema, {("self", "x")}).evaluate(bare, nothing, choices, nothing)

@@ -1,6 +1,6 @@
 """Issue "Dream": what must be shown, row by row, measured against its bar.
 
-``python -m relgym.experiments.dyna_bars 1 --arms relgym sac --seeds 2`` runs two arms of row 1 with two seeds each, and
+``python -m relgym.experiments.dyna_benchmarks 1 --arms relgym sac --seeds 2`` runs two arms of row 1 with two seeds each, and
 reports all that is known of the row. Results are kept in a store: what is there already isn't computed again, so that
 the whole comparison (``make dyna-full``) can be stopped and resumed. ``--page`` writes the page of results.
 """
@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Final
 
 from relgym.errors import StoreError
-from relgym.experiments.bar import report
 from relgym.experiments.chapter4.reproduce import Made, section
+from relgym.experiments.criterion import report
 from relgym.experiments.dyna_arms import ARMS
-from relgym.experiments.dyna_rows import ROWS, Found, Row
+from relgym.experiments.dyna_measures import ROWS, Found, Row
 from relgym.experiments.jobs.run import run
 from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
@@ -31,7 +31,7 @@ __all__ = ["main", "page", "shown", "wanted"]
 
 _HEAD: Final = """# What dreaming is worth
 
-`python -m relgym.experiments.dyna_bars` wrote this page, but for what stands below the tables, which it leaves alone.
+`python -m relgym.experiments.dyna_benchmarks` wrote this page, but for what stands below the tables, which it leaves alone.
 Each section is a row of bars. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than five, no
 more were run (*of* in the tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250 real
 steps; *each* lists the real steps to it, the smallest first. *time* is processor time, tests included (a run has one
@@ -129,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for progress in run(tasks, store, workers=chosen.jobs):
         print(f"{progress.done} of {progress.total} runs", file=sys.stderr, flush=True)
     for number in chosen.rows:
-        command = shlex.join(["python", "-m", "relgym.experiments.dyna_bars", str(number)])
+        command = shlex.join(["python", "-m", "relgym.experiments.dyna_benchmarks", str(number)])
         print(shown(number, store, chosen.out, command).text, flush=True)
     if chosen.page is not None:
         page(chosen.out, chosen.page)

@@ -1,4 +1,4 @@
-"""Trust is earned on real steps: a model of the same world is trusted, one of half the friction never."""
+"""Trust is earned on real steps: a model of the same world is accepted, one of half the friction never."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pytest
 
 import relgym
 from relgym.scene.objects import Transition
-from relgym.wrappers.sb3.apprentice import Apprentice
 from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.judges import LearnedTask
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
+from relgym.wrappers.sb3.reward_models import LearnedRewardModel
 from relgym.wrappers.sb3.stock import changing
+from relgym.wrappers.sb3.trainer import ModelTrainer
 
 
 def make(**arguments: Any) -> Any:
@@ -35,45 +35,45 @@ def steps(n: int, *, seed: int, **arguments: Any) -> list[Experience]:
 
 
 @pytest.mark.parametrize("halved", [False, True])
-def test_only_a_model_of_this_world_is_trusted(halved: bool, rng: np.random.Generator) -> None:
+def test_only_a_model_of_this_world_is_accepted(halved: bool, rng: np.random.Generator) -> None:
     lessons = steps(350, seed=1, gravity=5.0 if halved else 10.0)
     model = relgym.WorldModel(lessons[0].start.schema)
     for k in rng.permutation(len(lessons)):
         model.learn_one(lessons[k].transition)
     model.frozen = True  # as if it had been loaded without its history
     seen = model.seen
-    apprentice = Apprentice(model, make().get_wrapper_attr("task"), DynaConfig(least=50))
+    trainer = ModelTrainer(model, make().get_wrapper_attr("task"), DynaConfig(least=50))
     opened = []
     for real in steps(200, seed=2):
-        apprentice.take_up(real)
-        opened.append(apprentice.gate.open)
-    assert apprentice.gate.known > 0.95  # it speaks with as much confidence
+        trainer.take_up(real)
+        opened.append(trainer.acceptance.accepted)
+    assert trainer.acceptance.known > 0.95  # it speaks with as much confidence
     assert any(opened) is not halved
-    assert (apprentice.gate.error > 0.25) is halved
-    assert model.seen == seen  # a frozen model is judged, and learns nothing
+    assert (trainer.acceptance.error > 0.25) is halved
+    assert model.seen == seen  # a frozen model is evaluated, and learns nothing
 
 
-def test_a_model_that_leaves_out_what_moves_is_not_trusted() -> None:
+def test_a_model_that_leaves_out_what_moves_is_not_accepted() -> None:
     env = make()
     model = relgym.WorldModel(env.get_wrapper_attr("schema"), targets=())
-    apprentice = Apprentice(model, env.get_wrapper_attr("task"), DynaConfig(shuffle=0, least=5))
+    trainer = ModelTrainer(model, env.get_wrapper_attr("task"), DynaConfig(shuffle=0, least=5))
     for real in steps(40, seed=3):
-        apprentice.take_up(real)
-    assert apprentice.gate.known == 1.0  # nothing changes, it says
-    assert apprentice.gate.error > 0.5
-    assert not apprentice.gate.open
+        trainer.take_up(real)
+    assert trainer.acceptance.known == 1.0  # nothing changes, it says
+    assert trainer.acceptance.error > 0.5
+    assert not trainer.acceptance.accepted
 
 
 @pytest.mark.parametrize("frozen", [False, True])
-def test_a_judge_learns_at_once(frozen: bool) -> None:
+def test_a_reward_model_learns_at_once(frozen: bool) -> None:
     lessons = steps(20, seed=1)
     model = relgym.WorldModel(lessons[0].start.schema)
     model.frozen = frozen
-    judge = LearnedTask(model.schema, changing(model))
-    apprentice = Apprentice(model, judge, DynaConfig(shuffle=15))
+    reward_model = LearnedRewardModel(model.schema, changing(model))
+    trainer = ModelTrainer(model, reward_model, DynaConfig(shuffle=15))
     for count, real in enumerate(lessons, start=1):
-        apprentice.take_up(real)
-        assert judge.model.seen == count
+        trainer.take_up(real)
+        assert reward_model.model.seen == count
     assert model.seen == (0 if frozen else 5)
 
 
@@ -102,9 +102,9 @@ def test_lessons_come_in_random_order() -> None:
     order: list[list[int]] = []
     for shuffle in (0, 10, 10):
         model = Listening()
-        apprentice = Apprentice(model, task, DynaConfig(shuffle=shuffle))
+        trainer = ModelTrainer(model, task, DynaConfig(shuffle=shuffle))
         for real in lessons:
-            apprentice.take_up(real)
+            trainer.take_up(real)
         order.append([[real.transition for real in lessons].index(heard) for heard in model.heard])
     assert order[0] == list(range(30))
     assert sorted(order[1]) != order[1]
@@ -112,23 +112,23 @@ def test_lessons_come_in_random_order() -> None:
     assert order[1] == order[2]
 
 
-def test_in_a_changed_world_a_rival_takes_the_models_place() -> None:
-    """With half the gravity all friction is halved: the old laws count on, the rival knows only the new ones."""
+def test_in_a_changed_world_a_replacement_takes_the_models_place() -> None:
+    """With half the gravity all friction is halved: the old laws count on, the replacement knows only the new ones."""
     before, after = (steps(n, seed=s, gravity=g) for n, s, g in ((400, 1, 10.0), (500, 2, 5.0)))
     config, models = DynaConfig(least=50), []
     for renew in (1_000, 0):
         model = relgym.WorldModel(before[0].start.schema)
-        apprentice = Apprentice(model, make().get_wrapper_attr("task"), replace(config, renew=renew))
+        trainer = ModelTrainer(model, make().get_wrapper_attr("task"), replace(config, renew=renew))
         for real in before:
-            apprentice.take_up(real)
-        assert apprentice.gate.open and apprentice.model is model
+            trainer.take_up(real)
+        assert trainer.acceptance.accepted and trainer.model is model
         known = model.describe()
         for real in after:
-            apprentice.take_up(real)
-        assert (apprentice.gate.open, apprentice.renewals) == (bool(renew), int(bool(renew)))
-        models.append(apprentice.model)
+            trainer.take_up(real)
+        assert (trainer.acceptance.accepted, trainer.renewals) == (bool(renew), int(bool(renew)))
+        models.append(trainer.model)
         if renew:
-            assert apprentice.model is not model
+            assert trainer.model is not model
             assert model.describe() != known  # it learned on for as long as nobody was better
     weights = {
         abs(weight)

@@ -17,20 +17,20 @@ from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "LEARNED",
-    "BatchJudge",
-    "BatchJudges",
-    "Judge",
-    "Judges",
+    "BatchSceneFunction",
+    "BatchStepEvaluator",
+    "SceneFunction",
+    "StepEvaluator",
     "TaskFunctions",
-    "check_judges",
+    "check_reward_functions",
     "in_batches",
     "marked",
 ]
 
-Judge: TypeAlias = Callable[[Scene, Any, Scene], float]
+SceneFunction: TypeAlias = Callable[[Scene, Any, Scene], float]
 """A function of the scene before, the action taken and the scene after; the scenes hold no action object."""
 
-BatchJudge: TypeAlias = Callable[[SceneLayout, Float2D, Any, Float2D], NDArray[Any]]
+BatchSceneFunction: TypeAlias = Callable[[SceneLayout, Float2D, Any, Float2D], NDArray[Any]]
 """The same for n scenes: layout, state vectors before, actions, state vectors after; returns shape ``(n,)``."""
 
 LEARNED: Final = "learned"
@@ -64,19 +64,19 @@ class TaskFunctions(Protocol):
         ...
 
 
-def check_judges(
+def check_reward_functions(
     reward: Any, terminated: Any, task: Any, model: WorldModel, *, batched: bool, at_once: bool
 ) -> None:
-    """Check what was given to judge by, before any dream begins.
+    """Check what was given to evaluate steps by, before any dream begins.
 
     Parameters
     ----------
     reward, terminated, task
         As given.
     model
-        Whose dreams are judged.
+        Whose dreams are evaluated.
     batched
-        Whether functions judge n steps at once.
+        Whether functions evaluate n steps at once.
     at_once
         Whether the model has learned all that it ever will: else what it is to have ``"learned"`` is asked for when a
         dream begins.
@@ -100,15 +100,15 @@ def check_judges(
             _check_arguments(prop, given, batched=batched)
 
 
-def _check_arguments(prop: str, judge: Any, *, batched: bool) -> None:
-    if not takes(judge, 4 if batched else 3):
+def _check_arguments(prop: str, function: Any, *, batched: bool) -> None:
+    if not takes(function, 4 if batched else 3):
         told = (
             "(layout, vectors before, actions, vectors after); in_batches(schema, function) makes one of a function of "
             "scenes"
             if batched
             else "(scene before, action, scene after)"
         )
-        raise ConfigError(f"{prop}: expected a function of {told}, got {judge!r}")
+        raise ConfigError(f"{prop}: expected a function of {told}, got {function!r}")
 
 
 def _has_learned(model: WorldModel, prop: str) -> bool:
@@ -154,25 +154,25 @@ def _doubts(task: Any) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Judges:
+class StepEvaluator:
     """Reward and termination of single steps: each a function, `LEARNED` (the next scene tells), or None.
 
     `doubts`: NaN is no error, but says that nobody knows.
     """
 
-    reward: Judge | Literal["learned"] | None
-    terminated: Judge | Literal["learned"] | None
+    reward: SceneFunction | Literal["learned"] | None
+    terminated: SceneFunction | Literal["learned"] | None
     doubts: bool = False
 
     @classmethod
     def of(
         cls,
-        reward: Judge | Literal["learned"] | None,
-        terminated: Judge | Literal["learned"] | None,
+        reward: SceneFunction | Literal["learned"] | None,
+        terminated: SceneFunction | Literal["learned"] | None,
         task: TaskFunctions | None,
         model: WorldModel,
-    ) -> Judges:
-        """Settle who judges: what was given, else the task, else what the model has learned by now, else nobody.
+    ) -> StepEvaluator:
+        """Settle who says what steps are worth: what was given, else the task, else what the model has learned by now, else nobody.
 
         Raises
         ------
@@ -188,7 +188,7 @@ class Judges:
 
     @property
     def overruled(self) -> frozenset[tuple[str, str]]:
-        """(object, property) pairs that another than the model judges, whatever it says of them."""
+        """(object, property) pairs that something else than the model says, whatever it says of them."""
         return _overruled(self.reward, self.terminated)
 
     def __call__(self, before: Scene, action: Any, after: Scene) -> tuple[float, bool]:
@@ -198,22 +198,22 @@ class Judges:
 
 
 def _overruled(reward: Any, terminated: Any) -> frozenset[tuple[str, str]]:
-    judges = {"reward": reward, "terminated": terminated}
-    return frozenset((TASK, prop) for prop, judge in judges.items() if callable(judge))
+    evaluator = {"reward": reward, "terminated": terminated}
+    return frozenset((TASK, prop) for prop, function in evaluator.items() if callable(function))
 
 
 def _verdict(
     prop: str,
-    judge: Judge | Literal["learned"] | None,
+    function: SceneFunction | Literal["learned"] | None,
     before: Scene,
     action: Any,
     after: Scene,
     *,
     doubts: bool = False,
 ) -> float:
-    if judge is None:
+    if function is None:
         return 0.0
-    told = after[TASK][prop] if isinstance(judge, str) else judge(before, action, after)
+    told = after[TASK][prop] if isinstance(function, str) else function(before, action, after)
     try:
         value = float(told)
     except (TypeError, ValueError, OverflowError):
@@ -228,24 +228,24 @@ def _verdict(
 
 
 @dataclass(frozen=True, slots=True)
-class BatchJudges:
-    """`Judges` of n steps at once."""
+class BatchStepEvaluator:
+    """`StepEvaluator` of n steps at once."""
 
     layout: SceneLayout
-    reward: BatchJudge | Literal["learned"] | None
-    terminated: BatchJudge | Literal["learned"] | None
+    reward: BatchSceneFunction | Literal["learned"] | None
+    terminated: BatchSceneFunction | Literal["learned"] | None
     doubts: bool = False
 
     @classmethod
     def of(
         cls,
-        reward: BatchJudge | Literal["learned"] | None,
-        terminated: BatchJudge | Literal["learned"] | None,
+        reward: BatchSceneFunction | Literal["learned"] | None,
+        terminated: BatchSceneFunction | Literal["learned"] | None,
         task: TaskFunctions | None,
         model: WorldModel,
         layout: SceneLayout,
-    ) -> BatchJudges:
-        """As `Judges.of`."""
+    ) -> BatchStepEvaluator:
+        """As `StepEvaluator.of`."""
         own = _functions(task, "rewards", "terminations")
         return cls(
             layout,
@@ -256,7 +256,7 @@ class BatchJudges:
 
     @property
     def overruled(self) -> frozenset[tuple[str, str]]:
-        """As of `Judges`."""
+        """As of `StepEvaluator`."""
         return _overruled(self.reward, self.terminated)
 
     def __call__(self, before: Float2D, actions: Any, after: Float2D) -> tuple[Float1D, NDArray[np.bool_]]:
@@ -273,19 +273,19 @@ class BatchJudges:
     def _verdicts(
         self,
         prop: str,
-        judge: BatchJudge | Literal["learned"] | None,
+        function: BatchSceneFunction | Literal["learned"] | None,
         before: Float2D,
         actions: Any,
         after: Float2D,
         *,
         doubts: bool = False,
     ) -> Float1D:
-        if judge is None:
+        if function is None:
             return np.zeros(len(after))
-        if isinstance(judge, str):
+        if isinstance(function, str):
             return after[:, self.layout.column(self.layout.index(TASK), prop)].copy()
         what = _WORDS[prop]
-        told: Any = judge(self.layout, before, actions, after)
+        told: Any = function(self.layout, before, actions, after)
         try:
             found = np.asarray(told, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):  # no numbers, or not as many in each row
@@ -313,15 +313,15 @@ def marked(task: Any, scene: Scene) -> tuple[Any, ...]:
     return () if regions is None else tuple(regions(scene))
 
 
-def in_batches(schema: SceneSchema, judge: Judge) -> BatchJudge:
+def in_batches(schema: SceneSchema, function: SceneFunction) -> BatchSceneFunction:
     """Array version of a function of (scene, action, next scene): it goes through the scenes one by one.
 
     For convenience, not for speed: a function written for arrays is some hundred times as fast.
     """
 
-    def judged(layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float1D:
+    def evaluated(layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float1D:
         scenes = zip(before.copy(), actions, after.copy(), strict=True)
-        told = [judge(Scene(schema, layout, a), u, Scene(schema, layout, b)) for a, u, b in scenes]
+        told = [function(Scene(schema, layout, a), u, Scene(schema, layout, b)) for a, u, b in scenes]
         return np.array(told, dtype=np.float64)
 
-    return judged
+    return evaluated

@@ -1,6 +1,6 @@
 """Issue "One law per interaction": what must be shown, row by row, measured against its bar.
 
-``python -m relgym.experiments.law_bars 1 3 --seeds 2 --json laws.json`` measures rows 1 and 3 with two training
+``python -m relgym.experiments.law_benchmarks 1 3 --seeds 2 --json laws.json`` measures rows 1 and 3 with two training
 seeds and writes the figures down as well. Every transition counts, corners and double contacts included.
 """
 
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.experiments.bar import measured, report
-from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_blocks, truck_blocks
+from relgym.experiments.criterion import measured, report
+from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_episodes, truck_episodes
 from relgym.experiments.law_classic import CLASSICS, Classic, classic_transitions
 from relgym.experiments.law_scaling import scaling
 from relgym.experiments.law_score import SEEDS, TESTS, Part, Rows, score, taught
@@ -41,10 +41,13 @@ def _one_step(seeds: Sequence[int]) -> Rows:
         scores = []
         sentences: set[int] = set()
         for seed in seeds:
-            model = taught(ball_blocks(experiment, seed=seed))
-            scores += [score(model, ball_blocks(experiment, seed=test, test=True)) for test in TESTS]
+            model = taught(ball_episodes(experiment, seed=seed))
+            scores += [score(model, ball_episodes(experiment, seed=test, test=True)) for test in TESTS]
             sentences.add(len(report_of(model).laws))
-        for name, values in (("wrong", [s.wrong for s in scores]), ("silent", [s.silent for s in scores])):
+        for name, values in (
+            ("wrong", [s.wrong for s in scores]),
+            ("abstained", [s.abstained for s in scores]),
+        ):
             measures.append(measured(f"experiment {experiment}: {name} of 24,000", 0, values))
         measures.append(measured(f"experiment {experiment}: sentences", 3, sorted(sentences)))
         notes.append(model.describe(frame="world", incline=BALL_EXPERIMENTS[experiment].incline))
@@ -56,10 +59,10 @@ def _rollouts(seeds: Sequence[int]) -> Rows:
     for experiment in (1, 2):
         values = []
         for seed in seeds:
-            model = taught(ball_blocks(experiment, seed=seed))
+            model = taught(ball_episodes(experiment, seed=seed))
             for test in TESTS:
-                blocks = list(ball_blocks(experiment, seed=test, blocks=80, test=True))
-                values.append(int((largest_errors(model, blocks) > 1e-6).sum()))
+                episodes = list(ball_episodes(experiment, seed=test, episodes=80, test=True))
+                values.append(int((largest_errors(model, episodes) > 1e-6).sum()))
         measures.append(measured(f"experiment {experiment}: of 80 off by more than 1e-6", 0, values))
     return "roll-outs of 200 steps", measures, []
 
@@ -68,10 +71,10 @@ def _transfer(seeds: Sequence[int]) -> Rows:
     measures = []
     for incline, elasticity, friction in ((30.0, 0.9, 0.0), (30.0, 0.9, 0.2), (45.0, 0.95, 0.2)):
         home = BallExperiment(incline, elasticity, (friction,), 80)
-        models = [taught(ball_blocks(home, seed=seed)) for seed in seeds]
+        models = [taught(ball_episodes(home, seed=seed)) for seed in seeds]
         for other in (15.0, 30.0, 45.0, 60.0, 75.0):
             away = BallExperiment(other, elasticity, (friction,), 120)
-            values = [score(m, ball_blocks(away, seed=TESTS[0], test=True)).bad for m in models]
+            values = [score(m, ball_episodes(away, seed=TESTS[0], test=True)).bad for m in models]
             name = f"learned at {incline:g}, used at {other:g} degrees, mu {friction:g}: of 24,000"
             measures.append(measured(name, 0, values))
     return "other inclines", measures, []
@@ -84,7 +87,7 @@ def _rooms(seeds: Sequence[int]) -> Rows:
         for objects, count in ((12, 40), (60, 8)):
             values = []
             for seed in seeds:
-                model = taught(ball_blocks(experiment, seed=seed))
+                model = taught(ball_episodes(experiment, seed=seed))
                 found = rooms(
                     count,
                     objects=objects,
@@ -96,7 +99,7 @@ def _rooms(seeds: Sequence[int]) -> Rows:
                 values.append(score(model, found))
             name = f"laws of {experiment}, {objects} objects"
             measures.append(measured(f"{name}: wrong of {400 * count}", 0, [s.wrong for s in values]))
-            measures.append(measured(f"{name}: silent of {400 * count}", 0, [s.silent for s in values]))
+            measures.append(measured(f"{name}: abstained of {400 * count}", 0, [s.abstained for s in values]))
     return "rooms never seen", [*measures, *scaling()], []
 
 
@@ -106,15 +109,15 @@ def _parts_of_the_world(seeds: Sequence[int]) -> Rows:
         for kind in ("floor", "wall"):
             found = [
                 score(
-                    taught(ball_blocks(experiment, seed=seed), _Touching(kind)),
-                    ball_blocks(experiment, seed=TESTS[0], test=True),
+                    taught(ball_episodes(experiment, seed=seed), _Touching(kind)),
+                    ball_episodes(experiment, seed=TESTS[0], test=True),
                 )
                 for seed in seeds
             ]
             name = f"experiment {experiment}, contacts with {kind}s only:"
             measures.append(measured(f"{name} wrong of 24,000", 0, [s.wrong for s in found]))
             limit = 0 if kind == "floor" else 24_000
-            measures.append(measured(f"{name} silent of 24,000", limit, [s.silent for s in found]))
+            measures.append(measured(f"{name} abstained of 24,000", limit, [s.abstained for s in found]))
     return "contacts of one kind", measures, []
 
 
@@ -125,34 +128,38 @@ class _Touching:
         self.kind = kind
         self._extractor: Extractor | None = None
 
-    def __call__(self, block: Part) -> NDArray[np.bool_]:
-        self._extractor = self._extractor or Extractor(block.schema)
-        found = self._extractor.extract(block.layout, block.vectors[:-1])
-        ball = block.layout.bodies.index(block.layout.index("ball"))
-        others = [k for k, i in enumerate(block.layout.bodies) if block.layout.types[i].name != self.kind]
+    def __call__(self, episode: Part) -> NDArray[np.bool_]:
+        self._extractor = self._extractor or Extractor(episode.schema)
+        found = self._extractor.extract(episode.layout, episode.vectors[:-1])
+        ball = episode.layout.bodies.index(episode.layout.index("ball"))
+        others = [k for k, i in enumerate(episode.layout.bodies) if episode.layout.types[i].name != self.kind]
         return np.logical_not(found.relation("intersect")[:, ball][:, others].any(axis=1))
 
 
 def _online(seeds: Sequence[int]) -> Rows:
     measures = []
-    for experiment, blocks, at in ((1, 8, (1, 2, 4, 8)), (2, 40, (2, 4, 8, 16, 40))):
+    for experiment, episodes, at in ((1, 8, (1, 2, 4, 8)), (2, 40, (2, 4, 8, 16, 40))):
         exact, costs, found = [], [], {n: list[int]() for n in at}
-        test = list(ball_blocks(experiment, seed=TESTS[0], test=True))
+        test = list(ball_episodes(experiment, seed=TESTS[0], test=True))
         for seed in seeds:
             model: WorldModel | None = None
             spent: list[float] = []
-            for k, block in enumerate(ball_blocks(experiment, seed=seed, blocks=blocks), start=1):
-                model = model or WorldModel(block.schema)
-                spent += [_timed(model, transition) for transition in block.transitions()]
+            for k, episode in enumerate(ball_episodes(experiment, seed=seed, episodes=episodes), start=1):
+                model = model or WorldModel(episode.schema)
+                spent += [_timed(model, transition) for transition in episode.transitions()]
                 if k in at:
                     found[k].append(score(model, test).bad)
-            exact.append(found[blocks][-1] == 0)
+            exact.append(found[episodes][-1] == 0)
             costs.append(1e3 * sum(spent) / len(spent))
         for n in at:
-            limit = 0 if n == blocks else 24_000
-            measures.append(measured(f"experiment {experiment}: wrong or silent after {n}", limit, found[n]))
+            limit = 0 if n == episodes else 24_000
+            measures.append(
+                measured(f"experiment {experiment}: wrong or abstained after {n}", limit, found[n])
+            )
         share = sum(exact) / len(exact)
-        measures.append(measured(f"experiment {experiment}: exact after {blocks}, share", 0.9, [share], ">="))
+        measures.append(
+            measured(f"experiment {experiment}: exact after {episodes}, share", 0.9, [share], ">=")
+        )
         measures.append(measured(f"experiment {experiment}: predict and learn, ms", 1.0, costs))
     return "online", measures, []
 
@@ -182,8 +189,8 @@ def _no_contact(seeds: Sequence[int]) -> Rows:
 
 
 def _truck(seed: int) -> tuple[SceneSchema, list[Transition]]:
-    blocks = list(truck_blocks("step", seed=seed, repeats=1))
-    return blocks[0].schema, [each for block in blocks for each in block.transitions()]
+    episodes = list(truck_episodes("step", seed=seed, repeats=1))
+    return episodes[0].schema, [each for episode in episodes for each in episode.transitions()]
 
 
 def _classic(classic: Classic, body: bool, seed: int) -> tuple[SceneSchema, list[Transition]]:

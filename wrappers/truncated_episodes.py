@@ -11,10 +11,10 @@ from relgym.arguments import refusing
 from relgym.envs.arguments import checked_count, refuse_vector_env
 from relgym.errors import ConfigError
 
-__all__ = ["Glimpses"]
+__all__ = ["TruncatedEpisodes"]
 
 
-class Glimpses(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+class TruncatedEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """Truncates most episodes after a few steps; now and then one lasts as long as it will.
 
     What follows on a beginning, a model can dream; other beginnings (other rooms, other objects) it can't. So real
@@ -53,7 +53,7 @@ class Glimpses(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         return begun
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Take a step; of a glimpse, the last one says that it is truncated."""
+        """Take a step; of a truncated episode, the last one says that it is truncated."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         self._taken += 1
         late = bool(self._episode % self.whole) and self._taken >= self.steps

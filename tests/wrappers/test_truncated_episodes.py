@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 import relgym  # noqa: F401  (registers the ids)
 from relgym.errors import ConfigError
 from relgym.wrappers.action_repeat import ActionRepeat
-from relgym.wrappers.glimpses import Glimpses
+from relgym.wrappers.truncated_episodes import TruncatedEpisodes
 
 WAIT, RUSH = np.array([-1.0], dtype=np.float32), np.array([1.0], dtype=np.float32)
 
@@ -30,20 +30,20 @@ def lasted(env: gym.Env[Any, Any], action: Any = WAIT, **options: Any) -> tuple[
 
 
 def test_one_of_so_many_episodes_is_whole() -> None:
-    env = Glimpses(pushing(), 4, whole=3)
+    env = TruncatedEpisodes(pushing(), 4, whole=3)
     assert [lasted(env)[0] for _ in range(7)] == [20, 4, 4, 20, 4, 4, 20]
-    assert [lasted(whole := Glimpses(pushing(), 4, whole=1))[0], lasted(whole)[0]] == [20, 20]
+    assert [lasted(whole := TruncatedEpisodes(pushing(), 4, whole=1))[0], lasted(whole)[0]] == [20, 20]
 
 
-def test_a_glimpse_is_truncated_and_a_true_end_stays_one() -> None:
-    env = Glimpses(pushing(), 1)
+def test_a_truncated_episode_is_truncated_and_a_true_end_stays_one() -> None:
+    env = TruncatedEpisodes(pushing(), 1)
     env.reset(seed=0)
     assert lasted(env) == (1, False, True)
     assert lasted(env, RUSH, goal_distance=1.0) == (1, True, False)  # beyond the goal at its last step
 
 
 def test_nothing_else_changes() -> None:
-    plain, env = pushing(), Glimpses(pushing(), 3)
+    plain, env = pushing(), TruncatedEpisodes(pushing(), 3)
     (seen, said), (shown, told) = (e.reset(seed=1) for e in (plain, env))
     for _ in range(5):
         for name in seen:
@@ -54,14 +54,17 @@ def test_nothing_else_changes() -> None:
 
 
 def test_steps_of_the_env_inside_and_decisions_outside() -> None:
-    inside, outside = ActionRepeat(Glimpses(pushing(), 6), 3), Glimpses(ActionRepeat(pushing(), 3), 6)
+    inside, outside = (
+        ActionRepeat(TruncatedEpisodes(pushing(), 6), 3),
+        TruncatedEpisodes(ActionRepeat(pushing(), 3), 6),
+    )
     for env, decisions in ((inside, 2), (outside, 6)):
         env.reset(seed=0)
         assert lasted(env)[0] == decisions
 
 
 def test_a_failed_reset_is_no_episode() -> None:
-    env = Glimpses(pushing(), 4, whole=2)
+    env = TruncatedEpisodes(pushing(), 4, whole=2)
     with pytest.raises(ConfigError):
         env.reset(options={"no such option": 1})
     assert [lasted(env)[0] for _ in range(3)] == [20, 4, 20]
@@ -70,12 +73,12 @@ def test_a_failed_reset_is_no_episode() -> None:
 @pytest.mark.parametrize("wrong", [{"steps": 0}, {"steps": 2.5}, {"steps": 2, "whole": 0}])
 def test_wrong_counts_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match=r"steps|whole"):
-        Glimpses(pushing(), **wrong)
+        TruncatedEpisodes(pushing(), **wrong)
 
 
 @pytest.mark.filterwarnings("ignore:.*is different from the unwrapped version")
 def test_gymnasium_has_nothing_to_say() -> None:
-    check_env(Glimpses(pushing(), 5), skip_render_check=True)
-    spec = Glimpses(pushing(), 5).spec
+    check_env(TruncatedEpisodes(pushing(), 5), skip_render_check=True)
+    spec = TruncatedEpisodes(pushing(), 5).spec
     assert spec is not None
     assert spec.additional_wrappers[-1].kwargs == {"steps": 5, "whole": 5}

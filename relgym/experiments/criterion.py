@@ -10,11 +10,11 @@ from typing import Any, Literal
 
 from relgym.model.text import Cell, table
 
-__all__ = ["Bar", "Measure", "measured", "report"]
+__all__ = ["Criterion", "Measure", "measured", "report"]
 
 
 @dataclass(frozen=True, slots=True)
-class Bar:
+class Criterion:
     """A limit that a figure must keep.
 
     Attributes
@@ -48,7 +48,7 @@ class Measure:
         One figure per repetition (training seed, or pair of training and test seed).
     """
 
-    bar: Bar
+    criterion: Criterion
     values: tuple[float, ...]
 
     @property
@@ -56,7 +56,7 @@ class Measure:
         """The figure farthest on the wrong side; NaN if there is none."""
         if not self.values or any(math.isnan(v) for v in self.values):
             return math.nan
-        return max(self.values) if self.bar.side == "<=" else min(self.values)
+        return max(self.values) if self.criterion.side == "<=" else min(self.values)
 
     @property
     def middle(self) -> float:
@@ -66,25 +66,25 @@ class Measure:
     @property
     def ok(self) -> bool:
         """Whether the worst figure keeps the bar."""
-        return self.bar.met(self.worst)
+        return self.criterion.met(self.worst)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         derived = {"worst": self.worst, "median": self.middle, "ok": self.ok}
-        return asdict(self.bar) | {"values": list(self.values)} | derived
+        return asdict(self.criterion) | {"values": list(self.values)} | derived
 
 
 def measured(what: str, limit: float, values: Iterable[float], side: Literal["<=", ">="] = "<=") -> Measure:
     """A bar and its figures in one call."""
-    return Measure(Bar(what, limit, side), tuple(map(float, values)))
+    return Measure(Criterion(what, limit, side), tuple(map(float, values)))
 
 
 def report(title: str, measures: Sequence[Measure], notes: Iterable[str] = ()) -> str:
     """A table of bars, for people."""
     rows: list[list[Cell]] = [
         [
-            m.bar.what,
-            f"{m.bar.side} {m.bar.limit:g}",
+            m.criterion.what,
+            f"{m.criterion.side} {m.criterion.limit:g}",
             f"{m.worst:.4g}",
             f"{m.middle:.4g}",
             len(m.values),

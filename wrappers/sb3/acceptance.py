@@ -1,4 +1,4 @@
-"""Whether to trust a model: decided by how well it foretold what then really happened, with hysteresis."""
+"""Whether to trust a model: decided by how well it predicted what then really happened, with hysteresis."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
-__all__ = ["Spread", "TrustGate", "Verdict"]
+__all__ = ["ModelAcceptance", "Spread", "Verdict"]
 
 Key: TypeAlias = tuple[str, str]
 """A type or the task, and a property."""
@@ -33,12 +33,12 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One real step, as foretold and as it came.
+    """One real step, as predicted and as it came.
 
     Attributes
     ----------
     residuals
-        Observed minus foretold value, by (type or task, property); the largest where several objects have it.
+        Observed minus predicted value, by (type or task, property); the largest where several objects have it.
         Empty where the model didn't speak.
     changes
         Observed change of the same properties: what a model that says *nothing changes* is off by.
@@ -48,30 +48,30 @@ class Verdict:
     changes: Mapping[Key, float]
 
 
-class TrustGate:
+class ModelAcceptance:
     """Opens when a model's prequential error is small, shuts when it has grown large.
 
-    The error of a step is the largest ratio, over all properties, of how far the foretold value was off to
-    how far the property usually moves, cut off at 1; the gate's error is its mean over the latest steps. A
+    The error of a step is the largest ratio, over all properties, of how far the predicted value was off to
+    how far the property usually moves, cut off at 1; the acceptance's error is its mean over the latest steps. A
     model that says *nothing changes* scores about 1, an exact one 0. Steps of which the model said nothing
     don't count: nobody dreams them.
 
     Parameters
     ----------
-    open_at, shut_at
-        The gate opens at an error of at most `open_at` and shuts at one of at least `shut_at`; in between it
+    accept_at, reject_at
+        The acceptance opens at an error of at most `accept_at` and shuts at one of at least `reject_at`; in between it
         stays as it is.
     window
         How many of the latest steps count.
     least
-        With fewer of them the gate stays shut.
+        With fewer of them the acceptance stays shut.
 
     Examples
     --------
-    >>> gate = TrustGate(open_at=0.1, shut_at=0.5, window=4, least=2)
+    >>> acceptance = ModelAcceptance(accept_at=0.1, reject_at=0.5, window=4, least=2)
     >>> for off in (0.0, 0.0, 1.0, 1.0, 1.0):
-    ...     gate.count(Verdict({("cart", "v"): off}, {("cart", "v"): 1.0}))
-    ...     print(gate.error, gate.open)
+    ...     acceptance.count(Verdict({("cart", "v"): off}, {("cart", "v"): 1.0}))
+    ...     print(acceptance.error, acceptance.accepted)
     0.0 False
     0.0 True
     0.3333333333333333 True
@@ -79,9 +79,9 @@ class TrustGate:
     0.75 False
     """
 
-    def __init__(self, *, open_at: float, shut_at: float, window: int, least: int) -> None:
-        self.open_at, self.shut_at, self.least = open_at, shut_at, least
-        self.open = False
+    def __init__(self, *, accept_at: float, reject_at: float, window: int, least: int) -> None:
+        self.accept_at, self.reject_at, self.least = accept_at, reject_at, least
+        self.accepted = False
         self.switches = 0
         self._errors: deque[float] = deque(maxlen=window)
         self._spoke: deque[bool] = deque(maxlen=window)
@@ -98,7 +98,7 @@ class TrustGate:
         return sum(self._spoke) / len(self._spoke) if self._spoke else 0.0
 
     def count(self, verdict: Verdict) -> None:
-        """Take up one real step; `open` is up to date afterwards."""
+        """Take up one real step; `accepted` is up to date afterwards."""
         for key, change in verdict.changes.items():
             self._spreads.setdefault(key, Spread()).add(change)
         self._spoke.append(bool(verdict.residuals))
@@ -114,6 +114,6 @@ class TrustGate:
 
     def _decide(self) -> None:
         enough = len(self._errors) >= self.least
-        now = enough and (self.error <= self.open_at or (self.open and self.error < self.shut_at))
-        self.switches += now != self.open
-        self.open = now
+        now = enough and (self.error <= self.accept_at or (self.accepted and self.error < self.reject_at))
+        self.switches += now != self.accepted
+        self.accepted = now

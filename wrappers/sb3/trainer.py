@@ -1,0 +1,284 @@
+"""A model beside an agent: it predicts every real step, is evaluated by it, and then learns from it."""
+
+from __future__ import annotations
+
+import math
+from time import perf_counter
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from relgym.envs.learned_model_setting import check_knowledge
+from relgym.errors import ConfigError
+from relgym.model.motion import possible_targets
+from relgym.model.scenes import mismatch
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import TASK, Scene
+from relgym.scene.schema import SceneSchema
+from relgym.wrappers.sb3.acceptance import Key, ModelAcceptance, Verdict
+from relgym.wrappers.sb3.config import DynaConfig, checked_config
+from relgym.wrappers.sb3.lens import Lens
+from relgym.wrappers.sb3.recorder import Experience
+from relgym.wrappers.sb3.reward_models import (
+    Acting,
+    LearnedRewardModel,
+    NeuralModel,
+    NeuralRewardModel,
+    RewardModel,
+    check_rewards,
+)
+from relgym.wrappers.sb3.stock import DreamModel, SceneStock, changing
+
+__all__ = ["ModelTrainer", "check_model", "checked_reward_model"]
+
+
+class ModelTrainer:
+    """Predicts, is evaluated, learns; test, then train (Dawid 1984).
+
+    A model that was accepted and is no more may be one of a world that has changed: what it learned before counts on,
+    and nothing in a scene tells what holds when. So a replacement begins to learn the same steps from nothing, and whichever
+    is accepted first goes on (Gama et al. 2004 begin anew from such a point on).
+
+    Parameters
+    ----------
+    model
+        The model; one that is frozen (``model.frozen``) is evaluated all the same, but doesn't learn, nor does it get a
+        replacement. Replacements need a method ``untaught`` of the model's, as `WorldModel.untaught`.
+    reward_model
+        Reward and termination; one that learns (`LearnedRewardModel`) learns from every step as it comes. ``"learned"``: as
+        for `Dyna`.
+    config
+        Free parameters.
+
+    Raises
+    ------
+    ConfigError
+        The reward model can't say what steps are worth; or when a step is taken up, a given reward model's reward is NaN or infinite.
+
+    Attributes
+    ----------
+    stock : SceneStock
+        Real scenes to dream on from.
+    seconds : float
+        Time spent on predicting and learning.
+    renewals : int
+        How often a replacement has taken the model's place.
+    """
+
+    def __init__(
+        self,
+        model: DreamModel,
+        reward_model: RewardModel | Literal["learned"],
+        config: DynaConfig | None = None,
+    ) -> None:
+        self._config = checked_config(config)
+        self._trainee = _Trainee(model, self._config, np.random.default_rng([self._config.seed, 1]))
+        self._replacement: _Trainee | None = None
+        self._replacements = 0
+        self.reward_model = checked_reward_model(reward_model, model, model.schema)
+        self.stock = SceneStock()
+        self.seconds = 0.0
+        self.renewals = 0
+
+    @property
+    def model(self) -> DreamModel:
+        """The model at work: the one that was given, until a replacement takes its place."""
+        return self._trainee.model
+
+    @property
+    def acceptance(self) -> ModelAcceptance:
+        """Whether to trust the model."""
+        return self._trainee.acceptance
+
+    def take_up(self, real: Experience) -> None:
+        """Predict a real step, evaluate the model by it, and learn from it or from an earlier one."""
+        started = perf_counter()
+        self.acceptance.count(self._evaluated(self.model, real))
+        self.stock.add(real.start, first=real.first)
+        replacement = self._challenge()
+        if replacement is not None:
+            replacement.acceptance.count(self._evaluated(replacement.model, real))
+        if hasattr(self.reward_model, "learn_step"):
+            # At once: a reward model sees but what is there once, and what there is to learn is rare at first.
+            self.reward_model.learn_step(real.transition, real.reward, terminated=real.terminated)
+        self._trainee.learn(real)
+        if replacement is not None:
+            replacement.learn(real)
+            if replacement.acceptance.accepted:
+                self._trainee, self._replacement, self.renewals = replacement, None, self.renewals + 1
+        self.seconds += perf_counter() - started
+
+    def catch_up(self) -> None:
+        """Learn what is still waiting for its turn; there may be no more steps to wait for."""
+        started = perf_counter()
+        self._trainee.catch_up()
+        self.seconds += perf_counter() - started
+
+    def _challenge(self) -> _Trainee | None:
+        """The replacement of a model that was accepted and is no more, if it has one."""
+        patience, own = self._config.renew, self._trainee
+        alone = isinstance(self.reward_model, NeuralRewardModel)  # which is the model itself
+        if own.acceptance.accepted or not own.acceptance.switches or alone or not (patience and own.learns):
+            self._replacement = None
+        elif self._replacement is None or self._replacement.steps >= patience:
+            untaught = getattr(own.model, "untaught", None)
+            if untaught is None:
+                return None
+            self._replacements += 1
+            rng = np.random.default_rng([self._config.seed, 4, self._replacements])
+            self._replacement = _Trainee(untaught(), self._config, rng)
+        return self._replacement
+
+    def _evaluated(self, model: DreamModel, real: Experience) -> Verdict:
+        before, after = real.start, real.transition.after
+        predicted = model.predict_one(real.transition.before)
+        changes: dict[Key, float] = {(TASK, "reward"): real.reward, (TASK, "terminated"): 1.0}
+        residuals: dict[Key, float] = {}
+        moving = changing(model)
+        for o in before:
+            if o.name not in after:
+                continue
+            for prop in o.type.properties:
+                key, now = (o.type.name, prop), after[o.name][prop]
+                # What changes though no target covers it was predicted to stay.
+                if key in moving or (now != o[prop] and prop not in o.type.exogenous):
+                    _widen(changes, key, now - o[prop])
+                    _widen(residuals, key, now - predicted.scene[o.name][prop])
+        if predicted.ok:
+            residuals |= self._task_residuals(real, predicted.scene)
+        spoke = predicted.ok and all(map(math.isfinite, residuals.values()))
+        return Verdict(residuals if spoke else {}, changes)
+
+    def _task_residuals(self, real: Experience, predicted: Scene) -> dict[Key, float]:
+        layout = real.start.layout
+        following = np.concatenate([predicted[name].values for name in layout.names])
+        evaluated = self.reward_model.evaluate(
+            layout, real.start.vector[None], np.asarray(real.action)[None], following[None]
+        )
+        if not getattr(
+            self.reward_model, "learned", False
+        ):  # of one that learns NaN says that it doesn't know
+            check_rewards(evaluated.rewards, self.reward_model)
+        return {
+            (TASK, "reward"): real.reward - float(evaluated.rewards[0]),
+            (TASK, "terminated"): float(real.terminated) - float(evaluated.terminated[0]),
+        }
+
+
+class _Trainee:
+    """A model, whether it is accepted, and the lessons that wait for their turn."""
+
+    def __init__(self, model: DreamModel, config: DynaConfig, rng: np.random.Generator) -> None:
+        self.model = model
+        self.acceptance = ModelAcceptance(
+            accept_at=config.accept_at, reject_at=config.reject_at, window=config.window, least=config.least
+        )
+        self.learns = not getattr(model, "frozen", False)
+        self.steps = 0
+        self._waiting: list[Experience] = []
+        self._shuffle, self._rng = config.shuffle, rng
+
+    def learn(self, real: Experience) -> None:
+        """A stock of `shuffle` experiences is learned from in random order, one for every new one."""
+        self.steps += 1
+        if not self.learns:
+            return
+        self._waiting.append(real)
+        if len(self._waiting) > self._shuffle:
+            chosen = int(self._rng.integers(len(self._waiting)))
+            self._waiting[chosen], self._waiting[-1] = self._waiting[-1], self._waiting[chosen]
+            self._teach(self._waiting.pop())
+
+    def catch_up(self) -> None:
+        """Learn all that waits."""
+        for k in self._rng.permutation(len(self._waiting)).tolist():
+            self._teach(self._waiting[k])
+        self._waiting.clear()
+
+    def _teach(self, real: Experience) -> None:
+        if hasattr(self.model, "learn_step"):  # the task as well
+            self.model.learn_step(real.transition, real.reward, terminated=real.terminated)
+        else:
+            self.model.learn_one(real.transition)
+
+
+def checked_reward_model(
+    reward_model: Any, model: DreamModel, schema: SceneSchema, acting: Acting | None = None
+) -> RewardModel:
+    """A reward model, made where it is to be ``"learned"``.
+
+    Parameters
+    ----------
+    reward_model
+        What the user passed.
+    model
+        Whose dreams are evaluated.
+    schema, acting
+        Of the scenes, as `LearnedRewardModel` takes them.
+
+    Raises
+    ------
+    ConfigError
+        It can't say what steps are worth.
+    """
+    if isinstance(reward_model, str) and reward_model == "learned":
+        if hasattr(model, "predict_rewards"):
+            return NeuralRewardModel(cast(NeuralModel, model), acting=acting)
+        moving = changing(model)
+        if schema.targets is None:  # anything may turn out to change
+            moving |= {(t.type, t.property) for t in possible_targets(schema)}
+        return LearnedRewardModel(schema, moving, acting=acting)
+    if not callable(getattr(reward_model, "evaluate", None)):
+        raise ConfigError(
+            f"reward_model={reward_model!r}: expected 'learned', or an object with evaluate(layout, before, actions, after) for arrays "
+            "of steps, as a relgym.envs.tasks.Task has"
+        )
+    if isinstance(reward_model, (LearnedRewardModel, NeuralRewardModel)) and acting is not None:
+        reward_model.adopt(acting)
+    found: RewardModel = reward_model
+    return found
+
+
+def check_model(model: Any, lens: Lens, *, at_once: bool = False) -> None:
+    """Raise an error unless a model can speak of the env's scenes.
+
+    Parameters
+    ----------
+    model
+        The model.
+    lens
+        What it is to speak of.
+    at_once
+        Whether dreams begin before it has learned any more.
+
+    Raises
+    ------
+    ConfigError
+        It isn't a model, or one of other scenes.
+    QueryError
+        It knows none of its targets, and can't learn or is to be dreamed in at once.
+    """
+    missing = [
+        name for name in ("schema", "targets", "predict_one", "predict_batch") if not hasattr(model, name)
+    ]
+    if missing:
+        raise ConfigError(f"{type(model).__name__} is no model to dream with: it lacks {missing}")
+    schema = lens.recorder.view.schema
+    if difference := mismatch(schema, model.schema):
+        raise ConfigError(
+            f"the model was made for other scenes than the env shows: {difference}; make it with the recorder's schema "
+            "(env.get_wrapper_attr('view').schema)"
+        )
+    frozen = getattr(model, "frozen", False)
+    if isinstance(model, WorldModel) and (frozen or at_once):
+        check_knowledge(model)
+    if frozen and not model.targets:
+        raise ConfigError(
+            "the model knows none of the targets and can't learn (it was loaded without its history): load one that "
+            "was taught, or save with history=True"
+        )
+
+
+def _widen(found: dict[Key, float], key: Key, value: float) -> None:
+    if abs(value) >= abs(found.get(key, 0.0)):
+        found[key] = value
