@@ -49,8 +49,8 @@ class LearnedModelEnv(gym.Env[Any, Any]):
     for the next scene. Where it has no answer the episode is truncated and ``info["reason"]`` says why: a dream never
     goes on by guessing. Exogenous properties keep their values.
 
-    The model is used as it is, live: what it learns later changes the dream; what steps are worth is settled anew at each
-    reset. With ``snapshot=True`` the dream has a copy of its own, and stays as it was.
+    The model is used as it is, live: what it learns later changes the dream; what steps are worth is settled anew
+    at each reset. With ``snapshot=True`` the dream has a copy of its own, and stays as it was.
 
     Thousands of dreams at once: `LearnedModelVectorEnv`, which ``gym.make_vec`` makes of the same id.
 

@@ -172,7 +172,7 @@ class StepEvaluator:
         task: TaskFunctions | None,
         model: WorldModel,
     ) -> StepEvaluator:
-        """Settle who says what steps are worth: what was given, else the task, else what the model has learned by now, else nobody.
+        """Settle whose rewards count: those given, else the task's, else what the model has learned by now, else none.
 
         Raises
         ------

@@ -80,7 +80,8 @@ def main(args: Args) -> None:
     agent.learn(args.decisions, callback=dyna)
     acceptance = dyna.trainer.acceptance
     print(
-        f"prequential error {acceptance.error:.3f}, accepted: {acceptance.accepted}, imagined: {dyna.imagined:,} decisions"
+        f"prequential error {acceptance.error:.3f}, accepted: {acceptance.accepted}, "
+        f"imagined: {dyna.imagined:,} decisions"
     )
 
     tests = make_env()

@@ -64,7 +64,8 @@ def main(args: Args) -> None:
     agent.learn(args.steps, callback=dyna)
     acceptance = dyna.trainer.acceptance
     print(
-        f"prequential error {acceptance.error:.3f}, accepted: {acceptance.accepted}, imagined: {dyna.imagined:,} transitions"
+        f"prequential error {acceptance.error:.3f}, accepted: {acceptance.accepted}, "
+        f"imagined: {dyna.imagined:,} transitions"
     )
 
     tests = make_env()

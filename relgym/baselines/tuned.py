@@ -54,9 +54,9 @@ TUNED: Final[Mapping[tuple[str, str, str], int]] = {
 
 Chosen by ``relgym reproduce tuning --fast``: experiment 2, eight episodes of the first tuning seed.
 
-One exception, in the baseline's favour: boosted classifiers are reported with a penalty, though after eight episodes they
-do as well without. After forty of the same seed they then err on 11 % of the x modes (contact features), with it on
-0.5 %.
+One exception, in the baseline's favour: boosted classifiers are reported with a penalty, though after
+eight episodes they do as well without. After forty of the same seed they then err on 11 % of the x modes (contact
+features), with it on 0.5 %.
 """
 
 

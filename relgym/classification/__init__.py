@@ -1,1 +1,1 @@
-"""Preconditions: when does a mode hold, and which objects play its roles (§3.4, §3.5)."""
+"""Preconditions: when does a mode hold, and which objects its roles are bound to (§3.4, §3.5)."""

@@ -25,7 +25,7 @@ _Rows: TypeAlias = NDArray[np.int64]
 
 
 class RoleClassifier:
-    """Finds the objects that play the roles of one mode, the target's own role left aside.
+    """Binds objects to the roles of one mode, the target's own role left aside.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class RoleClassifier:
     # ----- learning -----
 
     def observe(self, example: Example, roles: Sequence[int]) -> bool:
-        """Take in who played the roles of one example of the mode; whether that contradicts the descriptions.
+        """Learn from the role binding of one example of the mode; returns whether that contradicts the descriptions.
 
         They must tell the players from the others by themselves: that the right objects happened to come first in
         the order of preference doesn't count. Learns nothing (that is `refresh`).

@@ -55,7 +55,7 @@ class RoleDescription:
     places
         Positions of the roles of this kind.
     definition
-        ``fulfils(A, B)``: B plays the role for target A; none: any object of the type does.
+        ``fulfils(A, B)``: B is bound to the role for target A; none: any object of the type does.
     common
         What all players had in common (see `stances`), shape ``(2 R + U,)``; none: no player was seen.
     """
@@ -83,7 +83,7 @@ class RoleDescription:
         return typical
 
     def score(self, world: World, target: int, candidate: int) -> float | None:
-        """Log-odds that a candidate plays the role; none if nothing speaks for it."""
+        """Log-odds that a candidate is bound to the role; none if nothing speaks for it."""
         if self.definition is None:
             return 0.0
         for clause, coverage in zip(self.definition.clauses, self.definition.coverage, strict=True):

@@ -91,7 +91,7 @@ def preferred(
 def role_matrix(
     mode: Mode, table: ExampleTable, rows: NDArray[np.integer], assignment: NDArray[np.intp], cluster: Cluster
 ) -> NDArray[np.float64]:
-    """Regression rows of a mode: one column per weight, each read from the object that plays the role.
+    """Regression rows of a mode: one column per weight, each read from the object that is bound to the role.
 
     Columns stand in the order of the roles and their terms.
     """

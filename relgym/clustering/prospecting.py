@@ -50,7 +50,7 @@ class Prospector(Population):
     Attributes
     ----------
     approximate
-        Whether the noise assumed is what an approximation leaves, for want of an exact law.
+        Whether the noise assumed is what an approximation leaves, no exact law being known.
     """
 
     def __init__(self, target: Target, config: ClusteringConfig, *, seed: int) -> None:

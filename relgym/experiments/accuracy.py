@@ -1,6 +1,6 @@
 """One-step errors, learned modes and roll-outs in the ball experiments: training seeds x test seeds (§4.3-§4.5).
 
-``python -m relgym.experiments.thesis_benchmarks 1 2 3 4`` prints them against their bars.
+``python -m relgym.experiments.thesis_benchmarks ball-1 ball-2 ball-3`` prints them beside their limits.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ _CLASSES: Final[Mapping[int, Sequence[tuple[str, str, _Kind, float]]]] = {
     2: (("halt", "x", _halt, 0.05), ("floor bounce", "y", _level, 0.02)),
     3: (),
 }
-"""Per experiment: the true modes with a bar of their own (tables 4.7, 4.8, 4.15 and 4.16)."""
+"""Per experiment: the true modes with a limit of their own (tables 4.7, 4.8, 4.15 and 4.16)."""
 
 _WRONG: Final = {1: 0.0005, 2: 0.001, 3: 0.002}
 _FAILED: Final = {1: 3, 2: 10}
@@ -149,7 +149,7 @@ def matched(mode: Mode, laws: Sequence[AnalyticMode]) -> int | None:
 
 
 def ball_measures(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
-    """The figures of one ball experiment against their bars, over all pairs of seeds."""
+    """The figures of one ball experiment beside their limits, over all pairs of seeds."""
     laws = BALL_EXPERIMENTS[experiment].modes()
     evaluations = [e for outcome in outcomes for e in outcome.evaluations.values()]
     found = [

@@ -1,8 +1,8 @@
-"""Envs that nobody here wrote, through views, as bars (``python -m relgym.experiments.any_env``).
+"""Envs that nobody here wrote, through views, as benchmarks (``python -m relgym.experiments.any_env``).
 
 Every env is learned twice from the same transitions: with the default configuration, and with the features that the
 default's own advice recommends. Errors are *nRMSE-d*: root mean square error of one step over the standard deviation of
-the change, per property, on fresh episodes, where rows at a limit (a wall, a clip) are evaluated apart: an error over
+the change, per property, on fresh episodes, where steps at a limit (a wall, a clip) are evaluated apart: an error over
 everything would measure the rare kind only.
 """
 
@@ -40,7 +40,7 @@ from relgym.experiments.criterion import Measure, measured, report
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.model.world_model import WorldModel
 
-__all__ = ["ROWS", "Setting", "main", "weight"]
+__all__ = ["BENCHMARKS", "Setting", "main", "weight"]
 
 TEST: Final = 4_000
 """Transitions evaluated on."""
@@ -48,7 +48,7 @@ TEST: Final = 4_000
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """How one row is measured.
+    """How one benchmark is measured.
 
     Attributes
     ----------
@@ -88,13 +88,13 @@ SETTINGS: Final = {
     "pendulum": Setting("pendulum", 10_000, 1e-4),
     "acrobot": Setting("acrobot", 2_000, 0.1, features=("trig", "degree4")),
 }
-"""Rows 1 to 4."""
+"""Classic control."""
 
 Pairs = Sequence[tuple[int, int]]
 
 
 def _one_step(setting: Setting, seeds: Pairs, *, quick: bool) -> list[Measure]:
-    """Rows 1 to 4: errors of one step by property, and the coefficients of the law in the source."""
+    """Classic control: errors of one step by property, and the coefficients of the law in the source."""
     study = STUDIES[setting.study]
     found: dict[tuple[str, float], list[float]] = {}
     for number, (training, test) in enumerate(seeds):
@@ -162,12 +162,12 @@ def _constants(model: WorldModel, prop: str) -> list[float]:
     return [m.intercept for m in model.modes("self", prop) if not any(role.terms for role in m.roles)]
 
 
-ROWS: Final = (*SETTINGS, "lander", "stream", "fleet", *LIVES)
-"""All rows."""
+BENCHMARKS: Final = (*SETTINGS, "lander", "stream", "fleet", *LIVES)
+"""By name."""
 
 
-def row(name: str, seeds: Pairs, *, quick: bool, steps: int | None = None) -> str:
-    """Measure one row; its table of bars. `steps` is the length of a long life, if not a million."""
+def benchmark(name: str, seeds: Pairs, *, quick: bool, steps: int | None = None) -> str:
+    """Measure one; its figures beside their limits. `steps` is the length of a long life, if not a million."""
     others: dict[str, Callable[..., list[Measure]]] = {
         "lander": flight,
         "stream": prequential,
@@ -181,12 +181,12 @@ def row(name: str, seeds: Pairs, *, quick: bool, steps: int | None = None) -> st
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Command line: rows, ``--seeds N``, ``--tuning`` for the tuning seeds, ``--quick`` for few transitions."""
+    """Command line: benchmarks, ``--seeds N``, ``--tuning`` for the tuning seeds, ``--quick`` for few transitions."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rows", nargs="*", default=list(ROWS), choices=[*ROWS, []])
+    parser.add_argument("benchmarks", nargs="*", default=list(BENCHMARKS), choices=[*BENCHMARKS, []])
     parser.add_argument("--seeds", type=int, default=1, help="how many training seeds, each with a test seed")
     parser.add_argument(
-        "--steps", type=int, help="length of a long life (rows 'memory'), of which a fifth is kept"
+        "--steps", type=int, help="length of a long life (benchmarks 'memory…'), of which a fifth is kept"
     )
     parser.add_argument("--tuning", action="store_true")
     parser.add_argument("--quick", action="store_true")
@@ -194,8 +194,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     training = TUNING_SEEDS if given.tuning else TRAINING_SEEDS
     tests = (TUNING_TEST_SEED,) if given.tuning else TEST_SEEDS
     seeds = [(s, tests[k % len(tests)]) for k, s in enumerate(training[: given.seeds])]
-    for name in given.rows or ROWS:
-        print(row(name, seeds, quick=given.quick, steps=given.steps), "\n", flush=True)
+    for name in given.benchmarks or BENCHMARKS:
+        print(benchmark(name, seeds, quick=given.quick, steps=given.steps), "\n", flush=True)
 
 
 if __name__ == "__main__":

@@ -102,7 +102,7 @@ STUDIES: Final = {
     ),
     "lander": Study("LunarLander-v3", ("px", "py", "vx", "vy", "th", "w", "left", "right")),
 }
-"""The envs of rows 1 to 5."""
+"""Classic control and LunarLander."""
 
 
 @dataclass(frozen=True, slots=True)

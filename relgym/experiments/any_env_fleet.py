@@ -73,7 +73,7 @@ class Diary(gym.Wrapper[Any, Any, Any, Any]):
 
 
 def fleet(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Measure]:
-    """Row 9: fleets in every autoreset mode against one env, and an agent's speed with the callback against without."""
+    """Fleets in every autoreset mode against one env, and an agent's speed with the callback against without."""
     found: dict[tuple[str, float, bool], list[float]] = {}
     for name in list(FEATURES)[: 1 if quick else None]:
         for mode in AutoresetMode:

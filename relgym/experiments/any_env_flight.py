@@ -36,7 +36,7 @@ FLOOR: Final = {"vx": 0.37, "vy": 0.32}
 """What least squares leaves of vx and vy (one seed), of which the limit is 10 % more."""
 
 SPIN: Final = 0.3
-"""Criterion of w."""
+"""Largest nRMSE-d of w."""
 
 
 def flying(lesson: Lesson) -> NDArray[np.bool_]:
@@ -57,7 +57,7 @@ def settled(lesson: Lesson) -> NDArray[np.bool_]:
 
 
 def flight(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Measure]:
-    """Row 5: errors in flight by property, of the model, of least squares and of nets; modes against leg flags."""
+    """Errors in flight by property, of the model, of least squares and of nets; modes against leg flags."""
     found: dict[tuple[str, float, bool], list[float]] = {}
     for number, (training, test) in enumerate(seeds):
         lesson = collect(STUDIES["lander"], 600 if quick else TRAIN, training)

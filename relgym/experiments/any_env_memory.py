@@ -44,7 +44,7 @@ class Life:
     transitions
         Fresh ones without end, of a seed.
     evaluated
-        Whether a model is still right: bars and figures, on fresh transitions of a test seed.
+        Whether a model is still right: figures and limits, on fresh transitions of a test seed.
     frames
         As in `ModelConfig`: while laws of motion do, modes rest, and a life costs little.
     """
@@ -81,7 +81,7 @@ LIVES: Final = {
     "memory-ball": Life(_balls, _ball_evaluated),
     "memory-ball-modes": Life(_balls, _ball_evaluated, frames="world"),
 }
-"""Row 10, by the name of its row."""
+"""By the name of the benchmark."""
 
 
 def memory(
@@ -92,7 +92,7 @@ def memory(
     steps: int | None = None,
     bound: int | None = None,
 ) -> list[Measure]:
-    """Row 10: a stream of fresh transitions, of the first seed; `steps` of which `bound` are kept.
+    """A stream of fresh transitions, of the first seed; `steps` of which `bound` are kept.
 
     The cost of the last steps is compared with that of a second model's at the beginning of the same stream, in turns:
     so it doesn't matter how busy the machine was earlier.

@@ -1,4 +1,4 @@
-"""Pong through its list of objects, as bars: what the ball does in the air, at walls and at paddles.
+"""Pong through its list of objects, as a benchmark: what the ball does in the air, at walls and at paddles.
 
 Predicted are the ball's displacements per frame, whole pixels: exact or wrong.
 """
@@ -40,7 +40,7 @@ _TARGETS: Final = (Target("ball", "dx"), Target("ball", "dy"))
 
 
 def pong(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Measure]:
-    """Row 6, learned from one recording and tested on another, and row 8's part for it.
+    """Learned from one recording and tested on another; and the stream as it comes.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def kinds_of(
 ) -> NDArray[np.intp]:
     """What happened, as places in `KINDS`, from displacements before and after, ``(n, 2)`` each, and heights, ``(n,)``.
 
-    Evaluated after the fact, to tell errors apart: what turns the ball round is a paddle, what throws it back at a wall is
+    Told after the fact, to tell errors apart: what turns the ball round is a paddle, what throws it back at a wall is
     the wall. The frame after that, serves and goals are other changes.
     """
     turned, same = before * after < 0.0, (before == after).all(axis=1)
@@ -86,7 +86,7 @@ def kinds_of(
 
 
 def _shares(columns: dict[str, NDArray[np.float64]], *, verbose: bool) -> Iterator[tuple[str, float, float]]:
-    """Figures with their bars, which they must reach."""
+    """Figures with the limits that they must reach."""
     before = columns["now"]
     after, said = before + columns["change"], before + columns["said"]
     exact, kinds = np.abs(said - after) < 0.5, kinds_of(before, after, columns["seen"][:, HEIGHT])

@@ -25,11 +25,11 @@ STEPS: Final = 5_000
 """Transitions of a stream."""
 
 ENVS: Final = ("mountain", "mountain-continuous", "cart", "pendulum", "lander")
-"""The envs of rows 1 to 3 and 5."""
+"""The envs."""
 
 
 def prequential(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Measure]:
-    """Row 8: prints a table per env, of the first seed; how the model compares with the best online baseline."""
+    """Prints a table per env, of the first seed; how the model compares with the best online baseline."""
     found = []
     for name in ENVS[:1] if quick else ENVS:
         ratios: dict[str, list[float]] = {}

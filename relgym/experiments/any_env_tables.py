@@ -1,4 +1,4 @@
-"""Traffic and Pong through tables, as bars (``python -m relgym.experiments.any_env_tables FOLDER``).
+"""Traffic and Pong through tables, as benchmarks (``python -m relgym.experiments.any_env_tables FOLDER``).
 
 The envs' pins clash with ours, so they are recorded in environments of their own (``examples/adapters``, option
 ``--record FOLDER``, for every seed) and learned from here, where what they are compared with can be installed.
@@ -27,7 +27,7 @@ from relgym.scene.objects import Target
 __all__ = ["highway", "main"]
 
 LIMITS: Final = {"car": 0.07, "ego": 0.15}
-"""Bars of x, nRMSE-d."""
+"""Largest nRMSE-d of x."""
 
 STEP: Final = 0.2
 """Seconds between two decisions: the weight of vx."""
@@ -36,9 +36,9 @@ _Columns = dict[str, NDArray[np.float64]]
 
 
 def highway(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Measure]:
-    """Row 7: where cars will be, and row 8's part for it: the stream as it comes, beside other learners.
+    """Where cars will be; and the stream as it comes, beside other learners.
 
-    Steps that end an episode are crashes, which push the cars apart; they are evaluated apart, and in the stream with all.
+    Steps that end an episode are crashes, which push the cars apart; they are counted apart, and in the stream too.
     """
     targets = [Target(name, "x") for name in LIMITS]
     found: dict[tuple[str, float], list[float]] = {}
@@ -94,22 +94,22 @@ def _off(model: WorldModel, name: str) -> float:
     return abs(weight / STEP - 1.0)
 
 
-ROWS: Final[dict[str, Callable[..., list[Measure]]]] = {"highway": highway, "pong": pong}
-"""Rows by name."""
+BENCHMARKS: Final[dict[str, Callable[..., list[Measure]]]] = {"highway": highway, "pong": pong}
+"""By name."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Command line: a folder of recordings, rows, ``--seeds N``, ``--tuning`` for the tuning seeds."""
+    """Command line: a folder of recordings, ``--only NAMES``, ``--seeds N``, ``--tuning`` for the tuning seeds."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--rows", nargs="*", default=list(ROWS), choices=list(ROWS))
+    parser.add_argument("--only", nargs="*", default=list(BENCHMARKS), choices=list(BENCHMARKS))
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--tuning", action="store_true")
     parser.add_argument("--online", action="store_true", help="leave out the baselines that are fitted once")
     given = parser.parse_args(arguments)
     seeds = (TUNING_SEEDS if given.tuning else TRAINING_SEEDS)[: given.seeds]
-    for name in given.rows:
-        print(report(name, ROWS[name](given.folder, seeds, batch=not given.online)), "\n", flush=True)
+    for name in given.only:
+        print(report(name, BENCHMARKS[name](given.folder, seeds, batch=not given.online)), "\n", flush=True)
 
 
 if __name__ == "__main__":

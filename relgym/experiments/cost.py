@@ -77,7 +77,7 @@ def step_cost(episodes: Iterable[Episode], setting: BallExperiment = BALL_EXPERI
 
 
 def step_measures(costs: Iterable[StepCost]) -> list[Measure]:
-    """Row 7: totals and quantiles, one figure per run."""
+    """Totals and quantiles, one figure per run."""
     runs = list(costs)
     ms = [1000.0 * run.steps for run in runs]
     return [
@@ -137,7 +137,7 @@ def query_cost(model: WorldModel, episodes: Iterable[Episode], *, singles: int =
 
 
 def query_measures(costs: Iterable[QueryCost]) -> list[Measure]:
-    """Row 8, one figure per run."""
+    """One figure per run."""
     runs = list(costs)
     return [
         measured("predict_one, ms", 1.0, [1e3 * run.single for run in runs]),

@@ -1,4 +1,4 @@
-"""Bars to be met, and what was measured, as records, as a table and as plain data."""
+"""Criteria, and what was measured, as records, as a table and as plain data."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ class Criterion:
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A figure, measured several times, against its bar.
+    """A figure, measured several times, against its criterion.
 
     Attributes
     ----------
-    bar
-        The bar.
+    criterion
+        The criterion.
     values
         One figure per repetition (training seed, or pair of training and test seed).
     """
@@ -65,7 +65,7 @@ class Measure:
 
     @property
     def ok(self) -> bool:
-        """Whether the worst figure keeps the bar."""
+        """Whether the worst figure keeps the limit."""
         return self.criterion.met(self.worst)
 
     def to_json(self) -> dict[str, Any]:
@@ -75,12 +75,12 @@ class Measure:
 
 
 def measured(what: str, limit: float, values: Iterable[float], side: Literal["<=", ">="] = "<=") -> Measure:
-    """A bar and its figures in one call."""
+    """A criterion and its figures in one call."""
     return Measure(Criterion(what, limit, side), tuple(map(float, values)))
 
 
 def report(title: str, measures: Sequence[Measure], notes: Iterable[str] = ()) -> str:
-    """A table of bars, for people."""
+    """A table of figures and limits, for people."""
     rows: list[list[Cell]] = [
         [
             m.criterion.what,
@@ -92,5 +92,5 @@ def report(title: str, measures: Sequence[Measure], notes: Iterable[str] = ()) -
         ]
         for m in measures
     ]
-    header = ["figure", "bar", "worst", "median", "of", ""]
+    header = ["figure", "limit", "worst", "median", "of", ""]
     return "\n".join([title, table(header, rows), *notes])

@@ -1,8 +1,9 @@
-"""Issue "Dream": what must be shown, row by row, measured against its bar.
+"""Benchmarks of Dyna: how many real steps it saves and what it costs; each figure beside its limit.
 
-``python -m relgym.experiments.dyna_benchmarks 1 --arms relgym sac --seeds 2`` runs two arms of row 1 with two seeds each, and
-reports all that is known of the row. Results are kept in a store: what is there already isn't computed again, so that
-the whole comparison (``make dyna-full``) can be stopped and resumed. ``--page`` writes the page of results.
+``python -m relgym.experiments.dyna_benchmarks truck --arms relgym sac --seeds 2`` runs two arms with two seeds
+each, and reports all that is known of the benchmark. Results are kept in a store: what is there already isn't computed
+again, so that the whole comparison (``make dyna-full``) can be stopped and resumed. ``--page`` writes the page of
+results.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from relgym.errors import StoreError
 from relgym.experiments.chapter4.reproduce import Made, section
 from relgym.experiments.criterion import report
 from relgym.experiments.dyna_arms import ARMS
-from relgym.experiments.dyna_measures import ROWS, Found, Row
+from relgym.experiments.dyna_measures import BENCHMARKS, Benchmark, Found
 from relgym.experiments.jobs.run import run
 from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
@@ -31,61 +32,61 @@ __all__ = ["main", "page", "shown", "wanted"]
 
 _HEAD: Final = """# What dreaming is worth
 
-`python -m relgym.experiments.dyna_benchmarks` wrote this page, but for what stands below the tables, which it leaves alone.
-Each section is a row of bars. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than five, no
-more were run (*of* in the tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250 real
-steps; *each* lists the real steps to it, the smallest first. *time* is processor time, tests included (a run has one
-thread); *learning* and *dreaming* are wall time on a machine with two cores that did other things too, and so may be
-longer. The [guide](../guides/dyna.md) says how it works."""
+`python -m relgym.experiments.dyna_benchmarks` wrote this page, but for what stands below the tables, which it leaves
+alone. Each section is a benchmark. Seeds are 0 to 4, on which nothing was chosen; where a figure is of fewer than
+five, no more were run (*of* in the tables). Success is 90 of 100 fixed test episodes twice in a row, checked every 250
+real steps; *each* lists the real steps to it, the smallest first. *time* is processor time, tests included (a run has
+one thread); *learning* and *dreaming* are wall time on a machine with two cores that did other things too, and so may
+be longer. The [guide](../guides/dyna.md) says how it works."""
 
 
-def wanted(row: Row, *, seeds: int, arms: Sequence[str]) -> list[Task]:
-    """Those of a row's tasks that have one of the first seeds (or none) and one of the arms (or none)."""
+def wanted(benchmark: Benchmark, *, seeds: int, arms: Sequence[str]) -> list[Task]:
+    """Those of a benchmark's tasks that have one of the first seeds (or none) and one of the arms (or none)."""
     few = TRAINING_SEEDS[:seeds]
     return [
         task
-        for task in row.tasks
+        for task in benchmark.tasks
         if task.arguments.get("seed", 0) in few and task.arguments.get("arm", arms[0]) in arms
     ]
 
 
-def known(row: Row, store: ResultStore) -> tuple[Found, float]:
-    """What the store holds of a row, and how many seconds it took."""
-    results = [(task.arguments, store.get(task)) for task in row.tasks]
+def known(benchmark: Benchmark, store: ResultStore) -> tuple[Found, float]:
+    """What the store holds of a benchmark, and how many seconds it took."""
+    results = [(task.arguments, store.get(task)) for task in benchmark.tasks]
     there = [(arguments, result) for arguments, result in results if result is not None]
     return [(arguments, r.value) for arguments, r in there], sum(r.seconds for _, r in there)
 
 
-def shown(number: int, store: ResultStore, out: Path, command: str) -> Made:
-    """Report a row; writes ``row-NUMBER.json`` and, if it has one, its picture.
+def shown(name: str, store: ResultStore, out: Path, command: str) -> Made:
+    """Report a benchmark; writes ``NAME.json`` and, if it has one, its picture.
 
     Raises
     ------
     StoreError
         Nothing of it has been run.
     """
-    row = ROWS[number]
-    found, seconds = known(row, store)
+    benchmark = BENCHMARKS[name]
+    found, seconds = known(benchmark, store)
     if not found:
-        raise StoreError(f"nothing is known of row {number}: run it with at least one seed and arm")
-    figures = row.show(found)
-    picture = f"dream-{number}.png" if figures.draw is not None else ""
+        raise StoreError(f"nothing is known of {name}: run it with at least one seed and arm")
+    figures = benchmark.show(found)
+    picture = f"dyna-{name}.png" if figures.draw is not None else ""
     if figures.draw is not None:
         out.mkdir(parents=True, exist_ok=True)
         figures.draw(out / picture)
-    extent = f"{len(found)} of the row's {len(row.tasks)} runs have been made."
-    text = report(row.title, figures.measures, [*figures.notes, extent])
+    extent = f"{len(found)} of {len(benchmark.tasks)} runs have been made."
+    text = report(benchmark.title, figures.measures, [*figures.notes, extent])
     today = date.today().isoformat()
-    made = Made(f"row-{number}", row.title, 'issue "Dream"', text, picture, today, command, seconds)
-    write_atomically(out / f"row-{number}.json", json.dumps(asdict(made), indent=1).encode())
+    made = Made(name, benchmark.title, "Dyna", text, picture, today, command, seconds)
+    write_atomically(out / f"{name}.json", json.dumps(asdict(made), indent=1).encode())
     return made
 
 
 def page(out: Path, target: Path) -> None:
-    """Write the page of results from what rows have written, and copy their pictures beside it.
+    """Write the page of results from what benchmarks have written, and copy their pictures beside it.
 
-    Of a page that is there already, sections of rows that wrote nothing into this folder stay, and so does what was
-    written by hand below the tables.
+    Of a page that is there already, sections of benchmarks that wrote nothing into this folder stay, and so does what
+    was written by hand below the tables.
     """
     old = _sections(target.read_text(encoding="utf-8")) if target.is_file() else {}
     sections = dict(old)
@@ -94,7 +95,7 @@ def page(out: Path, target: Path) -> None:
             write_atomically(target.parent / made.figure, (out / made.figure).read_bytes())
         remark = old.get(made.name, "").partition("\n```\n")[2].strip()
         sections[made.name] = section(made, ".") + (f"\n\n{remark}" if remark else "")
-    names = {f"row-{number}": row.title for number, row in ROWS.items()}
+    names = {name: benchmark.title for name, benchmark in BENCHMARKS.items()}
     missing = [f"{name}, {title}" for name, title in names.items() if name not in sections]
     rest = [f"Not made yet: {'; '.join(missing)}."] if missing else []
     parts = [_HEAD, *rest, *(sections[name] for name in names if name in sections)]
@@ -102,22 +103,22 @@ def page(out: Path, target: Path) -> None:
 
 
 def _sections(text: str) -> dict[str, str]:
-    """The sections of a page of results, by the names of their rows."""
+    """The sections of a page of results, by the names of their benchmarks."""
     return {own.split(":")[0]: f"## {own.strip()}" for own in text.split("\n## ")[1:]}
 
 
 def _made(out: Path) -> Iterator[Made]:
-    for number in ROWS:
-        path = out / f"row-{number}.json"
+    for name in BENCHMARKS:
+        path = out / f"{name}.json"
         if path.is_file():
             yield Made(**json.loads(path.read_text(encoding="utf-8")))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run what isn't run yet of the rows named on the command line, then report them."""
+    """Run what isn't run yet of the benchmarks named on the command line, then report them."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rows", type=int, nargs="*", choices=sorted(ROWS), default=sorted(ROWS))
+    parser.add_argument("benchmarks", nargs="*", choices=[*BENCHMARKS, []], default=list(BENCHMARKS))
     parser.add_argument("--arms", nargs="+", choices=list(ARMS), default=list(ARMS))
     parser.add_argument("--seeds", type=int, default=len(TRAINING_SEEDS), help="so many, at most 5")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
@@ -125,12 +126,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--page", type=Path, help="where to write the page of results")
     chosen = parser.parse_args(given)
     store = ResultStore(chosen.out / "cache")
-    tasks = [t for n in chosen.rows for t in wanted(ROWS[n], seeds=chosen.seeds, arms=chosen.arms)]
+    tasks = [
+        t for n in chosen.benchmarks for t in wanted(BENCHMARKS[n], seeds=chosen.seeds, arms=chosen.arms)
+    ]
     for progress in run(tasks, store, workers=chosen.jobs):
         print(f"{progress.done} of {progress.total} runs", file=sys.stderr, flush=True)
-    for number in chosen.rows:
-        command = shlex.join(["python", "-m", "relgym.experiments.dyna_benchmarks", str(number)])
-        print(shown(number, store, chosen.out, command).text, flush=True)
+    for name in chosen.benchmarks:
+        command = shlex.join(["python", "-m", "relgym.experiments.dyna_benchmarks", name])
+        print(shown(name, store, chosen.out, command).text, flush=True)
     if chosen.page is not None:
         page(chosen.out, chosen.page)
 

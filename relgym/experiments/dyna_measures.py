@@ -1,4 +1,4 @@
-"""Issue "Dream": what must be shown, row by row: the tasks that a row rests on, and its figures against their bars."""
+"""Benchmarks of Dyna: the tasks that each rests on, and its figures beside their limits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from relgym.experiments.dyna_speed import WORLDS
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.seeds import TRAINING_SEEDS
 
-__all__ = ["ROWS", "Found", "Row", "Shown"]
+__all__ = ["BENCHMARKS", "Benchmark", "Found", "Shown"]
 
 Found: TypeAlias = Sequence[tuple[Mapping[str, Any], Any]]
 """Arguments and results of the tasks that have been run."""
@@ -46,12 +46,12 @@ _BALL_BASELINES: Final = ("sac", "sac5", "sac20")
 
 @dataclass(frozen=True)
 class Shown:
-    """A row's figures.
+    """A benchmark's figures.
 
     Attributes
     ----------
     measures
-        Against their bars.
+        Beside their limits.
     notes
         Tables and sentences beneath.
     draw
@@ -64,8 +64,8 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Row:
-    """Something that must be shown.
+class Benchmark:
+    """Something that is measured.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ def _learning(
     ]
 
 
-# ------------------------------------------------------------------ rows 1 and 3: real steps to success
+# ------------------------------------------------------------------ real steps to success
 def _truck(found: Found) -> Shown:
     runs = _runs(found)
     baselines = (("sac", 20.0), ("sac-permuted", 5.0), ("ensemble", 2.0))
@@ -139,7 +139,7 @@ def _of(runs: Sequence[Run], arm: str) -> list[Run]:
     return [run for run in runs if run.arm == arm]
 
 
-# ------------------------------------------------------------------ row 2: trained in the dream alone
+# ------------------------------------------------------------------ trained in the dream alone
 def _asleep(found: Found) -> Shown:
     successes = measured(
         "successes of 100 real episodes", ENOUGH, [value["successes"] for _, value in found], ">="
@@ -147,7 +147,7 @@ def _asleep(found: Found) -> Shown:
     return Shown([successes], [_times(found)])
 
 
-# ------------------------------------------------------------------ row 4: models that are wrong
+# ------------------------------------------------------------------ models that are wrong
 def _no_harm(found: Found) -> Shown:
     """A model of another world, then a world that becomes another one, each beside SAC."""
     learned = [(arguments, Run.from_json(value)) for arguments, value in found if "curve" in value]
@@ -181,7 +181,7 @@ def _course(run: Run, what: str) -> str:
     )
 
 
-# ------------------------------------------------------------------ rows 5 and 6
+# ------------------------------------------------------------------ more boxes, and speed
 def _among(found: Found) -> Shown:
     counts = list(found[0][1]["successes"])
     measures = [
@@ -212,19 +212,21 @@ _FEW: Final[Mapping[str, int]] = {"sac40": 5_000, "ensemble": 2_500}
 
 _CHANGE: Final[Mapping[str, Any]] = {"after": _TURN, "arguments": _LIGHT}
 
-ROWS: Final[Mapping[int, Row]] = {
-    1: Row("TruckPush: real steps to success", _learning("truck", _TRUCK_ARMS, STEPS, _FEW), _truck),
-    2: Row(
+BENCHMARKS: Final[Mapping[str, Benchmark]] = {
+    "truck": Benchmark(
+        "TruckPush: real steps to success", _learning("truck", _TRUCK_ARMS, STEPS, _FEW), _truck
+    ),
+    "truck-dream-only": Benchmark(
         "TruckPush: trained in the dream alone",
         [_task("asleep", course="truck", seed=seed, real=1_000, updates=20_000) for seed in TRAINING_SEEDS],
         _asleep,
     ),
-    3: Row(
+    "ball": Benchmark(
         "BallGoal: real decisions to success",
         _learning("ball", ("relgym", "relgym-given", *_BALL_BASELINES), _BALL_STEPS),
         _ball,
     ),
-    4: Row(
+    "truck-wrong-model": Benchmark(
         "TruckPush: wrong models do no harm",
         [
             *_learning("truck", ("sac",), _MISLED_STEPS),
@@ -238,15 +240,15 @@ ROWS: Final[Mapping[int, Row]] = {
         ],
         _no_harm,
     ),
-    5: Row(
+    "truck-more-boxes": Benchmark(
         "TruckPush: dreams among more boxes than the model saw",
         [_task("among", seed=seed, bystanders=[2, 3, 4, 5, 6, 7], **_DREAMS) for seed in TRAINING_SEEDS],
         _among,
     ),
-    6: Row(
+    "speed": Benchmark(
         "Speed of dreams",
         [_task("speed", world=world) for world in WORLDS],
         _speed,
     ),
 }
-"""What must be shown, by its number in the issue."""
+"""By name."""

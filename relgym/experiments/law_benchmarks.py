@@ -1,7 +1,7 @@
-"""Issue "One law per interaction": what must be shown, row by row, measured against its bar.
+"""Benchmarks of laws of motion: accuracy, transfer, scaling, noise; each figure beside its limit.
 
-``python -m relgym.experiments.law_benchmarks 1 3 --seeds 2 --json laws.json`` measures rows 1 and 3 with two training
-seeds and writes the figures down as well. Every transition counts, corners and double contacts included.
+``python -m relgym.experiments.law_benchmarks one-step inclines --seeds 2 --json laws.json`` measures two of them with
+two training seeds and writes the figures down as well. Every transition counts, corners and double contacts included.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from relgym.experiments.criterion import measured, report
 from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_episodes, truck_episodes
 from relgym.experiments.law_classic import CLASSICS, Classic, classic_transitions
 from relgym.experiments.law_scaling import scaling
-from relgym.experiments.law_score import SEEDS, TESTS, Part, Rows, score, taught
+from relgym.experiments.law_score import SEEDS, TESTS, Part, Section, score, taught
 from relgym.experiments.law_trials import inexpressible, noise, other_worlds
 from relgym.experiments.rollouts import largest_errors
 from relgym.experiments.rooms import rooms
@@ -35,7 +35,7 @@ from relgym.scene.schema import SceneSchema
 __all__ = ["main"]
 
 
-def _one_step(seeds: Sequence[int]) -> Rows:
+def _one_step(seeds: Sequence[int]) -> Section:
     measures, notes = [], []
     for experiment in (1, 2):
         scores = []
@@ -54,7 +54,7 @@ def _one_step(seeds: Sequence[int]) -> Rows:
     return "one step", measures, notes
 
 
-def _rollouts(seeds: Sequence[int]) -> Rows:
+def _rollouts(seeds: Sequence[int]) -> Section:
     measures = []
     for experiment in (1, 2):
         values = []
@@ -67,7 +67,7 @@ def _rollouts(seeds: Sequence[int]) -> Rows:
     return "roll-outs of 200 steps", measures, []
 
 
-def _transfer(seeds: Sequence[int]) -> Rows:
+def _transfer(seeds: Sequence[int]) -> Section:
     measures = []
     for incline, elasticity, friction in ((30.0, 0.9, 0.0), (30.0, 0.9, 0.2), (45.0, 0.95, 0.2)):
         home = BallExperiment(incline, elasticity, (friction,), 80)
@@ -80,7 +80,7 @@ def _transfer(seeds: Sequence[int]) -> Rows:
     return "other inclines", measures, []
 
 
-def _rooms(seeds: Sequence[int]) -> Rows:
+def _rooms(seeds: Sequence[int]) -> Section:
     measures = []
     for experiment in (1, 2):
         setting = BALL_EXPERIMENTS[experiment]
@@ -103,7 +103,7 @@ def _rooms(seeds: Sequence[int]) -> Rows:
     return "rooms never seen", [*measures, *scaling()], []
 
 
-def _parts_of_the_world(seeds: Sequence[int]) -> Rows:
+def _parts_of_the_world(seeds: Sequence[int]) -> Section:
     measures = []
     for experiment in (1, 2):
         for kind in ("floor", "wall"):
@@ -136,7 +136,7 @@ class _Touching:
         return np.logical_not(found.relation("intersect")[:, ball][:, others].any(axis=1))
 
 
-def _online(seeds: Sequence[int]) -> Rows:
+def _online(seeds: Sequence[int]) -> Section:
     measures = []
     for experiment, episodes, at in ((1, 8, (1, 2, 4, 8)), (2, 40, (2, 4, 8, 16, 40))):
         exact, costs, found = [], [], {n: list[int]() for n in at}
@@ -174,7 +174,7 @@ def _timed(model: WorldModel, transition: Transition) -> float:
 _FRAMES: Final[tuple[Literal["auto", "world"], ...]] = ("auto", "world")
 
 
-def _no_contact(seeds: Sequence[int]) -> Rows:
+def _no_contact(seeds: Sequence[int]) -> Section:
     streams: dict[str, Callable[[int], tuple[SceneSchema, list[Transition]]]] = {"truck-push": _truck}
     for classic in CLASSICS:
         for body in (False, True):
@@ -207,32 +207,33 @@ def _learned(
     return json.dumps(model.to_json()["targets"]), process_time() - start
 
 
-ROWS: Final[dict[int, Callable[[Sequence[int]], Rows]]] = {
-    1: _one_step,
-    2: _rollouts,
-    3: _transfer,
-    4: _rooms,
-    5: _parts_of_the_world,
-    6: _online,
-    7: other_worlds,
-    8: noise,
-    9: _no_contact,
-    10: inexpressible,
+BENCHMARKS: Final[dict[str, Callable[[Sequence[int]], Section]]] = {
+    "one-step": _one_step,
+    "roll-outs": _rollouts,
+    "inclines": _transfer,
+    "rooms": _rooms,
+    "contacts-of-one-kind": _parts_of_the_world,
+    "online": _online,
+    "other-worlds": other_worlds,
+    "noise": noise,
+    "no-contact": _no_contact,
+    "inexpressible": inexpressible,
 }
+"""By name."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure the rows named on the command line and print them."""
+    """Measure the benchmarks named on the command line and print them."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rows", type=int, nargs="+", choices=sorted(ROWS))
+    parser.add_argument("benchmarks", nargs="+", choices=list(BENCHMARKS))
     parser.add_argument("--json", type=Path, help="where to write the figures")
     parser.add_argument("--seeds", type=int, help="only so many training seeds")
     chosen = parser.parse_args(arguments)
-    found: dict[int, Any] = {}
-    for row in chosen.rows:
-        title, measures, notes = ROWS[row](SEEDS[: chosen.seeds])
-        found[row] = {"title": title, "measures": [m.to_json() for m in measures], "notes": notes}
-        print(report(f"row {row}: {title}", measures, notes), flush=True)
+    found: dict[str, Any] = {}
+    for name in chosen.benchmarks:
+        title, measures, notes = BENCHMARKS[name](SEEDS[: chosen.seeds])
+        found[name] = {"title": title, "measures": [m.to_json() for m in measures], "notes": notes}
+        print(report(f"{name}: {title}", measures, notes), flush=True)
     if chosen.json:
         chosen.json.write_text(json.dumps(found, indent=1))
 

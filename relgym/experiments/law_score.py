@@ -19,7 +19,7 @@ from relgym.laws.touching import Contacts
 from relgym.model.world_model import WorldModel
 from relgym.scene.relations import Extractor
 
-__all__ = ["SEEDS", "TESTS", "WRONG", "Part", "Rows", "Score", "score", "score_laws", "taught"]
+__all__ = ["SEEDS", "TESTS", "WRONG", "Part", "Score", "Section", "score", "score_laws", "taught"]
 
 WRONG: Final = 1e-9
 """A velocity component off by more than this is wrong."""
@@ -33,8 +33,8 @@ TESTS: Final = tuple(range(500, 505))
 Part: TypeAlias = Episode | Room
 """Consecutive scenes with the same objects."""
 
-Rows: TypeAlias = tuple[str, list[Measure], list[str]]
-"""A row's title, its figures, and what to print below."""
+Section: TypeAlias = tuple[str, list[Measure], list[str]]
+"""A benchmark's title, its figures, and what to print below."""
 
 
 @dataclass(frozen=True, slots=True)

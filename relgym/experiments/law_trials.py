@@ -12,7 +12,7 @@ from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.law_motion import episode
-from relgym.experiments.law_score import TESTS, Rows, score, score_laws, taught
+from relgym.experiments.law_score import TESTS, Section, score, score_laws, taught
 from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.experiments.rooms import Room
 from relgym.laws.book import LawBook
@@ -103,7 +103,7 @@ TRIALS: Final = (
         ),
     ),
 )
-"""Row 7."""
+"""Worlds that the benchmark *other-worlds* learns."""
 
 
 def _weaker(speed: float) -> float:
@@ -120,7 +120,7 @@ INEXPRESSIBLE: Final[Mapping[str, World]] = {
     "restitution drops at a speed": World(2, materials={"block": Material(_brittle)}),
     "soft contact": World(2, materials={"block": Material(spring=1.0)}),
 }
-"""Row 10."""
+"""Worlds of the benchmark *inexpressible*."""
 
 
 def trial_rooms(world: World, count: int, *, seed: int, steps: int = _STEPS) -> list[Room]:
@@ -136,9 +136,9 @@ def _formulas(book: LawBook) -> tuple[str, frozenset[str]]:
     return book.pair.frame, frozenset(law.formula(6) for axis in book.pair.axes for law in axis)
 
 
-# ------------------------------------------------------------------ row 7
-def other_worlds(seeds: Sequence[int], train: int = 40, test: int = 20) -> Rows:
-    """Row 7: the laws of each trial world, found and right."""
+# ------------------------------------------------------------------ other worlds
+def other_worlds(seeds: Sequence[int], train: int = 40, test: int = 20) -> Section:
+    """The laws of each trial world, found and right."""
     measures: list[Measure] = []
     notes: list[str] = []
     for trial in TRIALS:
@@ -169,7 +169,7 @@ def transplanted(seed: int, train: int = 40, test: int = 20) -> float:
     return score_laws(above, trial_rooms(space, test, seed=TESTS[0])).share
 
 
-# ------------------------------------------------------------------ row 8
+# ------------------------------------------------------------------ noise
 def noisy(parts: Sequence[Episode], sd: float, *, rng: np.random.Generator) -> Iterator[Episode]:
     """The same episodes, with independent noise on everything that moves: positions and velocities."""
     for part in parts:
@@ -183,8 +183,8 @@ def noisy(parts: Sequence[Episode], sd: float, *, rng: np.random.Generator) -> I
         yield replace(part, vectors=vectors)
 
 
-def noise(seeds: Sequence[int], episodes: int = 24) -> Rows:
-    """Row 8: restitution and friction from noisy states."""
+def noise(seeds: Sequence[int], episodes: int = 24) -> Section:
+    """Restitution and friction from noisy states."""
     measures = []
     for experiment in (1, 2):
         setting = BALL_EXPERIMENTS[experiment]
@@ -215,9 +215,9 @@ def constants(book: LawBook) -> dict[str, float]:
     return found
 
 
-# ------------------------------------------------------------------ row 10
-def inexpressible(seeds: Sequence[int], train: int = 40, test: int = 20) -> Rows:
-    """Row 10: laws of contacts that aren't of their form must abstain."""
+# ------------------------------------------------------------------ what no law can state
+def inexpressible(seeds: Sequence[int], train: int = 40, test: int = 20) -> Section:
+    """Laws of contacts that aren't of their form must abstain."""
     measures: list[Measure] = []
     for name, world in INEXPRESSIBLE.items():
         laws, models = [], []

@@ -199,7 +199,7 @@ def best_sigmas(outcomes: Iterable[NoiseOutcome]) -> dict[tuple[float, str], flo
 def noise_measures(
     outcomes: Iterable[NoiseOutcome], best: Mapping[tuple[float, str], float]
 ) -> list[Measure]:
-    """Row 11: error with the estimated noise over that with the best hand-set one, one figure per training seed.
+    """Error with the estimated noise over that with the best hand-set one, one figure per training seed.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class RolloutErrors:
         How many were off by more than `STRAY` somewhere, or stopped early; all, and those during whose truth
         no corner was hit.
     stopped
-        How many of those stopped early, for want of a prediction.
+        How many of those stopped early, where there was no prediction.
     corner
         Trials during whose truth a corner was hit.
     median

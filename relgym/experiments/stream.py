@@ -1,4 +1,4 @@
-"""Online in earnest: errors while learning, and what later episodes may not change (rows 5 and 6)."""
+"""Online in earnest: errors while learning, and what later episodes may not change."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from relgym.model.world_model import WorldModel
 __all__ = ["KindsOutcome", "box_then_ramp", "prequential_measures", "same_model", "stream_measures"]
 
 EARLY, LATE = 3, 32
-"""Episodes from which on the two bars of row 5 hold; the first episode is 1."""
+"""Episodes from which on the two limits of `prequential_measures` hold; the first episode is 1."""
 
 
 def prequential_measures(courses: Iterable[Course]) -> list[Measure]:
-    """Row 5: share of wrong predictions from episode 3 and from episode 32 on; the worse of both coordinates."""
+    """Share of wrong predictions from episode 3 and from episode 32 on; the worse of both coordinates."""
     runs = list(courses)
     found = []
     for first, limit in ((EARLY, 0.02), (LATE, 0.003)):
@@ -33,7 +33,7 @@ def prequential_measures(courses: Iterable[Course]) -> list[Measure]:
 
 
 def same_model(episodes: Iterable[Episode], after: int, *, config: ModelConfig | None = None) -> bool:
-    """Row 6: whether the model after some episodes is, byte for byte, the same if more follow.
+    """Whether the model after some episodes is, byte for byte, the same if more follow.
 
     One model sees the first episodes only. The other one sees all, and a copy is taken on the way.
 
@@ -69,7 +69,7 @@ class KindsOutcome:
 
 
 def box_then_ramp(*, seed: int, test: int, episodes: int = 40, test_episodes: int = 40) -> KindsOutcome:
-    """Row 6: learn scenes with a box only, then with a ramp only, and test on the former before and after.
+    """Learn scenes with a box only, then with a ramp only, and test on the former before and after.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def box_then_ramp(*, seed: int, test: int, episodes: int = 40, test_episodes: in
 
 
 def stream_measures(same: Iterable[bool], kinds: Iterable[KindsOutcome]) -> list[Measure]:
-    """Row 6, one figure per run."""
+    """One figure per run."""
     return [
         measured("models equal byte for byte", 1.0, map(float, same), ">="),
         measured("more wrong on box-only scenes", 0.0, [each.worsening for each in kinds]),

@@ -1,6 +1,7 @@
-"""Issue "Chapter III whole": what must be shown, row by row, measured against its bar.
+"""Benchmarks of learning the thesis' worlds: accuracy, cost, learning online, noise; each figure beside its limit.
 
-``python -m relgym.experiments.thesis_benchmarks 1 2 --json bars.json`` measures rows 1 and 2 and writes the figures down as well.
+``python -m relgym.experiments.thesis_benchmarks ball-1 cost --json figures.json`` measures two of them and writes the
+figures down as well.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ __all__ = ["main"]
 
 
 Section: TypeAlias = tuple[str, list[Measure], list[str]]
-"""Title, figures and remarks of one row."""
+"""Title, figures and remarks of one benchmark."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,25 +143,25 @@ def _noise(request: Request) -> Section:
     return "noise, experiment 1", noise_measures(outcomes, best), []
 
 
-ROWS: Final[Mapping[int, Callable[[Request], Section]]] = {
-    1: _ball(1),
-    2: _ball(2),
-    3: _ball(3),
-    5: _prequential,
-    6: _stream,
-    7: _steps,
-    8: _queries,
-    9: _per_episode,
-    10: _bystanders,
-    11: _noise,
+BENCHMARKS: Final[Mapping[str, Callable[[Request], Section]]] = {
+    "ball-1": _ball(1),
+    "ball-2": _ball(2),
+    "ball-3": _ball(3),
+    "online": _prequential,
+    "later-episodes": _stream,
+    "cost-per-step": _steps,
+    "cost-per-query": _queries,
+    "truck-per-episode": _per_episode,
+    "truck-bystanders": _bystanders,
+    "noise": _noise,
 }
-"""Row 4, roll-outs, is measured with rows 1 and 2."""
+"""By name; roll-outs are measured with the ball's experiments 1 and 2."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Measure the rows named on the command line and print them."""
+    """Measure the benchmarks named on the command line and print them."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rows", type=int, nargs="+", choices=sorted(ROWS))
+    parser.add_argument("benchmarks", nargs="+", choices=list(BENCHMARKS))
     parser.add_argument("--json", type=Path, help="where to write the figures")
     parser.add_argument(
         "--tuning", action="store_true", help="the seeds for tuning instead of those for reporting"
@@ -169,11 +170,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     chosen = parser.parse_args(arguments)
     training = (TUNING_SEEDS if chosen.tuning else TRAINING_SEEDS)[: chosen.seeds]
     request = Request(training, (TUNING_TEST_SEED,) if chosen.tuning else TEST_SEEDS)
-    found: dict[int, Any] = {}
-    for row in chosen.rows:
-        title, measures, notes = ROWS[row](request)
-        found[row] = {"title": title, "measures": [m.to_json() for m in measures], "notes": notes}
-        print(report(f"row {row}: {title}", measures, notes), flush=True)
+    found: dict[str, Any] = {}
+    for name in chosen.benchmarks:
+        title, measures, notes = BENCHMARKS[name](request)
+        found[name] = {"title": title, "measures": [m.to_json() for m in measures], "notes": notes}
+        print(report(f"{name}: {title}", measures, notes), flush=True)
     if chosen.json:
         chosen.json.write_text(json.dumps(found, indent=1))
 

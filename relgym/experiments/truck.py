@@ -1,4 +1,4 @@
-"""The box pushing domain beyond Table 3.1: constants per episode, bystanders, other numbers of boxes (rows 9 and 10)."""
+"""The box pushing domain beyond Table 3.1: constants per episode, bystanders, other numbers of boxes."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def per_episode(*, seed: int, test: int, config: ModelConfig | None = None) -> P
 
 
 def per_episode_measures(outcomes: Iterable[PerEpisodeOutcome]) -> list[Measure]:
-    """Row 9, one figure per training seed."""
+    """One figure per training seed."""
     runs = list(outcomes)
     return [
         measured("rows of Table 3.1 among the five largest modes", 3, [run.found for run in runs], ">="),
@@ -153,7 +153,7 @@ def counts(*, seed: int, test: int, config: ModelConfig | None = None) -> CountO
 
 
 def bystander_measures(beside: Sequence[BystanderOutcome], counted: Sequence[CountOutcome]) -> list[Measure]:
-    """Row 10, one figure per training seed."""
+    """One figure per training seed."""
     return [
         measured("wrong with 2-7 bystanders", 0.001, [max(run.wrong.values()) for run in beside]),
         measured(

@@ -14,6 +14,7 @@ from relgym.scene.geometry.vectors import FloatArray
 
 __all__ = ["ONE", "ZERO", "AxisLaw", "FreeLaw", "Kind", "Operator", "PairLaw", "Piece", "Share"]
 
+_KEY = "rivals"  # of alternatives in files
 ONE = "1"
 """Name of the feature whose weight is a constant term."""
 
@@ -118,7 +119,7 @@ class AxisLaw:
             "pieces": _pieces_to_json(self.pieces),
             "operator": self.operator,
             "kinds": [list(kind) for kind in self.kinds],
-            "rivals": [[operator, _pieces_to_json(pieces)] for operator, pieces in self.alternatives],
+            _KEY: [[operator, _pieces_to_json(pieces)] for operator, pieces in self.alternatives],
             "signs": list(self.signs),
             "examples": self.examples,
             "unexplained": self.unexplained,
@@ -132,7 +133,7 @@ class AxisLaw:
             _pieces_from_json(data["pieces"]),
             data["operator"],
             tuple((str(a), str(b)) for a, b in data["kinds"]),
-            tuple((operator, _pieces_from_json(pieces)) for operator, pieces in data["rivals"]),
+            tuple((operator, _pieces_from_json(pieces)) for operator, pieces in data[_KEY]),
             (bool(data["signs"][0]), bool(data["signs"][1])),
             int(data["examples"]),
             int(data["unexplained"]),

@@ -63,7 +63,7 @@ class Advice:
     law
         The law that was found with these features, as text; empty without any.
     remains
-        Share of the change that it would leave; NaN if nothing was tried, for want of examples.
+        Share of the change that it would leave; NaN if there were too few examples to try anything.
     wrong, spoken
         How many of the latest predictions were wrong, of how many, where too many were for anybody to say that the
         modes explain it (`relgym.model.hindsight`); else 0.

@@ -40,7 +40,7 @@ class Answers(StandIns):
     Parameters
     ----------
     clusterer, classifier, casting
-        Who knows the modes, when each holds, and who plays their roles.
+        Who knows the modes, when each holds, and which objects their roles are bound to.
     conditions
         Next values that clauses may test.
     config

@@ -1,4 +1,4 @@
-"""Who plays the roles of a target's modes: one role classifier per mode that has any (§3.5)."""
+"""Role binding for a target's modes: one role classifier per mode that has any (§3.5)."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Casting:
             self.classifiers[number].recall(exemplars, number)
 
     def observe(self, mode: Mode, example: Example, roles: Sequence[int]) -> bool:
-        """Take in who played the roles of one example; whether that contradicts the descriptions."""
+        """Learn from the role binding of one example; returns whether that contradicts the descriptions."""
         kinds = self._kinds(mode)
         known = self.classifiers.get(mode.id)
         if known is None or known.kinds != kinds:

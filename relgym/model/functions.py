@@ -1,4 +1,4 @@
-"""What modes say of examples: their functions laid over slots, and who plays their roles."""
+"""What modes say of examples: their functions laid over slots, and the role bindings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ModeFunctions:
     Parameters
     ----------
     clusterer, casting
-        Who knows the modes, and who plays their roles.
+        Knows the modes and binds objects to their roles.
     config
         Free parameters.
     """
@@ -121,7 +121,7 @@ class ModeFunctions:
         return played
 
     def _recast(self, table: ExampleTable, exemplars: Exemplars) -> None:
-        """Write down anew who plays the roles of the remembered examples' modes."""
+        """Bind objects anew to the roles of the remembered examples' modes."""
         numbers = exemplars.rows.astype(np.intp)
         labels = self.clusterer.labels[numbers]
         roles = exemplars.columns["roles"]

@@ -105,8 +105,8 @@ def look_back(
 ) -> None:
     """Tell each target how its predictions of a step came out; arguments as of `WorldModel.look_back`.
 
-    Only what a mode said counts: neither fallback values nor laws of motion, which know by themselves where they fail. What
-    rests on another property's next value that was off isn't evaluated, since the fault is that one's.
+    Only what a mode said counts: neither fallback values nor laws of motion, which know by themselves where they fail.
+    What rests on another property's next value that was off isn't evaluated, since the fault is that one's.
     """
     layout = prediction.scene.layout
     targets = {(t.type, t.property): t for t in parts.targets}

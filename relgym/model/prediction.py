@@ -18,11 +18,11 @@ __all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
 class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
-    Only `PREDICTED` is a mode's word. With every other outcome the value is a fallback value, not a claim: what is unexplained
-    is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes, and so it is where an
-    approximation isn't good (`relgym.model.scope`); or, where modes cover the examples but nothing tells which of them
-    holds when, it is what the vote's winner says; outside experience it is what the mode says that would win the vote;
-    what depends on such a fallback value follows from it; else the property keeps its value.
+    Only `PREDICTED` is a mode's word. With every other outcome the value is a fallback, not a claim: what is
+    unexplained is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes, and so it is
+    where an approximation isn't good (`relgym.model.scope`); or, where modes cover the examples but nothing tells which
+    of them holds when, it is what the vote's winner says; outside experience it is what the mode says that would win
+    the vote; what depends on such a fallback value follows from it; else the property keeps its value.
     """
 
     PREDICTED = "predicted by a mode"
@@ -63,7 +63,7 @@ class Prediction:
         (`relgym.laws.frames`), and then the roles are the target and all that it touches.
     spread
         Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
-        among a few, or else on the same side of a threshold that tells) left, in units of the property; of a fallback value
+        among a few, or else on the same side of a threshold that tells) left, in units of the property; of a fallback
         what it left there; NaN where the property keeps its value.
     """
 

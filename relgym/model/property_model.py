@@ -1,4 +1,4 @@
-"""The model of one target: its modes, when each holds, and which objects play its roles (Figure 1.4)."""
+"""The model of one target: its modes, when each holds, and which objects its roles are bound to (Figure 1.4)."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class PropertyModel(Answers):
     Attributes
     ----------
     clusterer, classifier, casting
-        The learners of modes, of their preconditions and of who plays their roles.
+        The learners of modes, of their preconditions and of role bindings.
     spreads
         How far examples scatter about their modes.
     limits

@@ -44,7 +44,7 @@ class Split:
         return self.below if number <= self.threshold else self.above
 
     def __str__(self) -> str:
-        return f"± {self.below:.2g} where {self.name} <= {self.threshold:.3g}, ± {self.above:.2g} otherwise"
+        return f"± {self.below:.2g} where {self.name} <= {self.threshold:.3g}, ± {self.above:.2g} else"
 
     def to_json(self) -> list[Any]:
         """Plain data that `from_json` reads back."""

@@ -1,4 +1,4 @@
-"""1,024 dreams stepped at once (bar: 100,000 env-steps a second on one core, three times the engine's).
+"""1,024 dreams stepped at once (at least: 100,000 env-steps a second on one core, three times the engine's).
 
 Everything is recomputed in each step: geometry, relations, votes, players, functions. A round is one step of all
 dreams, so 10.24 ms are 100,000 env-steps a second.

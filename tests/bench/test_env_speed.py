@@ -1,4 +1,4 @@
-"""Steps per second through `gym.make` (bar: 10,000 with the ball), beside the engine alone."""
+"""Steps per second through `gym.make` (at least: 10,000 with the ball), beside the engine alone."""
 
 from __future__ import annotations
 

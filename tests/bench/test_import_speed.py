@@ -1,4 +1,4 @@
-"""What `import relgym` costs beside the gymnasium it builds on (bar: < 0.5 s more)."""
+"""What `import relgym` costs beside the gymnasium it builds on (at most: < 0.5 s more)."""
 
 from __future__ import annotations
 

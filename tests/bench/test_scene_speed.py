@@ -1,4 +1,4 @@
-"""Cost of relations and contacts: one scene of seven objects (bar: 250 us) and a batch (bar: 10 us each)."""
+"""Cost of relations and contacts: one scene of seven objects (at most: 250 us) and a batch (at most: 10 us each)."""
 
 from __future__ import annotations
 

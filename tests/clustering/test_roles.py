@@ -1,4 +1,4 @@
-"""Roles: cut out of weight vectors (§3.2.3), and who plays them (§3.2.4)."""
+"""Roles: cut out of weight vectors (§3.2.3), and bound to objects (§3.2.4)."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def test_limits_are_evaluated_apart() -> None:
     assert study.special(np.array([[8.0, 0.0], [-8.0, 1.0], [7.9, 2.0]])).tolist() == [True, True, False]
 
 
-def test_the_command_prints_a_row(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_a_benchmark(capsys: pytest.CaptureFixture[str]) -> None:
     main(["pendulum", "--quick", "--tuning"])
     text = capsys.readouterr().out
     assert "w' = w + 0.75 sin(th) + 0.15 action.a" in text

@@ -158,7 +158,7 @@ def test_the_command_measures_pong(tmp_path: Path, capsys: pytest.CaptureFixture
         before[:, 1, 5], after[:, 1, 5] = turned[:-1], turned[1:]
         changed = replace(recording, before=before, after=after)
         changed.save(tmp_path / f"pong{name}-{TUNING_SEEDS[0]}.npz")
-    main([str(tmp_path), "--rows", "pong", "--tuning", "--online"])
+    main([str(tmp_path), "--only", "pong", "--tuning", "--online"])
     text = capsys.readouterr().out
     assert "paddles, sign of dx" in text
     assert "a clause names the wall" in text

@@ -160,7 +160,7 @@ def test_what_suits_dreams_is_not_asked_of_baselines(arm: str, entropy: float) -
 @pytest.mark.sb3
 @pytest.mark.slow
 def test_dreaming_pays_in_truck_push() -> None:
-    """Issue "Dream", row 1 in small: one seed, given reward; SAC alone is nowhere near at these steps."""
+    """The benchmark *truck* in small: one seed, given reward; SAC alone is nowhere near at these steps."""
     course, tests = COURSES["truck"], Examination(COURSES["truck"])
     dreaming = run(course, ARMS["relgym-given"], seed=100, steps=3_000, testing=tests)
     assert dreaming.solved_at is not None

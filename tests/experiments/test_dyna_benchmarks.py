@@ -1,4 +1,4 @@
-"""Rows of bars of the Dyna experiments: by hand from made-up results, and the whole command with tiny tasks."""
+"""Benchmarks of Dyna: by hand from made-up results, and the whole command with tiny tasks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from relgym.experiments import dyna_benchmarks
 from relgym.experiments.criterion import Measure
 from relgym.experiments.dyna import Run, solved_at
 from relgym.experiments.dyna_arms import ARMS
-from relgym.experiments.dyna_measures import ROWS, Shown
+from relgym.experiments.dyna_measures import BENCHMARKS, Shown
 from relgym.experiments.jobs.store import Result, ResultStore
 
 
@@ -29,7 +29,7 @@ def by_name(shown: Shown) -> dict[str, Measure]:
 def test_ratios_are_of_medians_and_lower_bounds_where_a_baseline_failed() -> None:
     runs = [value("relgym", s, *([0] * s), 90, 90) for s in range(3)]  # 500, 750, 1,000
     runs += [value("sac", 0, 1, 2), value("ensemble", 0, 0, 0, 0, 0, 95, 95)]
-    found = by_name(ROWS[1].show([({}, run) for run in runs]))
+    found = by_name(BENCHMARKS["truck"].show([({}, run) for run in runs]))
     assert found["SAC: times as many real steps (at least)"].worst == pytest.approx(60_001 / 750)
     assert found["Dyna, MLP ensemble: times as many real steps"].worst == 2.0
     assert found["Dyna, relgym: seconds of one core"].values == (10.0, 10.0, 10.0)
@@ -39,14 +39,14 @@ def test_ratios_are_of_medians_and_lower_bounds_where_a_baseline_failed() -> Non
 def test_the_better_baseline_counts() -> None:
     runs = [value("relgym", 0, 90, 90, course="ball"), value("sac", 0, 1, 1, 1, 90, 90, course="ball")]
     runs.append(value("sac20", 0, 1, 90, 90, course="ball"))
-    (ratio,) = ROWS[3].show([({}, run) for run in runs]).measures
+    (ratio,) = BENCHMARKS["ball"].show([({}, run) for run in runs]).measures
     assert ratio.worst == 1.5 and not ratio.ok
 
 
 def test_no_harm_is_measured_at_the_same_real_steps() -> None:
     change = {"change": {}}
     found = by_name(
-        ROWS[4].show(
+        BENCHMARKS["truck-wrong-model"].show(
             [
                 ({}, value("sac", 0, 5, 20)),
                 ({}, {"run": value("relgym", 0, 5, 15), "right_there": 0.995}),
@@ -63,57 +63,64 @@ def test_no_harm_is_measured_at_the_same_real_steps() -> None:
 
 
 def test_dreamt_policies_and_speeds() -> None:
-    asleep = ROWS[2].show([({}, {"successes": good, "seconds": 1.0}) for good in (90, 89)])
+    asleep = BENCHMARKS["truck-dream-only"].show(
+        [({}, {"successes": good, "seconds": 1.0}) for good in (90, 89)]
+    )
     assert [m.ok for m in asleep.measures] == [False]
-    among = ROWS[5].show([({}, {"successes": {"2": 80, "7": 79}, "seconds": 1.0})])
+    among = BENCHMARKS["truck-more-boxes"].show([({}, {"successes": {"2": 80, "7": 79}, "seconds": 1.0})])
     assert [m.ok for m in among.measures] == [True, False]
-    speed = ROWS[6].show([({"world": "truck"}, {"dreams": 120_000.0, "engine": 50_000.0})])
+    speed = BENCHMARKS["speed"].show([({"world": "truck"}, {"dreams": 120_000.0, "engine": 50_000.0})])
     assert [m.ok for m in speed.measures] == [True, False]
 
 
 def test_finished_runs_are_not_run_again_and_make_the_page(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    task = dyna_benchmarks.wanted(ROWS[1], seeds=1, arms=["sac"])
+    task = dyna_benchmarks.wanted(BENCHMARKS["truck"], seeds=1, arms=["sac"])
     assert [t.arguments["arm"] for t in task] == ["sac"]
     ResultStore(tmp_path / "cache").put(task[0], Result(value("sac", 0, 42), 3.0))
     monkeypatch.setattr(type(task[0]), "run", None)  # nothing may be computed
     page = tmp_path / "docs" / "dream.md"
-    dyna_benchmarks.main(["1", "--arms", "sac", "--seeds", "1", "--out", str(tmp_path), "--page", str(page)])
+    dyna_benchmarks.main(
+        ["truck", "--arms", "sac", "--seeds", "1", "--out", str(tmp_path), "--page", str(page)]
+    )
     assert "> 60,000" in capsys.readouterr().out
     text = page.read_text()
-    assert "row-1: TruckPush: real steps to success" in text and "(./dream-1.png)" in text
-    assert "1 of the row's 30 runs have been made." in text
-    assert "Not made yet: row-2, TruckPush: trained in the dream alone; row-3" in text
-    assert (page.parent / "dream-1.png").stat().st_size > 5_000
+    assert "truck: TruckPush: real steps to success" in text and "(./dyna-truck.png)" in text
+    assert "1 of 30 runs have been made." in text
+    assert "Not made yet: truck-dream-only, TruckPush: trained in the dream alone; ball" in text
+    assert (page.parent / "dyna-truck.png").stat().st_size > 5_000
 
 
 def test_a_page_keeps_what_was_made_elsewhere_and_what_was_written_by_hand(tmp_path: Path) -> None:
     store, page = ResultStore(tmp_path / "cache"), tmp_path / "dream.md"
-    for number, result in ((2, {"successes": 97, "seconds": 1.0}), (1, value("sac", 0, 42))):
-        task = next(t for t in ROWS[number].tasks if t.arguments.get("arm", "sac") == "sac")
+    for name, result in (
+        ("truck-dream-only", {"successes": 97, "seconds": 1.0}),
+        ("truck", value("sac", 0, 42)),
+    ):
+        task = next(t for t in BENCHMARKS[name].tasks if t.arguments.get("arm", "sac") == "sac")
         store.put(task, Result(result, 3.0))
-    for number, folder in ((2, "a"), (1, "b")):
-        dyna_benchmarks.shown(number, store, tmp_path / folder, "again")
+    for name, folder in (("truck-dream-only", "a"), ("truck", "b")):
+        dyna_benchmarks.shown(name, store, tmp_path / folder, "again")
     dyna_benchmarks.page(tmp_path / "a", page)
     second = page.read_text().split("\n## ")[1]
     remark = "\nAll in one night.\n\n```text\nand day\n```\n\nReally.\n"
     page.write_text(page.read_text() + remark)
     dyna_benchmarks.page(tmp_path / "b", page)
-    head, row_1, row_2 = page.read_text().split("\n## ")
-    assert "Not made yet: row-3, BallGoal" in head and row_1.startswith("row-1: ")
-    assert row_2 == f"{second}{remark}"
+    head, first, other = page.read_text().split("\n## ")
+    assert "Not made yet: ball, BallGoal" in head and first.startswith("truck: ")
+    assert other == f"{second}{remark}"
     dyna_benchmarks.page(tmp_path / "a", page)
-    assert page.read_text().split("\n## ") == [head, row_1, row_2]
+    assert page.read_text().split("\n## ") == [head, first, other]
 
 
-def test_a_row_of_which_nothing_is_known_says_so(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="nothing is known of row 5"):
-        dyna_benchmarks.shown(5, ResultStore(tmp_path), tmp_path, "")
+def test_a_benchmark_of_which_nothing_is_known_says_so(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="nothing is known of truck-more-boxes"):
+        dyna_benchmarks.shown("truck-more-boxes", ResultStore(tmp_path), tmp_path, "")
 
 
 def test_every_task_can_be_asked_for() -> None:
-    for row in ROWS.values():
-        every = dyna_benchmarks.wanted(row, seeds=5, arms=list(ARMS))
-        assert every == list(row.tasks)
-        assert dyna_benchmarks.wanted(replace(row, tasks=()), seeds=5, arms=["sac"]) == []
+    for benchmark in BENCHMARKS.values():
+        every = dyna_benchmarks.wanted(benchmark, seeds=5, arms=list(ARMS))
+        assert every == list(benchmark.tasks)
+        assert dyna_benchmarks.wanted(replace(benchmark, tasks=()), seeds=5, arms=["sac"]) == []

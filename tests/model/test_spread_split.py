@@ -95,7 +95,7 @@ def test_the_report_tells_the_sides_apart(rough: WorldModel) -> None:
     split = rough.property_model("self", "w").spreads.by_mode[mode.id].split
     assert split is not None
     assert str(split) in rough.describe()
-    assert str(Split("x", 0.25, 0.002, 0.05)) == "± 0.002 where x <= 0.25, ± 0.05 otherwise"
+    assert str(Split("x", 0.25, 0.002, 0.05)) == "± 0.002 where x <= 0.25, ± 0.05 else"
 
 
 def test_a_file_knows_the_sides(rough: WorldModel, tmp_path_factory: pytest.TempPathFactory) -> None:

@@ -229,7 +229,7 @@ def test_sixteen_episodes_of_the_first_experiment() -> None:
 def test_the_first_experiment() -> None:
     model = train(list(ball_episodes(1, seed=0)))
     for target in evaluate(model, ball_episodes(1, seed=1000, test=True)).targets:
-        # Issue "Chapter III whole", row 1.
+        # As the benchmark ball-1 asks.
         assert target.total.rate <= 0.0005
 
 

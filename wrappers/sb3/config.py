@@ -38,8 +38,8 @@ class DynaConfig:
         the algorithm was made for.
     catch_up
         Gradient steps at once, in fresh dreams all the while, the first time that the model is accepted and the
-        algorithm's random steps are over, and again whenever a learned reward model has come to know of another reward or end
-        (`LearnedRewardModel.verdicts`); 0: none. A model of few objects is often exact long before real steps at
+        algorithm's random steps are over, and again whenever a learned reward model has come to know of another reward
+        or end (`LearnedRewardModel.verdicts`); 0: none. A model of few objects is often exact long before real steps at
         `updates` each have trained a policy: raising it trades computing for real steps. Should hold `updates` *
         `every`, a round of dreams, many times.
     permute
@@ -49,7 +49,7 @@ class DynaConfig:
         smallest and the largest value seen at the start of episodes. The model licenses that too; where nothing has a
         body, nothing is resampled.
     perturb_velocity
-        Share of the dreams in which moving bodies begin with velocities resampled, up to twice as fast as they were ever
+        Share of the dreams in which moving bodies begin with other velocities, up to twice as fast as they were ever
         seen. So dreams get where no real step has led yet: exploring starts (Sutton & Barto 2018, §5.3), which the
         world doesn't offer and a model does. Helps where a goal lies behind what only a fast body gets over.
     shuffle
@@ -59,9 +59,9 @@ class DynaConfig:
         The model is accepted when its prequential error falls to `accept_at`, until it rises to `reject_at`
         (`ModelAcceptance`).
     renew
-        A model that was accepted and is no more gets a replacement that learns the same steps from nothing, and takes its
-        place if it is accepted first (`ModelTrainer`); one that isn't accepted within so many real steps begins anew.
-        0: no replacements.
+        A model that was accepted and is no more gets a replacement that learns the same steps from nothing, and
+        takes its place if it is accepted first (`ModelTrainer`); one that isn't accepted within so many real steps
+        begins anew. 0: no replacements.
     window, least
         Latest real steps that the error is a mean of, and how many there must be.
     seed
@@ -104,8 +104,8 @@ class DynaConfig:
         fine = _number(self.accept_at) and _number(self.reject_at)
         if not fine or not 0.0 <= self.accept_at <= self.reject_at or not math.isfinite(self.reject_at):
             raise ConfigError(
-                f"accept_at={self.accept_at!r}, reject_at={self.reject_at!r}: expected 0 <= accept_at <= reject_at, so that "
-                "the acceptance doesn't flutter"
+                f"accept_at={self.accept_at!r}, reject_at={self.reject_at!r}: expected 0 <= accept_at <= reject_at, so "
+                "that a model isn't accepted and rejected in turns"
             )
 
 

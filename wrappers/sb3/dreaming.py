@@ -65,7 +65,7 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
     Parameters
     ----------
     trainer
-        Model, reward_model and stock. The stock must hold scenes (`explore`); the model is used live.
+        Model, reward model and stock. The stock must hold scenes (`explore`); the model is used live.
     like
         The env that the agent is to act in, in all its wrappers, a `TransitionRecorder` among them.
     num_envs
@@ -224,9 +224,9 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
         acceptance = self.trainer.acceptance
         if not acceptance.accepted:
             raise ConfigError(
-                f"the model isn't accepted: its error is {acceptance.error:.3g}, it is accepted at {acceptance.accept_at:g}, and it "
-                f"spoke of {acceptance.known:.0%} of the latest real steps: let it watch more of them (explore) before an "
-                "agent trains in its dreams"
+                f"the model isn't accepted: its error is {acceptance.error:.3g}, it is accepted at "
+                f"{acceptance.accept_at:g}, and it predicted {acceptance.known:.0%} of the latest real steps: let it "
+                "watch more of them (explore) before an agent trains in its dreams"
             )
         if (
             self.history and self.num_timesteps < self.history[-1][0]

@@ -69,7 +69,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     ``relgym/dreams_known``, ``relgym/renewals`` (how often a replacement took the model's place: `ModelTrainer`),
     ``relgym/learning_seconds`` and ``relgym/dreaming_seconds``.
 
-    The model that was passed stays that of the world it learned: where a replacement has taken its place, that is `world`.
+    The model that was passed stays that of the world it learned: where a replacement has taken its place,
+    that is `world`.
 
     Examples
     --------
@@ -206,9 +207,10 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         lacks = [f"{each.target}: {each}." for p in parts if hasattr(p, "advice") for each in p.advice()]
         warnings.warn(
             f"the model was never accepted in {self.num_timesteps:,} steps, and nothing was dreamed: its error was "
-            f"{acceptance.error:.2g}, to be accepted it must fall to {acceptance.accept_at:g}, and it spoke of {acceptance.known:.0%} of "
-            f"the latest steps. {' '.join(lacks) or 'Give it more steps.'} Features of the model are switched on in "
-            "its ModelConfig, those of reward and termination in that of reward_model=LearnedRewardModel(...)",
+            f"{acceptance.error:.2g}, to be accepted it must fall to {acceptance.accept_at:g}, and it predicted "
+            f"{acceptance.known:.0%} of the latest steps. {' '.join(lacks) or 'Give it more steps.'} Features of the "
+            "model are switched on in its ModelConfig, those of reward and termination in that of "
+            "reward_model=LearnedRewardModel(...)",
             UserWarning,
             stacklevel=2,
         )
@@ -235,8 +237,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     def _catch_up(self, accepted: bool) -> None:
         """Train at once as much as many real steps would have brought: when the model is first accepted.
 
-        And again when the reward model has learned of something else that is paid for or ends episodes: what was dreamed
-        before didn't know of it, nor does the policy that was trained in it.
+        And again when the reward model has learned of something else that is paid for or ends episodes: what was
+        dreamed before didn't know of it, nor does the policy that was trained in it.
         """
         if not accepted or self.num_timesteps <= self.model.learning_starts or not self.buffer.size():
             return
@@ -253,7 +255,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
             self._aim()
 
     def _aim(self) -> None:
-        """Let DQN's target net follow: Stable-Baselines3 does so per real step, of which a round of catch-up updates has none."""
+        """Let DQN's target net follow: Stable-Baselines3 does so per real step, and catch-up updates have none."""
         if isinstance(self.model, DQN):
             own, target = self.model.q_net, self.model.q_net_target
             polyak_update(own.parameters(), target.parameters(), self.model.tau)
@@ -333,8 +335,8 @@ def reward_model_of(
     task = recorder.get_wrapper_attr("task") if recorder.has_wrapper_attr("task") else None
     if task is None:
         raise ConfigError(
-            "nothing says what a dream is worth: pass reward_model='learned', or reward_model= an object with evaluate(layout, before, "
-            "actions, after), or give the env a task"
+            "nothing says what a dream is worth: pass reward_model='learned', or reward_model= an object with "
+            "evaluate(layout, before, actions, after), or give the env a task"
         )
     return checked_reward_model(task, model, recorder.view.schema)
 

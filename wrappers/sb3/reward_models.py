@@ -82,8 +82,8 @@ class LearnedRewardModel(RewardFunctions):
     config
         Free parameters of the model; laws of motion have nothing to say here.
     acting
-        Puts actions into scenes; default: as the env does in which `Dyna` or `explore` let it predict rewards, else by the
-        schema's affine maps.
+        Puts actions into scenes; default: as the env does in which `Dyna` or `explore` let it predict rewards, else by
+        the schema's affine maps.
 
     Attributes
     ----------
@@ -94,14 +94,14 @@ class LearnedRewardModel(RewardFunctions):
     -----
     What depends on one among several objects of a type can't be learned so.
 
-    It evaluates as an env's task does: dreams may be evaluated by it (`LearnedModelEnv`, argument ``task``). Where nothing is
-    known, rewards are NaN.
+    It evaluates steps as an env's task does, so `LearnedModelEnv` takes it as its ``task``. Where nothing is known,
+    rewards are NaN.
 
     The reward may depend on whether the step ends the episode, as a bonus for success does: it is learned given that.
 
-    Policies seek out what a reward model is wrong about. Where the bonus is a mode of its own, its clauses' thresholds and
-    those of termination differ by a hair: in between, it would be paid without an end, again and again. So where the
-    two modes never were right of one and the same real step, the reward model doesn't know.
+    Policies seek out what a reward model is wrong about. Where the bonus is a mode of its own, its clauses'
+    thresholds and those of termination differ by a hair: in between, it would be paid without an end, again and again.
+    So where the two modes never were right of one and the same real step, the reward model doesn't know.
     """
 
     learned: Final = True

@@ -35,9 +35,9 @@ __all__ = ["ModelTrainer", "check_model", "checked_reward_model"]
 class ModelTrainer:
     """Predicts, is evaluated, learns; test, then train (Dawid 1984).
 
-    A model that was accepted and is no more may be one of a world that has changed: what it learned before counts on,
-    and nothing in a scene tells what holds when. So a replacement begins to learn the same steps from nothing, and whichever
-    is accepted first goes on (Gama et al. 2004 begin anew from such a point on).
+    A model that was accepted and is no more may be one of a world that has changed: what it learned before counts
+    on, and nothing in a scene tells what holds when. So a replacement begins to learn the same steps from nothing, and
+    whichever is accepted first goes on (Gama et al. 2004 begin anew from such a point on).
 
     Parameters
     ----------
@@ -45,15 +45,15 @@ class ModelTrainer:
         The model; one that is frozen (``model.frozen``) is evaluated all the same, but doesn't learn, nor does it get a
         replacement. Replacements need a method ``untaught`` of the model's, as `WorldModel.untaught`.
     reward_model
-        Reward and termination; one that learns (`LearnedRewardModel`) learns from every step as it comes. ``"learned"``: as
-        for `Dyna`.
+        Reward and termination; one that learns (`LearnedRewardModel`) learns from every step as it comes.
+        ``"learned"``: as for `Dyna`.
     config
         Free parameters.
 
     Raises
     ------
     ConfigError
-        The reward model can't say what steps are worth; or when a step is taken up, a given reward model's reward is NaN or infinite.
+        `reward_model` isn't one; or when a step is taken up, the reward of one that doesn't learn is NaN or infinite.
 
     Attributes
     ----------
@@ -230,8 +230,8 @@ def checked_reward_model(
         return LearnedRewardModel(schema, moving, acting=acting)
     if not callable(getattr(reward_model, "evaluate", None)):
         raise ConfigError(
-            f"reward_model={reward_model!r}: expected 'learned', or an object with evaluate(layout, before, actions, after) for arrays "
-            "of steps, as a relgym.envs.tasks.Task has"
+            f"reward_model={reward_model!r}: expected 'learned', or an object with "
+            "evaluate(layout, before, actions, after) for arrays of steps, as a relgym.envs.tasks.Task has"
         )
     if isinstance(reward_model, (LearnedRewardModel, NeuralRewardModel)) and acting is not None:
         reward_model.adopt(acting)

@@ -187,7 +187,7 @@ def rates_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown:
     def draw(path: Path) -> None:
         figure, panels = canvas(5.5 * len(targets), 4.0, 1, len(targets))
         for panel, (target, learners) in zip(panels[0], found.items(), strict=True):
-            _bars(panel, learners)
+            _rates_drawn(panel, learners)
             panel.set(title=f"{_axis(target)} velocity", xlabel="training episodes", ylabel="wrong, %")
         panels[0][-1].legend(fontsize=7)
         save(figure, path)
@@ -203,7 +203,7 @@ def _split(score: _Score) -> list[Cell]:
     ]
 
 
-def _bars(panel: Any, learners: Mapping[str, Mapping[int, _Score]]) -> None:
+def _rates_drawn(panel: Any, learners: Mapping[str, Mapping[int, _Score]]) -> None:
     width = 0.8 / len(learners)
     numbers = list(next(iter(learners.values())))
     for k, (learner, scores) in enumerate(learners.items()):

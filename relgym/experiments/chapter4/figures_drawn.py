@@ -125,7 +125,7 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
         for mode in learned["modes"]
     }
     for mode in learned["modes"]:
-        said = " | ".join(dict.fromkeys(clauses[mode["mode"]])) or "otherwise"
+        said = " | ".join(dict.fromkeys(clauses[mode["mode"]])) or "else"
         lines.append(["learned", f"{mode['mode']}, {mode['examples']} examples", said, mode["function"]])
 
     def draw(path: Path) -> None:
@@ -135,7 +135,7 @@ def ball_modes_shown(_: Protocol, values: Values) -> Shown:
         )  # the ball begins above an object
         _picture(panels[0][0], episode, 0, "path, coloured by time", path=True)
         panels[0][1].set_axis_off()
-        said = (" | ".join(clauses[m["mode"]])[:80] or "otherwise" for m in learned["modes"])
+        said = (" | ".join(clauses[m["mode"]])[:80] or "else" for m in learned["modes"])
         text = "\n\n".join(
             f"{m['function']}\n    if {clause}" for m, clause in zip(learned["modes"], said, strict=True)
         )

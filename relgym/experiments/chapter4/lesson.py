@@ -186,7 +186,7 @@ def _trees(model: WorldModel) -> list[dict[str, Any]]:
         functions = {mode.id: mode.formula(3) for mode in part.modes}
         for pair in part.classifier.classifiers:
             other = pair.i if pair.positive == pair.j else pair.j
-            stages = [*map(str, pair.definition.clauses), "otherwise"]
+            stages = [*map(str, pair.definition.clauses), "else"]
             for stage, tree in zip(stages, (*pair.clause_trees, pair.fall_through_tree), strict=True):
                 if tree is not None:
                     about = {"target": target, "mode": pair.positive, "other": other, "stage": stage}

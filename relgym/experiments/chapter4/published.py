@@ -168,7 +168,8 @@ REMARKS: Final[Mapping[str, str]] = {
     "figure-4.3": "95 % of all errors below 1e-12 from 16 episodes on",
     "figure-4.4": "bounces and ramp with high errors for many episodes, low ones after 80",
     "figure-4.5": "the same; the third quartile of floor bounces never improves",
-    "figure-4.6": "y: 2 % after 80 episodes by the text (1.1 % by Table 4.8), mostly misclassified; x 0.5 % by Table 4.7",
+    "figure-4.6": "y: 2 % after 80 episodes by the text (1.1 % by Table 4.8), mostly misclassified; x 0.5 % by "
+    "Table 4.7",
     "figure-4.7": "essentially zero after 32 episodes if the right mode is always chosen",
     "figure-4.12": "as in experiment 1, most modes are learned very quickly",
     "figure-4.13": "the halt's errors stay high throughout",
@@ -178,8 +179,8 @@ REMARKS: Final[Mapping[str, str]] = {
     "figure-4.17": "slightly higher than in experiment 2",
     "figure-4.18": "expecting too little, modes are lost once the noise exceeds it (none learned at 1e-5); expecting "
     "1e-5, they are overgeneral",
-    "figure-4.19": "median above our 95th percentile until 128 episodes, then a drop; the third quartile never below the "
-    "change",
+    "figure-4.19": "median above our 95th percentile until 128 episodes, then a drop; the third quartile never below "
+    "the change",
     "figure-4.20": "uncentred: all three worse than in Figure 4.19",
     "figure-4.22": "26 of 80 trials with a significant error",
     "figure-4.23": "26 of 80 trials with a significant error",

@@ -124,7 +124,7 @@ _ROLES: Final = (
 
 def roles_shown(_: Protocol, values: Values) -> Shown:
     """Figure 3.8; its boxes as rows."""
-    rows: list[list[Cell]] = [["learner", "mode", "role", "who plays it"]]
+    rows: list[list[Cell]] = [["learner", "mode", "role", "bound to"]]
     rows += [[PRINTED, *row] for row in _ROLES]
     for learner, runs in values.items():
         target = next(t for t in runs[0]["report"]["targets"] if t["target"] == "truck.vx")

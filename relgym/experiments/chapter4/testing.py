@@ -44,7 +44,7 @@ def _joined(parts: Sequence[tuple[NDArray[Any], ...]]) -> tuple[Any, ...]:
 def _columns(
     model: WorldModel, part: Sequence[Episode], laws: AnalyticModes
 ) -> dict[str, tuple[NDArray[Any], ...]]:
-    """Per target: truth, counted, residual, abstained, best residual of a learned mode (NaN if there are laws), change."""
+    """Per target: truth, counted, residual, abstained, best residual of a mode (NaN if there are laws), change."""
     layout = part[0].layout
     before = np.concatenate([b.vectors[:-1] for b in part])
     after = np.concatenate([b.vectors[1:] for b in part])

@@ -258,7 +258,7 @@ def test_dyna_learns_the_task_beside_the_world() -> None:
 
 @pytest.mark.sb3
 def test_actions_come_into_scenes_as_the_env_has_them() -> None:
-    """Three choices are a number and three indicators in its scenes: a reward model of one's own learns that from the env."""
+    """Three choices are a number and three indicators in its scenes: a reward model learns that from the env."""
     from relgym.wrappers.sb3.dreaming import explore
 
     class Paying(gym.Env[Any, Any]):
