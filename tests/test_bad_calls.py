@@ -11,7 +11,7 @@ import inspect
 import json
 import os
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -275,6 +275,15 @@ def outcome(name: str, parameter: str, value: Any) -> str:
 
 def written(model: WorldModel) -> str:
     return json.dumps(model.to_json(history=True), sort_keys=True)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What is saved under odd names isn't saved here."""
+    before = Path.cwd()
+    os.chdir(tmp_path_factory.mktemp("bad-calls"))
+    yield
+    os.chdir(before)
 
 
 @st.composite

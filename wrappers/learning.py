@@ -42,6 +42,7 @@ class Learning:
         """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``."""
         return self._observer.study.model
 
+    @refusing(ObservationError)
     def predict(
         self, observation: Any, action: Any, info: Mapping[str, Any] | None = None
     ) -> ScenePrediction:

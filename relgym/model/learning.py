@@ -44,8 +44,13 @@ class LearnReport:
         return any(part.changed for part in self.parts.values())
 
 
-def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport:
-    """Take up one transition, whose first scene has been perceived and whose numbers are finite."""
+def learn(
+    parts: Parts, percept: Percept, transition: Transition, only: frozenset[int] | None = None
+) -> LearnReport:
+    """Take up one transition, whose first scene has been perceived and whose numbers are finite.
+
+    With `only`, of the objects with these indices; all others are there to be seen.
+    """
     before, after = transition.before, transition.after
     if parts.open:
         parts.discover_targets(before, after)
@@ -56,7 +61,7 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
-            if stays(before, after, index):
+            if (only is None or index in only) and stays(before, after, index):
                 _learn_object(parts, percept, index, following, reports, turn)
     for type_name, table in parts.tables.items():
         if parts.open and table.seen in CHECK_AT:
@@ -66,6 +71,9 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
         revise(parts, parts.looks.pop(0))
     if parts.laws is not None:
         there = {i: stays(before, after, i) for i in range(len(before))}
+        if only is not None:  # of all that moves
+            moving = {t.type for t in parts.targets}
+            there |= {i: False for i, t in enumerate(before.layout.types) if t.name in moving and i not in only}
         parts.laws.learn_one(percept, following, there, parts.models)
     return LearnReport(reports, _refresh(parts))
 

@@ -19,6 +19,14 @@ from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
 from relgym.model.hindsight import hindsight_to_json, look_back, restore_hindsight
 from relgym.model.learning import LearnReport, finish, learn
+from relgym.model.locality import (
+    Neighbourhoods,
+    foci,
+    large,
+    learn_locally,
+    predict_locally,
+    predict_many_locally,
+)
 from relgym.model.merging import merge
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
@@ -81,9 +89,10 @@ class WorldModel:
         self.frozen = False
         self.extra: dict[str, Any] = {}
         self._percept: tuple[Scene, Percept] | None = None
+        self._neighbourhoods: tuple[Scene, Neighbourhoods] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_percept": None}
+        return self.__dict__ | {"_percept": None, "_neighbourhoods": None}
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{t}: {len(self._parts.models[t].modes)} modes" for t in self.targets)
@@ -160,7 +169,10 @@ class WorldModel:
         following = next_values(before, transition.after)
         if not self._parts.screen.admits(before.layout, before.vector, following):
             return LearnReport({}, 0, set_aside=True)
-        report = learn(self._parts, self._perceive(before), transition)
+        if large(before.layout):
+            report = learn_locally(self._parts, self._near(before), transition, self.seen)
+        else:
+            report = learn(self._parts, self._perceive(before), transition)
         self.seen += 1
         return report
 
@@ -221,7 +233,7 @@ class WorldModel:
         merge(whole, other._parts, follow_laws=other.seen > self.seen)
         self._parts = whole
         self.seen += other.seen
-        self._percept = None
+        self._percept = self._neighbourhoods = None
         self.finish()
 
     def untaught(self) -> WorldModel:
@@ -268,7 +280,15 @@ class WorldModel:
         """
         self._parts.check(scene)
         with self._calm(scene.vector):
+            if large(scene.layout):
+                return predict_locally(self._parts, self._near(scene), scene)
             return predict(self._parts, self._perceive(scene), scene)
+
+    def _near(self, scene: Scene) -> Neighbourhoods:
+        """A large scene, taken apart; the last one is remembered."""
+        if self._neighbourhoods is None or self._neighbourhoods[0] is not scene:
+            self._neighbourhoods = (scene, Neighbourhoods(self._parts, scene))
+        return self._neighbourhoods[1]
 
     def _calm(self, vectors: NDArray[np.float64]) -> AbstractContextManager[None]:
         """Where numbers are so large that what is worked out from them may overflow, that needs no warning."""
@@ -288,6 +308,9 @@ class WorldModel:
         """
         vectors = self._parts.checked_batch(layout, vectors)
         with self._calm(vectors):
+            if large(layout):
+                near = [Neighbourhoods(self._parts, Scene(self.schema, layout, v.copy())) for v in vectors]
+                return predict_many_locally(self._parts, near, layout, vectors)
             percept = self._parts.perception.percept(layout, vectors)
             return predict_many(self._parts, percept, layout, vectors)
 
@@ -348,6 +371,9 @@ class WorldModel:
         index = whole("index", index, 0, len(scene), QueryError)
         digits = whole("digits", digits, 1, 18, ConfigError)
         laws = self._parts.laws
+        if large(scene.layout):
+            small = self._near(scene).named(index)
+            scene, index = small, small.layout.index(scene.layout.names[index])
         return () if laws is None else laws.lines(self._perceive(scene), index, digits)
 
     def advice(self) -> tuple[Advice, ...]:
@@ -363,6 +389,9 @@ class WorldModel:
         from relgym.model.explain import explain
 
         with self._calm(scene.vector):
+            if large(scene.layout):
+                near = self._near(scene)
+                return "\n\n".join(explain(self, near.named(k)) for k in foci(self._parts, scene.layout))
             return explain(self, scene)
 
     @refusing(ObservationError)
