@@ -98,10 +98,11 @@ def chosen_view(
     elif isinstance(given, Mapping):
         view = view_from_json(given)
     else:
-        makes = callable(given) and getattr(given, "__module__", "") != "builtins"
-        if makes:
-            checked_function("view", given, "observation_space", "action_space")
-        view = given(observation_space, action_space) if makes else given
+        view = given
+        if callable(given) and getattr(given, "__module__", "") != "builtins":
+            view = checked_function("view", given, "observation_space", "action_space")(
+                observation_space, action_space
+            )
     if not isinstance(view, View):
         raise ConfigError(
             f"view={given!r}: expected a view (NumbersView, TableView, FunctionView, ...), or a function of "

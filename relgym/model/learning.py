@@ -70,12 +70,19 @@ def learn(
     if parts.looks and turn.take():
         revise(parts, parts.looks.pop(0))
     if parts.laws is not None:
-        there = {i: stays(before, after, i) for i in range(len(before))}
-        if only is not None:  # of all that moves
-            moving = {t.type for t in parts.targets}
-            there |= {i: False for i, t in enumerate(before.layout.types) if t.name in moving and i not in only}
-        parts.laws.learn_one(percept, following, there, parts.models)
+        parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models)
     return LearnReport(reports, _refresh(parts))
+
+
+def _there(parts: Parts, transition: Transition, only: frozenset[int] | None) -> dict[int, bool]:
+    """Whether each object stays; of those that move, only some may teach."""
+    before, after = transition.before, transition.after
+    there = {i: stays(before, after, i) for i in range(len(before))}
+    if only is not None:
+        moving = {t.type for t in parts.targets}
+        others = (i for i, t in enumerate(before.layout.types) if t.name in moving and i not in only)
+        there |= dict.fromkeys(others, False)
+    return there
 
 
 def finish(parts: Parts) -> int:

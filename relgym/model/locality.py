@@ -1,9 +1,9 @@
-"""Scenes of very many bodies are looked at locally: around each object that is learned of, with the bodies nearest to it.
+"""Scenes of very many bodies are looked at locally: each object that is learned of, with the bodies nearest to it.
 
-Relations are told of pairs, and a thousand bodies are half a million of them. What a body does depends on what is near,
-so a scene of more than `MOST` bodies is taken apart: for each object whose properties are targets there is a small scene
-of it and its nearest neighbours, some of each type, and that is what is learned from and predicted. All small scenes
-have the same layout, whoever the neighbours are.
+Relations are told of pairs, and a thousand bodies are half a million of them. What a body does depends on what is
+near, so a scene of more than `MOST` bodies is taken apart: for each object whose properties are targets there is a
+small scene of it and its nearest neighbours, some of each type, and that is what is learned from and predicted. All
+small scenes have the same layout, whoever the neighbours are.
 """
 
 from __future__ import annotations
@@ -23,7 +23,15 @@ from relgym.model.scenes import next_values, stays, wrap
 from relgym.scene.axes import Axes
 from relgym.scene.objects import ACTION, Scene, SceneLayout, Transition, pose_columns
 
-__all__ = ["MOST", "Neighbourhoods", "foci", "large", "learn_locally", "predict_locally", "predict_many_locally"]
+__all__ = [
+    "MOST",
+    "Neighbourhoods",
+    "foci",
+    "large",
+    "learn_locally",
+    "predict_locally",
+    "predict_many_locally",
+]
 
 MOST = 96
 """Scenes of no more bodies than this are looked at as a whole."""
@@ -52,7 +60,9 @@ class _Plan:
     poses: NDArray[np.intp]  # columns of the bodies' poses, of a vector with (0, 1) appended
     used: tuple[int, ...]
     bodies: NDArray[np.intp]  # indices of the objects that have bodies
-    groups: dict[str, tuple[NDArray[np.intp], int]]  # numbers of each type's bodies, and how many are looked at
+    groups: dict[
+        str, tuple[NDArray[np.intp], int]
+    ]  # numbers of each type's bodies, and how many are looked at
     bodiless: dict[str, list[int]]
 
     @classmethod
@@ -80,7 +90,9 @@ class _Plan:
                 bodiless.setdefault(t.name, []).append(k)
         # The first objects of each type lend their names.
         names = [layout.names[k] for each in bodiless.values() for k in each]
-        names += [layout.names[layout.bodies[n]] for members, count in groups.values() for n in members[:count]]
+        names += [
+            layout.names[layout.bodies[n]] for members, count in groups.values() for n in members[:count]
+        ]
         axes = Axes.of(scene.schema)
         bodies = np.array(layout.bodies, dtype=np.intp)
         return cls(scene.schema.layout(names), pose_columns(layout)[0], axes.used, bodies, groups, bodiless)
@@ -258,5 +270,7 @@ def _told(batch: BatchPrediction) -> tuple[Prediction, ...]:
     for k, (name, prop) in enumerate(batch.parts):
         value = float(batch.vectors[0, layout.column(layout.index(name), prop)])
         outcome, mode = OUTCOMES[int(batch.outcomes[0, k])], int(batch.modes[0, k])
-        found.append(Prediction(name, prop, value, outcome, mode, (), float(batch.margins[0, k]), batch.frames[k]))
+        found.append(
+            Prediction(name, prop, value, outcome, mode, (), float(batch.margins[0, k]), batch.frames[k])
+        )
     return tuple(found)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
 from relgym.model.hindsight import hindsight_to_json, look_back, restore_hindsight
+from relgym.model.journal import Journal
 from relgym.model.learning import LearnReport, finish, learn
 from relgym.model.locality import (
     Neighbourhoods,
@@ -84,15 +85,48 @@ class WorldModel:
     ) -> None:
         if config is not None and not isinstance(config, ModelConfig):
             raise ConfigError(f"config={config!r}: expected a ModelConfig")
-        self._parts = Parts(schema, config or ModelConfig(), schema.targets if targets is None else targets)
+        self._state = Parts(schema, config or ModelConfig(), schema.targets if targets is None else targets)
         self.seen = 0
         self.frozen = False
         self.extra: dict[str, Any] = {}
         self._percept: tuple[Scene, Percept] | None = None
         self._neighbourhoods: tuple[Scene, Neighbourhoods] | None = None
+        self._journal = Journal()
+        self._damaged = False
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_percept": None, "_neighbourhoods": None}
+        if self._damaged:
+            self._roll_back()
+        return self.__dict__ | {"_percept": None, "_neighbourhoods": None, "_journal": Journal()}
+
+    @property
+    def _parts(self) -> Parts:
+        if self._damaged:  # a rollback was interrupted, too
+            self._roll_back()
+        return self._state
+
+    @contextmanager
+    def _step(self, name: str, *arguments: Any, numbers: int = 0) -> Iterator[None]:
+        """Make a step that is either made as a whole or not at all, whatever error comes in between."""
+        if self._damaged:
+            self._roll_back()
+        mark = self._journal.prepare(self)
+        try:
+            yield
+            self._journal.add(name, arguments, numbers)
+        except BaseException:
+            self._damaged = True
+            self._journal.drop(mark)
+            self._roll_back()
+            raise
+
+    def _roll_back(self) -> None:
+        """Be what it was after the last step that was made as a whole."""
+        whole: WorldModel = self._journal.replayed(lambda model, name, given: getattr(model, name)(*given))
+        # All at once, as far as interrupts go.
+        self.__dict__.update(
+            _state=whole._state, seen=whole.seen, _percept=None, _neighbourhoods=None, _damaged=False
+        )
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{t}: {len(self._parts.models[t].modes)} modes" for t in self.targets)
@@ -153,6 +187,9 @@ class WorldModel:
 
         Notes
         -----
+        Whatever else is raised, an interrupt from the keyboard included, the model is as it was before
+        (`relgym.model.journal`).
+
         A transition in which a number is far larger than all that is known of its property is set aside, and counted in
         `set_aside`, not in `seen` (`relgym.model.screening`).
 
@@ -165,6 +202,10 @@ class WorldModel:
                 "this model was loaded without its history and can only predict; "
                 "save it with save(path, history=True) to go on learning"
             )
+        with self._step("_learn", transition, numbers=2 * len(transition.before.vector)):
+            return self._learn(transition)
+
+    def _learn(self, transition: Transition) -> LearnReport:
         before = transition.before
         following = next_values(before, transition.after)
         if not self._parts.screen.admits(before.layout, before.vector, following):
@@ -203,6 +244,12 @@ class WorldModel:
         precision
             Relative precision of what was observed (`View.precision`); of numbers below 1 it is absolute.
         """
+        with self._step("_look_back", prediction, dict(residuals), precision):
+            self._look_back(prediction, residuals, precision)
+
+    def _look_back(
+        self, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
+    ) -> None:
         scene = prediction.scene
         said = {(part.object, part.property): part.value for part in prediction.parts}
         observed = scene.replace({key: said[key] + off for key, off in residuals.items() if key in said})
@@ -231,10 +278,9 @@ class WorldModel:
             )
         whole = copy.deepcopy(self._parts)  # what fails half way leaves this model as it was
         merge(whole, other._parts, follow_laws=other.seen > self.seen)
-        self._parts = whole
-        self.seen += other.seen
-        self._percept = self._neighbourhoods = None
-        self.finish()
+        seen = self.seen + other.seen
+        finish(whole)
+        self.__dict__.update(_state=whole, seen=seen, _percept=None, _neighbourhoods=None, _journal=Journal())
 
     def untaught(self) -> WorldModel:
         """A model of the same schema, configuration and named targets that has learned nothing."""
@@ -246,7 +292,13 @@ class WorldModel:
 
         A model without its history has nothing to learn from and stays as it is.
         """
-        return 0 if self.frozen else finish(self._parts)
+        if self.frozen:
+            return 0
+        with self._step("_finish"):
+            return self._finish()
+
+    def _finish(self) -> int:
+        return finish(self._parts)
 
     @property
     def laws(self) -> LawBook | None:
@@ -460,7 +512,7 @@ class WorldModel:
         try:
             parts = parts_from_json(body, arrays)
             model = cls(parts.schema, parts.config, targets=())
-            model._parts, model.seen, model.frozen = parts, int(body["seen"]), arrays is None
+            model._state, model.seen, model.frozen = parts, int(body["seen"]), arrays is None
             model.extra = dict(body["extra"])
             restore_hindsight(parts, body.get("hindsight", {}))
             return model, model.extra

@@ -18,7 +18,9 @@ from relgym.scene.shapes import Box
 
 
 def room(objects: int, *, seed: int, steps: int = 100) -> Room:
-    return rooms(1, objects=objects, elasticity=0.9, friction=0.0, rng=np.random.default_rng(seed), steps=steps)[0]
+    return rooms(
+        1, objects=objects, elasticity=0.9, friction=0.0, rng=np.random.default_rng(seed), steps=steps
+    )[0]
 
 
 def taught(model: WorldModel, *lessons: Room) -> WorldModel:
@@ -57,7 +59,10 @@ def test_what_is_learned_locally_is_what_is_learned_of_the_whole(monkeypatch: py
         said, true = local.predict_one(transition.before), transition.after
         off.append(abs(said.scene["ball"]["vy"] - true["ball"]["vy"]) > 1e-6)
         monkeypatch.setattr(locality, "MOST", 100)
-        assert not off[-1] or abs(whole.predict_one(transition.before).scene["ball"]["vy"] - true["ball"]["vy"]) > 1e-6
+        assert (
+            not off[-1]
+            or abs(whole.predict_one(transition.before).scene["ball"]["vy"] - true["ball"]["vy"]) > 1e-6
+        )
         monkeypatch.setattr(locality, "MOST", 10)
     assert np.mean(off) < 0.05
     scene = Scene(lessons[0].schema, lessons[0].layout, lessons[0].vectors[30].copy())
@@ -83,11 +88,15 @@ def test_a_model_of_small_rooms_predicts_a_room_of_a_thousand_bodies() -> None:
 
 def test_many_moving_bodies_are_predicted_in_one_batch_and_some_are_learned_of() -> None:
     cart = ObjectType("cart", ("px", "py", "vx", "sx", "sy"), Box(), velocity=("vx", None, None))
-    schema = SceneSchema((cart,), tuple((f"c{k}", "cart") for k in range(120)), targets=(Target("cart", "vx"),))
+    schema = SceneSchema(
+        (cart,), tuple((f"c{k}", "cart") for k in range(120)), targets=(Target("cart", "vx"),)
+    )
     rng, layout = np.random.default_rng(0), schema.layout()
     model = WorldModel(schema)
     for _ in range(12):
-        now = np.stack([3.0 * np.arange(120), np.zeros(120), rng.normal(size=120), np.ones(120), np.ones(120)], axis=1)
+        now = np.stack(
+            [3.0 * np.arange(120), np.zeros(120), rng.normal(size=120), np.ones(120), np.ones(120)], axis=1
+        )
         then = now * (1.0, 1.0, 0.5, 1.0, 1.0)
         report = model.learn_one(
             Transition(Scene(schema, layout, now.ravel()), Scene(schema, layout, then.ravel()))
