@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.errors import ConfigError
 from relgym.model.learning import LearnReport, learn
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
@@ -26,6 +27,7 @@ from relgym.scene.objects import ACTION, Scene, SceneLayout, Transition, pose_co
 __all__ = [
     "MOST",
     "Neighbourhoods",
+    "check_size",
     "foci",
     "large",
     "learn_locally",
@@ -39,6 +41,9 @@ MOST = 96
 NEAREST = 40
 """About so many bodies, at least one of each type, make a small scene."""
 
+MOST_MOVERS = 10_000
+"""In a scene of more types than fit into a small one: most objects that are learned of, times bodies."""
+
 LEARNED = 8
 """Of a transition at most so many objects that changed are learned from."""
 
@@ -48,8 +53,33 @@ roles and spreads aren't told."""
 
 
 def large(layout: SceneLayout) -> bool:
-    """Whether scenes of a layout are taken apart."""
-    return len(layout.bodies) > MOST
+    """Whether scenes of a layout are taken apart; not where there are so many types that it would gain nothing."""
+    if len(layout.bodies) <= MOST:
+        return False
+    kinds: int | None = layout.__dict__.get("_kinds")
+    if kinds is None:
+        kinds = layout.__dict__["_kinds"] = len({layout.types[k].name for k in layout.bodies})
+    return kinds <= NEAREST
+
+
+def check_size(parts: Parts, layout: SceneLayout) -> None:
+    """Raise `ConfigError` where a step would take long: many kinds of bodies, of which many are learned of."""
+    bodies = len(layout.bodies)
+    if bodies <= MOST or large(layout):
+        return
+    able = {
+        t.name
+        for t in layout.types
+        if t.name != ACTION and set(t.properties) - set(t.exogenous) and t.velocity
+    }
+    learned = able if parts.open else {t.type for t in parts.targets}
+    movers = sum(t.name in learned for t in layout.types)
+    if movers * bodies > MOST_MOVERS:
+        raise ConfigError(
+            f"the scene has {bodies} bodies of more than {NEAREST} types, and {movers} of them are to be learned of: "
+            f"at most {MOST_MOVERS // bodies} of so many; name the targets that matter (targets=['type.property', ...]), "
+            "or give bodies that behave alike one type"
+        )
 
 
 @dataclass(frozen=True, slots=True)

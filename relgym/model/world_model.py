@@ -22,6 +22,7 @@ from relgym.model.journal import Journal
 from relgym.model.learning import LearnReport, finish, learn
 from relgym.model.locality import (
     Neighbourhoods,
+    check_size,
     foci,
     large,
     learn_locally,
@@ -202,6 +203,7 @@ class WorldModel:
                 "this model was loaded without its history and can only predict; "
                 "save it with save(path, history=True) to go on learning"
             )
+        check_size(self._parts, transition.before.layout)
         with self._step("_learn", transition, numbers=2 * len(transition.before.vector)):
             return self._learn(transition)
 
@@ -331,6 +333,7 @@ class WorldModel:
             NaN or infinity somewhere, or another schema.
         """
         self._parts.check(scene)
+        check_size(self._parts, scene.layout)
         with self._calm(scene.vector):
             if large(scene.layout):
                 return predict_locally(self._parts, self._near(scene), scene)
@@ -359,6 +362,7 @@ class WorldModel:
             State vectors, shape ``(n, layout.width)``.
         """
         vectors = self._parts.checked_batch(layout, vectors)
+        check_size(self._parts, layout)
         with self._calm(vectors):
             if large(layout):
                 near = [Neighbourhoods(self._parts, Scene(self.schema, layout, v.copy())) for v in vectors]

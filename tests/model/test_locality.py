@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
+from relgym.errors import ConfigError
 from relgym.experiments.rooms import Room, rooms
 from relgym.model import locality
 from relgym.model.locality import Neighbourhoods
@@ -108,3 +109,33 @@ def test_many_moving_bodies_are_predicted_in_one_batch_and_some_are_learned_of()
     still = Scene(schema, layout, now.ravel())
     first, second = (model.learn_one(Transition(still, still)).parts.keys() for _ in range(2))
     assert first != second  # one that rests in its turn
+
+
+def test_many_kinds_of_which_all_are_learned_of_are_refused_before_anything_is_spent() -> None:
+    kinds = tuple(
+        ObjectType(f"t{k}", ("px", "py", "vx", "sx", "sy"), Box(), velocity=("vx", None, None))
+        for k in range(200)
+    )
+    schema = SceneSchema(kinds, tuple((f"o{k}", f"t{k}") for k in range(200)))
+    values = np.stack([3.0 * np.arange(200), *np.zeros((2, 200)), *np.ones((2, 200))], axis=1)
+    scene = Scene(schema, schema.layout(), values.ravel())
+    model = WorldModel(schema)
+    with pytest.raises(ConfigError, match=r"200 bodies of more than 40 types, and 200 of them .* at most 50"):
+        model.learn_one(Transition(scene, scene))
+    some = WorldModel(schema, targets=(Target("t7", "vx"),))
+    some.learn_one(Transition(scene, scene))
+    assert some.predict_one(scene).scene == scene
+
+
+def test_more_properties_than_one_model_learns_are_refused() -> None:
+    wide = ObjectType("wide", tuple(f"p{k}" for k in range(400)))
+    schema = SceneSchema((wide,), (("w", "wide"),))
+    model = WorldModel(schema)
+    with pytest.raises(ConfigError, match="400 properties change, and one model learns at most 256"):
+        model.learn_one(Transition(schema.scene({"w": np.zeros(400)}), schema.scene({"w": np.ones(400)})))
+    assert (model.seen, model.targets) == (0, ())
+    with pytest.raises(ConfigError, match="at most 256"):
+        WorldModel(schema, targets=[Target("wide", f"p{k}") for k in range(257)])
+    named = WorldModel(schema, targets=[Target("wide", "p3")])
+    named.learn_one(Transition(schema.scene({"w": np.zeros(400)}), schema.scene({"w": np.ones(400)})))
+    assert named.seen == 1
