@@ -12,10 +12,11 @@ VIZ := $(VENV)/.installed-viz
 DEV := $(VENV)/.installed-dev
 SB3 := $(VENV)/.installed-sb3
 DYNA := $(VENV)/.installed-dyna
+DOCS := $(VENV)/.installed-docs
 
 .DEFAULT_GOAL := help
 .PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow slow-sb3 bench soak outliers coverage lint format types check
-.PHONY: wheel clean example-highway example-ocatari
+.PHONY: wheel docs docs-serve pages animations clean example-highway example-ocatari
 
 help:            ## show this list
 	@sed -n 's/^\([a-z0-9-]*\):[^#]*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 17
@@ -73,7 +74,7 @@ lint: $(DEV)     ## ruff: rules and format
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
-format: $(DEV)   ## let ruff mend what it can
+format: $(DEV)   ## let ruff fix what it can
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
@@ -88,8 +89,21 @@ wheel: $(VIZ)    ## build dist/relgym-*.whl
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 	rm -rf build
 
+docs: $(DOCS)    ## build the docs site into site/: start with site/index.html
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	$(BIN)/python docs/tools/check_site.py site
+
+docs-serve: docs ## show it at localhost:8000 (a browser needs that for the site's search)
+	$(BIN)/python -m http.server --bind 127.0.0.1 --directory site 8000
+
+pages: $(DEV)    ## run the code on all pages, and write what it prints into them
+	$(BIN)/python tests/support/pages.py
+
+animations: $(VIZ) ## draw the envs' moving pictures again
+	$(BIN)/python docs/tools/animations.py
+
 clean:           ## remove all that was installed, built and cached
-	rm -rf $(VENV) $(VENV)-highway $(VENV)-ocatari build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .coverage
+	rm -rf $(VENV) $(VENV)-highway $(VENV)-ocatari build dist site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .coverage
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)-highway/.installed: pyproject.toml
@@ -118,6 +132,10 @@ $(DYNA): $(VIZ)
 
 $(DEV): $(VIZ)
 	$(PIP) -e '.[viz,dev,baselines]'
+	@touch $@
+
+$(DOCS): $(VIZ)
+	$(PIP) -e '.[viz,docs]'
 	@touch $@
 
 $(SB3): $(DEV)

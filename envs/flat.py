@@ -2,7 +2,7 @@
 
 Nets learn slowly from absolute positions and from numbers of very different size; and in float32 a position of a
 thousand units has lost what a stop to within a tenth needs. A `FlatSpec` says what to show and how large it typically
-is, a `Flattener` does it for any number of scenes at once. Both speak of types and properties only through the schema.
+is, a `Flattener` does it for any number of scenes at once. Both know types and properties only through the schema.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Why a dream ends early: the model has left what it knows, or the world has left its space."""
+"""Why a dream is truncated: the model makes no prediction, or the next scene lies outside the observation space."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ __all__ = ["CAUSES", "Cause", "causes", "explained", "horizon_reached", "parts_o
 class Cause(enum.Enum):
     """What ended a dream; the value is the sentence for people, the name is ``info["cause"]`` in lower case.
 
-    All but `HORIZON` say that the prediction was not followed: the dream stays in the last scene that is known.
-    `NO_REWARD` comes of tasks that are learned (`LearnedRewardModel`).
+    With all but `HORIZON` the prediction was not followed: the dream stays in the last scene that is known. `NO_REWARD`
+    comes from a `LearnedRewardModel`.
     """
 
     NO_MODE = Outcome.NO_MODE.value
@@ -51,7 +51,7 @@ def causes(
     Parameters
     ----------
     prediction
-        What the model says.
+        The model's prediction.
     inside
         Whether each next scene lies in the observation space, shape ``(n,)``.
     min_margin

@@ -67,16 +67,16 @@ class TaskFunctions(Protocol):
 def check_reward_functions(
     reward: Any, terminated: Any, task: Any, model: WorldModel, *, batched: bool, at_once: bool
 ) -> None:
-    """Check what was given to evaluate steps by, before any dream begins.
+    """Check functions and tasks before any dream begins.
 
     Parameters
     ----------
     reward, terminated, task
         As given.
     model
-        Whose dreams are evaluated.
+        The model of the dreams.
     batched
-        Whether functions evaluate n steps at once.
+        Whether functions take n steps at once.
     at_once
         Whether the model has learned all that it ever will: else what it is to have ``"learned"`` is asked for when a
         dream begins.
@@ -149,7 +149,7 @@ def _functions(task: Any, *names: str) -> list[Any]:
 
 
 def _doubts(task: Any) -> bool:
-    """Whether a task is learned, so that a NaN of its says that it doesn't know."""
+    """Whether a task is learned, so that NaN means that it doesn't know."""
     return bool(getattr(task, "learned", False))
 
 
@@ -157,7 +157,7 @@ def _doubts(task: Any) -> bool:
 class StepEvaluator:
     """Reward and termination of single steps: each a function, `LEARNED` (the next scene tells), or None.
 
-    `doubts`: NaN is no error, but says that nobody knows.
+    `doubts`: NaN is no error, but means that the reward is unknown.
     """
 
     reward: SceneFunction | Literal["learned"] | None
@@ -188,7 +188,7 @@ class StepEvaluator:
 
     @property
     def overruled(self) -> frozenset[tuple[str, str]]:
-        """(object, property) pairs that something else than the model says, whatever it says of them."""
+        """(object, property) pairs whose prediction isn't used, since a function gives them."""
         return _overruled(self.reward, self.terminated)
 
     def __call__(self, before: Scene, action: Any, after: Scene) -> tuple[float, bool]:
@@ -221,7 +221,7 @@ def _verdict(
     if not (np.isfinite(value) or (doubts and np.isnan(value))):
         what = _WORDS[prop]
         raise ConfigError(
-            f"the {what} of a dreamed step is {told!r}: expected a finite number; mend the {what} function for "
+            f"the {what} of a dreamed step is {told!r}: expected a finite number; fix the {what} function for "
             f"before={before.values()}, action={action}, after={after.values()}"
         )
     return value
@@ -300,7 +300,7 @@ class BatchStepEvaluator:
         if not fine.all():
             row = int(np.flatnonzero(~fine)[0])
             raise ConfigError(
-                f"the {what} of dreamed step {row} of {len(found)} is {found[row]}: expected a finite number; mend the "
+                f"the {what} of dreamed step {row} of {len(found)} is {found[row]}: expected a finite number; fix the "
                 f"{what} function for before={before[row].tolist()}, after={after[row].tolist()} (objects "
                 f"{list(self.layout.names)})"
             )

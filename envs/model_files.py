@@ -10,13 +10,14 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.errors import ConfigError, ModelFileError, ObservationError
 from relgym.scene.objects import TASK, Scene
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["EnvRecord", "copied", "schema_like", "world_like"]
+__all__ = ["EnvRecord", "copied", "made_how", "schema_like", "world_like"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,7 @@ class EnvRecord:
     starts
         First scenes of some episodes.
     metadata
-        Plain data for people and renderers: the env's id, `render_fps`.
+        Plain data for people, renderers and the console: how the env was made (`made_how`), `render_fps`.
     """
 
     observation_space: spaces.Space[Any]
@@ -75,13 +76,67 @@ class EnvRecord:
             ) from None
 
 
+def made_how(spec: EnvSpec | None) -> dict[str, Any]:
+    """What ``gym.make`` needs to make an env again, as plain data for a model's file.
+
+    Parameters
+    ----------
+    spec
+        The env's; ``None``: it was made without ``gym.make``, and nobody knows.
+
+    Returns
+    -------
+    ``env``, the id; ``arguments``, those that differ from the registered ones; ``omitted``, the names of arguments that
+    no file can hold (functions, arrays, objects); ``wrappers``, the names of wrappers that were put on afterwards.
+    Entries that would be empty are left out.
+    """
+    if spec is None:
+        return {}
+    registered = gym.registry.get(spec.id)
+    usual = {} if registered is None else registered.kwargs
+    given = {
+        k: v for k, v in spec.kwargs.items() if k != "render_mode"
+    }  # how it is shown is no one's to learn
+    if registered is not None and spec.max_episode_steps not in (None, registered.max_episode_steps):
+        given["max_episode_steps"] = spec.max_episode_steps
+    arguments, omitted = {}, []
+    for name, value in given.items():
+        try:
+            arguments[name] = _plain_argument(value)
+        except TypeError:
+            if name not in usual or usual[name] is not value:
+                omitted.append(name)
+            continue
+        if name in usual and arguments[name] == usual[name]:
+            del arguments[name]
+    parts = {
+        "arguments": arguments,
+        "omitted": omitted,
+        "wrappers": [wrapper.name for wrapper in spec.additional_wrappers],
+    }
+    return {"env": spec.id} | {name: part for name, part in parts.items() if part}
+
+
+def _plain_argument(value: Any) -> Any:
+    """An argument as JSON holds it, tuples as lists; `TypeError` where it can't."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, (list, tuple)):
+        return [_plain_argument(each) for each in value]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: _plain_argument(each) for key, each in value.items()}
+    raise TypeError(f"{value!r} isn't plain data")
+
+
 def world_like(like: gym.Env[Any, Any], schema: SceneSchema) -> gym.Env[Any, Any]:
     """A copy of the env inside all wrappers, whose episode goes on undisturbed.
 
     Raises
     ------
     ConfigError
-        The model can't speak of its scenes (`schema_like`), or it can't be copied.
+        The model can't predict its scenes (`schema_like`), or it can't be copied.
     """
     inner = like.unwrapped
     own = getattr(inner, "schema", None)
@@ -96,7 +151,7 @@ def copied(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
     except (TypeError, NotImplementedError, copy.Error) as error:
         raise ConfigError(
             f"like={env} can't be copied ({error}), and a dream must not disturb the real env's episode; a model "
-            "that a ModelLearner taught holds spaces and first scenes of its own: leave out like"
+            "that a ModelLearner saved holds spaces and first scenes of its own: leave out like"
         ) from error
     world.unwrapped.render_mode = None  # its resets are no one's to see
     return world
@@ -132,7 +187,7 @@ def schema_like(other: SceneSchema | None, schema: SceneSchema, what: str) -> Sc
 
 
 def _difference(other: SceneSchema, schema: SceneSchema) -> str:
-    """What keeps a model of one schema from speaking of the other's scenes; empty if nothing does."""
+    """Why a model of one schema can't predict scenes of the other; empty if it can."""
     if (other.up, other.planar) != (schema.up, schema.planar):
         return f"it has up={other.up!r}, planar={other.planar}"
     known = {t.name: (t.properties, t.shape, dict(t.pose)) for t in schema.types}

@@ -1,7 +1,7 @@
 """Tasks: what an agent is asked to do, as pure functions of (scene, action, next scene).
 
-Reward and termination of an env live here and not in the env, so that a dream can be evaluated by the very same
-functions as the world: one scene at a time, or thousands at once.
+Reward and termination of an env live here and not in the env, so that imagined steps get them from the very same
+functions as real ones: one scene at a time, or thousands at once.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["Region", "RewardFunctions", "Task", "TaskOutcome", "column_of"]
 
 @dataclass(frozen=True, slots=True)
 class TaskOutcome:
-    """What a task says of n steps.
+    """Rewards, ends and successes of n steps.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Region:
 
 
 class RewardFunctions(ABC):
-    """Says what steps are worth, and which of them are the last.
+    """Rewards of steps, and which of them end an episode.
 
     A subclass supplies `evaluate`. The functions of single scenes and those of arrays go through it, so that they
     agree to the last bit.

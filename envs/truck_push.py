@@ -288,6 +288,7 @@ def _checked_task(task: str | None, resample: str) -> str | None:
         return "push" if resample == "episode" else None
     if task is not None and resample != "episode":
         raise ConfigError(
-            f"task={task!r} with resample={resample!r}: nobody can plan for frictions yet to be drawn; pass task=None"
+            f"task={task!r} with resample={resample!r}: no agent can plan for frictions that are yet to be drawn; "
+            "pass task=None"
         )
     return task

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,13 +17,18 @@ from rich.progress import (
     ProgressColumn,
     TextColumn,
     TimeElapsedColumn,
+    TimeRemainingColumn,
 )
-from typer.core import TyperGroup
 
-from relgym.errors import ConfigError, RelgymError
+from relgym.console.errors import Commands
+from relgym.console.options import config_of_options, pairs
+from relgym.errors import ConfigError
 from relgym.model.text import plain
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from relgym.console.learning import Lesson, Round
     from relgym.experiments.demo import Demonstration, DemoOutcome
     from relgym.experiments.plots import Trajectory
 
@@ -33,28 +39,49 @@ _FRESH = 1000
 """Test scenes have other seeds than those that a model is likely to have been learned with."""
 
 
-class _Commands(TyperGroup):
-    """Commands whose foreseeable errors end in a sentence, not in a traceback."""
-
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            return super().invoke(ctx)
-        except (RelgymError, OSError) as error:
-            typer.secho(f"relgym: {error}", fg="red", err=True)
-            raise typer.Exit(2) from None
-
-
-app = typer.Typer(cls=_Commands, no_args_is_help=True, add_completion=False, help=__doc__)
+app = typer.Typer(cls=Commands, no_args_is_help=True, add_completion=False, help=__doc__)
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")]
 Seed = Annotated[int, typer.Option(help="Seed of everything random.", min=0)]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file, as `relgym learn` writes it.")]
-EnvId = Annotated[str, typer.Argument(metavar="ENV", help="Env id, such as relgym/BallBoxRamp-v0.")]
+EnvId = Annotated[
+    str, typer.Argument(metavar="ENV", help="Env id, such as CartPole-v1 or relgym/BallBoxRamp-v0.")
+]
+OtherEnv = Annotated[
+    str | None, typer.Option("--env", metavar="ID", help="Another env than the one that the file names.")
+]
 Arguments = Annotated[
     list[str] | None,
     typer.Option("--arg", "-a", metavar="NAME=VALUE", help="Argument of the env; repeatable."),
 ]
-World = Annotated[str, typer.Option("--world", help="Whose test scenes: truck or ball (experiment 1).")]
+ViewOption = Annotated[
+    str | None,
+    typer.Option(
+        "--view", metavar="VIEW", help="auto, numbers, a FILE.json, or MODULE:NAME of a view of yours."
+    ),
+]
+Names = Annotated[
+    str | None, typer.Option("--names", metavar="A,B,...", help="Names of the env's numbers, in order.")
+]
+
+
+@app.callback()
+def main(
+    modules: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--import",
+            metavar="MODULE",
+            help="Import a module first, which registers envs or features; repeatable.",
+        ),
+    ] = None,
+) -> None:
+    """Learn readable models of what actions do, and ask, test and print them."""
+    if modules:
+        from relgym.console.envs import imported
+
+        for name in modules:
+            imported(name, "--import")
 
 
 @app.command()
@@ -88,28 +115,54 @@ def demo(
 
 @app.command()
 def learn(
-    env_id: EnvId,
     out: Annotated[Path, typer.Option(help="Model file to write.")],
+    env_id: Annotated[str | None, typer.Argument(metavar="ENV", help="Env id, such as CartPole-v1.")] = None,
     steps: Annotated[int, typer.Option(help="Transitions to learn from.", min=1)] = 10_000,
     arg: Arguments = None,
-    seed: Seed = 0,
-    history: Annotated[bool, typer.Option(help="Keep what further learning needs.")] = False,
+    features: Annotated[
+        list[str] | None,
+        typer.Option(metavar="A,B,...", help="Features beside the properties: trig, squares, products, ..."),
+    ] = None,
+    follow_advice: Annotated[
+        bool, typer.Option("--follow-advice", help="Learn again with the features that the model advises.")
+    ] = False,
+    view: ViewOption = None,
+    names: Names = None,
+    config: Annotated[
+        list[str] | None,
+        typer.Option("--config", "-c", metavar="KEY=VALUE", help="Parameter of the learner; repeatable."),
+    ] = None,
+    reward: Annotated[bool, typer.Option("--reward", help="Learn the reward too.")] = False,
+    termination: Annotated[bool, typer.Option("--termination", help="Learn when episodes end too.")] = False,
+    seed: Annotated[int | None, typer.Option(help="Seed of everything random; default 0.", min=0)] = None,
+    history: Annotated[bool, typer.Option("--history", help="Keep what further learning needs.")] = False,
+    resume: Annotated[
+        Path | None, typer.Option(metavar="MODEL", help="Go on from a model that was saved with --history.")
+    ] = None,
+    as_json: Json = False,
 ) -> None:
-    """Watch an env under random actions, learn a model of it and save it."""
-    from relgym.wrappers import ModelLearner
+    """Watch an env under random actions, learn a model of it, save it and say how good it is.
 
-    env: Any = ModelLearner(_make(env_id, arg))
-    env.action_space.seed(seed)
-    env.reset(seed=seed)
-    with _progress() as bar:
-        task = bar.add_task(env_id, total=steps)
-        for _ in range(steps):
-            *_, terminated, truncated, _ = env.step(env.action_space.sample())
-            if terminated or truncated:
-                env.reset()
-            bar.advance(task)
-    env.save(out, history=history)
-    typer.echo(f"{env.model!r}\n{out}")
+    Ctrl-C ends it early and saves what was learned.
+    """
+    from relgym.console.learning import Lesson, lessons
+
+    lesson = Lesson(
+        env_id=env_id,
+        arguments=pairs("--arg", arg),
+        out=out,
+        steps=steps,
+        seed=seed,
+        view=view,
+        names=names,
+        reward=reward,
+        terminated=termination,
+        config=config_of_options(config, features),
+        resume=resume,
+        history=history,
+        follow_advice=follow_advice,
+    )
+    _show_lessons(lessons, lesson, as_json)
 
 
 @app.command()
@@ -119,67 +172,66 @@ def rules(
     as_json: Json = False,
 ) -> None:
     """Print a model: modes, functions, clauses, roles."""
-    from relgym.model.world_model import WorldModel
+    from relgym.console.models import loaded
 
-    loaded = WorldModel.load(model)
-    _echo_json(_report(loaded, digits)) if as_json else typer.echo(loaded.describe(digits=digits))
+    known = loaded(model)
+    _echo_json(_report(known, digits)) if as_json else typer.echo(known.describe(digits=digits))
 
 
 @app.command()
 def explain(
     model: ModelFile,
-    env_id: EnvId,
     step: Annotated[int, typer.Option(help="Which scene of the episode.", min=0)] = 0,
+    env_id: OtherEnv = None,
     arg: Arguments = None,
+    view: ViewOption = None,
     seed: Seed = 0,
 ) -> None:
-    """Say why a model predicts what it predicts in a scene of an env."""
-    from relgym.model.world_model import WorldModel
-    from relgym.wrappers.views import view_of
+    """Say why a model predicts what it predicts in a scene of its env."""
+    from relgym.console.models import opened
+    from relgym.console.scenes import scene_at
 
-    loaded = WorldModel.load(model)
-    env: Any = _make(env_id, arg)
-    env.action_space.seed(seed)
-    observation, info = env.reset(seed=seed)
-    # The model's own view knows which numbers are an angle, say; an env of scenes has others of its own.
-    view = view_of(env, None if env.has_wrapper_attr("schema") else loaded.extra.get("view"))
-    scene = view.scene(observation, info)
-    for taken in range(step):
-        observation, _, terminated, truncated, info = env.step(env.action_space.sample())
-        scene = view.scene(observation, info, last=scene)
-        if (terminated or truncated) and taken + 1 < step:
-            raise ConfigError(
-                f"--step {step}: the episode was over after {taken + 1} steps; try another --seed"
-            )
-    typer.echo(loaded.explain(view.with_action(scene, env.action_space.sample())))
+    found = opened(model, env_id, pairs("--arg", arg), view)
+    typer.echo(found.model.explain(scene_at(found, step=step, seed=seed)))
 
 
 @app.command("eval")
-def evaluate(model: ModelFile, world: World, seed: Seed = _FRESH, as_json: Json = False) -> None:
-    """Test a model one step ahead, on fresh scenes of the world that it was learned in."""
-    from relgym.experiments import evaluate as evaluation
-    from relgym.model.world_model import WorldModel
+def evaluate(
+    model: ModelFile,
+    steps: Annotated[int, typer.Option(help="Fresh steps to test on.", min=1)] = 1000,
+    env_id: OtherEnv = None,
+    arg: Arguments = None,
+    view: ViewOption = None,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Test a model one step ahead, on fresh steps with random actions."""
+    from relgym.console.models import opened
+    from relgym.console.testing import evaluated
 
-    shown = _demonstration(world)
-    found = evaluation.evaluate(WorldModel.load(model), shown.testing(seed), shown.laws)
+    with _working("testing"):
+        found = evaluated(opened(model, env_id, pairs("--arg", arg), view), steps=steps, seed=seed)
     _echo_json(found) if as_json else typer.echo(found)
 
 
 @app.command()
 def rollout(
     model: ModelFile,
-    world: World,
-    seed: Seed = _FRESH,
     trials: Annotated[int, typer.Option(help="Number of roll-outs.", min=1)] = 80,
+    steps: Annotated[int, typer.Option(help="Most steps of a roll-out.", min=1)] = 200,
+    env_id: OtherEnv = None,
+    arg: Arguments = None,
+    view: ViewOption = None,
+    seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
     """Let a model imagine whole episodes from their first scenes, and compare with what happens."""
-    from itertools import islice
+    from relgym.console.models import opened
+    from relgym.console.testing import rolled_out
 
-    from relgym.experiments.rollouts import rollouts
-    from relgym.model.world_model import WorldModel
-
-    found = rollouts(WorldModel.load(model), list(islice(_demonstration(world).testing(seed), trials)))
+    with _working("testing"):
+        subject = opened(model, env_id, pairs("--arg", arg), view)
+        found = rolled_out(subject, trials=trials, steps=steps, seed=seed)
     _echo_json(found) if as_json else typer.echo(found)
 
 
@@ -217,19 +269,16 @@ def reproduce(
 
 
 @app.command()
-def envs(as_json: Json = False) -> None:
-    """List relgym's envs."""
-    import gymnasium
+def envs(
+    every: Annotated[
+        bool, typer.Option("--all", help="All that are installed, not only relgym's own.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """List relgym's envs, or all that are installed."""
+    from relgym.console.envs import listing
 
-    import relgym  # noqa: F401 - registers them
-
-    found = {}
-    for spec in gymnasium.registry.values():
-        if spec.namespace == "relgym":
-            lines = (gymnasium.envs.registration.load_env_creator(str(spec.entry_point)).__doc__ or "").split(
-                "\n"
-            )
-            found[spec.id] = lines[0]
+    found = listing(every=every)
     _echo_json(found) if as_json else typer.echo(_columns(found))
 
 
@@ -251,11 +300,17 @@ def dyna(
 
 
 @app.command()
-def inspect(env_id: EnvId, arg: Arguments = None, seed: Seed = 0) -> None:
-    """Show an env's schema, and the relations in its first scene."""
+def inspect(
+    env_id: EnvId, arg: Arguments = None, view: ViewOption = None, names: Names = None, seed: Seed = 0
+) -> None:
+    """Show an env as relgym sees it: arguments, spaces, objects, properties, the first scene."""
+    from relgym.console.envs import made, signature_text
+    from relgym.console.views import view_named
     from relgym.experiments.inspection import inspected
 
-    typer.echo(inspected(_make(env_id, arg), seed=seed))
+    env = made(env_id, pairs("--arg", arg))
+    shown = inspected(env, view_named(env, view, names), seed=seed)
+    typer.echo(f"{env_id}\n\narguments\n  {signature_text(env)}\n\n{shown}")
 
 
 @app.command()
@@ -291,6 +346,31 @@ def _demonstrate(shown: Demonstration, out: Path, seed: int) -> tuple[DemoOutcom
     return outcome, trajectories(env.model, shown, seed=figures.seed)
 
 
+def _show_lessons(learned: Callable[..., Iterator[Round]], lesson: Lesson, as_json: bool) -> None:
+    """Learn under a progress bar; say what came of each round, and what to do next."""
+    from relgym.console.next_steps import next_steps
+
+    rounds: list[Round] = []
+    with _progress(TimeRemainingColumn(), TextColumn("{task.fields[wrong]}")) as bar:
+        task = bar.add_task("learning", total=lesson.steps, wrong="")
+
+        def tick(done: int, wrong: float) -> None:
+            if done < bar.tasks[0].completed:  # another round
+                bar.reset(task, total=lesson.steps, wrong="")
+            bar.update(task, completed=done, wrong=f"wrong lately: {wrong:.1%}")
+
+        for number, found in enumerate(learned(lesson, tick), start=1):
+            rounds.append(found)
+            if not as_json:
+                typer.echo(f"{'' if number == 1 else chr(10)}{found}")
+    if as_json:
+        _echo_json(rounds)
+    else:
+        typer.echo(f"\n{next_steps(rounds[-1])}")
+    if rounds[-1].stopped:
+        raise typer.Exit(130 if "Ctrl-C" in rounds[-1].stopped else 1)
+
+
 def _show_reproduction(request: Any) -> None:
     """Run jobs under a progress bar; print every table as it is made."""
     from relgym.experiments.chapter4.command import remaining, reproduce
@@ -307,40 +387,6 @@ def _show_reproduction(request: Any) -> None:
     typer.echo(f"Written to {request.out}")
 
 
-def _demonstration(world: str) -> Demonstration:
-    from relgym.experiments.demo import demonstrations
-
-    known = {shown.name: shown for shown in demonstrations()}
-    if world not in known:
-        raise ConfigError(f"--world {world}: expected one of {sorted(known)}")
-    return known[world]
-
-
-def _make(env_id: str, arguments: list[str] | None) -> Any:
-    import gymnasium
-
-    import relgym  # noqa: F401 - registers the envs
-
-    try:
-        return gymnasium.make(env_id, **dict(map(_argument, arguments or [])))
-    except gymnasium.error.Error as error:
-        raise ConfigError(f"{error}; `relgym envs` lists relgym's own") from None
-    except (ImportError, TypeError, ValueError) as error:
-        if isinstance(error, ConfigError):
-            raise
-        raise ConfigError(f"{env_id} with {arguments or 'no arguments'} can't be made: {error}") from None
-
-
-def _argument(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise ConfigError(f"--arg {text}: expected NAME=VALUE, the value in JSON or a plain word")
-    try:
-        return name, json.loads(value)
-    except ValueError:
-        return name, value
-
-
 def _report(model: Any, digits: int = 7) -> Any:
     from relgym.model.report import report
 
@@ -350,7 +396,14 @@ def _report(model: Any, digits: int = 7) -> Any:
 def _progress(*more: ProgressColumn) -> Progress:
     basic = (TextColumn("{task.description:>6}"), BarColumn(40), MofNCompleteColumn(), TimeElapsedColumn())
     columns = (*basic, *more)
-    return Progress(*columns, console=Console(stderr=True), transient=not sys.stderr.isatty())
+    return Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty())
+
+
+@contextmanager
+def _working(what: str) -> Iterator[None]:
+    """Show that something is going on, where a person watches."""
+    with Console(stderr=True).status(what):
+        yield
 
 
 def _columns(rows: dict[str, str]) -> str:

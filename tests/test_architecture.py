@@ -13,11 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from source_tree import FOLDERS, ROOT, Import, Module, modules, room_of
+from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 
 FOUNDATION = frozenset({"errors", "arguments", "config"})
-ROOMS = FOUNDATION | {"scene", "numeric", "logic"}
-LEARNERS = ROOMS | {"clustering", "classification", "laws"}
+ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
+LEARNERS = ENGINES | {"clustering", "classification", "laws"}
 CORE = LEARNERS | {"model"}
 
 MAY_IMPORT = {
@@ -27,21 +27,22 @@ MAY_IMPORT = {
     "scene": FOUNDATION,
     "numeric": FOUNDATION,
     "logic": FOUNDATION,
-    "clustering": ROOMS,
-    "classification": ROOMS,
-    "laws": ROOMS | {"clustering"},
+    "clustering": ENGINES,
+    "classification": ENGINES,
+    "laws": ENGINES | {"clustering"},
     "model": LEARNERS,
     "baselines": CORE,
     "envs": CORE,
     "wrappers": CORE | {"envs"},
     "experiments": CORE | {"baselines", "envs", "wrappers"},
-    "cli": CORE | {"baselines", "envs", "wrappers", "experiments"},
+    "console": CORE | {"envs", "wrappers", "experiments"},
+    "cli": CORE | {"baselines", "envs", "wrappers", "experiments", "console"},
     "__main__": frozenset({"cli"}),
 }
-"""Other rooms each room may import; a line here is a decision about the design, not a way to pass."""
+"""Other packages each package may import; a line here is a decision about the design, not a way to pass."""
 
-FACADE_USERS = frozenset({"experiments", "cli"})
-"""Rooms that may `import relgym` itself: those above all that the façade offers."""
+FACADE_USERS = frozenset({"experiments", "console", "cli"})
+"""Packages that may `import relgym` itself: those above everything that the façade offers."""
 
 CORE_LIBRARIES = frozenset({"numpy", "scipy"})
 FCL = "relgym.scene.geometry.fcl"
@@ -56,16 +57,18 @@ WORLD_WORDS = frozenset(
 """Names of the two worlds' objects and properties; a learner that knows one has peeked."""
 
 
-def _rooms() -> list[str]:
-    return sorted({module.room for module in modules()} - {""})
+def _packages() -> list[str]:
+    return sorted({module.package for module in modules()} - {""})
 
 
-@pytest.mark.parametrize("room", _rooms())
-def test_rooms_import_only_what_lies_below(room: str) -> None:
-    assert room in MAY_IMPORT, f"relgym.{room} has no line in MAY_IMPORT: decide what lies below it"
-    wrong = [_sentence(m, i) for m in modules() if m.room == room for i in m.imports if _upward(room, i)]
-    below = ", ".join(sorted(MAY_IMPORT[room])) or "nothing"
-    assert not wrong, f"relgym.{room} may import of relgym only: {below}\n" + "\n".join(wrong)
+@pytest.mark.parametrize("package", _packages())
+def test_packages_import_only_what_lies_below(package: str) -> None:
+    assert package in MAY_IMPORT, f"relgym.{package} has no line in MAY_IMPORT: decide what lies below it"
+    wrong = [
+        _sentence(m, i) for m in modules() if m.package == package for i in m.imports if _upward(package, i)
+    ]
+    below = ", ".join(sorted(MAY_IMPORT[package])) or "nothing"
+    assert not wrong, f"relgym.{package} may import of relgym only: {below}\n" + "\n".join(wrong)
 
 
 def test_no_relative_imports() -> None:
@@ -83,15 +86,15 @@ def test_the_core_needs_numpy_scipy_and_fcl_alone() -> None:
     wrong = [
         _sentence(m, i)
         for m in modules()
-        if m.room in CORE
+        if m.package in CORE
         for i in m.imports
-        if _third_party(i) and not (m.name == FCL and _package(i) == "fcl")
+        if _third_party(i) and not (m.name == FCL and _distribution(i) == "fcl")
     ]
     assert not wrong, f"only {sorted(CORE_LIBRARIES)}, and fcl in {FCL}\n" + "\n".join(wrong)
 
 
 def test_only_one_module_imports_fcl() -> None:
-    users = {module.name for module in modules() if any(_package(i) == "fcl" for i in module.imports)}
+    users = {module.name for module in modules() if any(_distribution(i) == "fcl" for i in module.imports)}
     assert users == {FCL}
 
 
@@ -99,7 +102,7 @@ def test_the_core_knows_no_world_by_name() -> None:
     wrong = [
         f"{module.file}:{node.lineno} holds {node.value!r}"
         for module in modules()
-        if module.room in CORE
+        if module.package in CORE
         for node in _strings_but_docstrings(module.tree)
         if node.value in WORLD_WORDS
     ]
@@ -163,20 +166,20 @@ def test_mypy_sees_what_is_wrong(package: str, tmp_path: Path) -> None:
     assert "Found 1 error in 1 file (checked 3 source files)" in run.stdout
 
 
-def _upward(room: str, found: Import) -> bool:
-    if _package(found) != "relgym":
+def _upward(package: str, found: Import) -> bool:
+    if _distribution(found) != "relgym":
         return False
-    target = room_of(found.target)
+    target = package_of(found.target)
     if target not in MAY_IMPORT:  # `import relgym`, or a name of the façade
-        return room not in FACADE_USERS
-    return target != room and target not in MAY_IMPORT[room]
+        return package not in FACADE_USERS
+    return target != package and target not in MAY_IMPORT[package]
 
 
 def _third_party(found: Import) -> bool:
-    return _package(found) not in {"relgym", *CORE_LIBRARIES, *sys.stdlib_module_names}
+    return _distribution(found) not in {"relgym", *CORE_LIBRARIES, *sys.stdlib_module_names}
 
 
-def _package(found: Import) -> str:
+def _distribution(found: Import) -> str:
     return found.target.split(".")[0]
 
 

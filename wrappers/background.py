@@ -267,7 +267,7 @@ def _learn(
 ) -> None:
     """The process' life: learn what comes; answer every question with all that was learned so far.
 
-    What makes it fail it says at once, unasked, so that nobody goes on in vain.
+    An error is reported at once, without being asked for.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()

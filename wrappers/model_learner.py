@@ -1,4 +1,4 @@
-"""The wrapper that learns a model of an env while an agent acts in it (design §5)."""
+"""The wrapper that learns a model of an env while an agent acts in it."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 
 from relgym.arguments import refusing
 from relgym.config import ModelConfig
+from relgym.envs.model_files import made_how
 from relgym.errors import ConfigError
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations
@@ -116,10 +117,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
             window=window,
             background=background,
             bad_observations=bad_observations,
-            metadata={
-                "env": None if env.spec is None else env.spec.id,
-                "render_fps": env.metadata.get("render_fps"),
-            },
+            metadata=made_how(env.spec) | {"render_fps": env.metadata.get("render_fps")},
         )
         # Plain data only: recorded arguments are deep-copied, and a learner among them would be forked.
         RecordConstructorArgs.__init__(

@@ -247,7 +247,7 @@ class Observer:
         except RelgymError:
             if first:
                 raise
-            return False  # a file, a target or a feature speaks of the angle, so it is no mere guess
+            return False  # a file, a target or a feature names the angle, so it is no mere guess
         if self._study is not None:
             self._study.discard()
         old, new = (_angles(v) for v in (self.view, view))

@@ -1,4 +1,4 @@
-"""Most episodes are cut short: who can dream the rest would rather see more beginnings."""
+"""Most episodes are truncated early: an agent that can imagine the rest learns more from other beginnings."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ __all__ = ["TruncatedEpisodes"]
 
 
 class TruncatedEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """Truncates most episodes after a few steps; now and then one lasts as long as it will.
+    """Truncates most episodes after a few steps; every `whole`-th one lasts as long as it will.
 
-    What follows on a beginning, a model can dream; other beginnings (other rooms, other objects) it can't. So real
-    steps that are to show an agent what there is are better spent on many short episodes. Whole ones remain, for
-    nobody dreams of what pays, or of an end, who never met it.
+    A model can imagine how an episode goes on, but not other beginnings (other rooms, other objects). So for an agent
+    that trains in a model, real steps are better spent on many short episodes. Some stay whole, since rewards and ends
+    that were never seen can't be learned.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class TruncatedEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
 
     Notes
     -----
-    An episode counts from its reset on. Where resets are dear, this isn't for you.
+    An episode counts from its reset on. Don't use this where resets are expensive.
     """
 
     @refusing(ConfigError)

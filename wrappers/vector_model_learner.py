@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.arguments import refusing
 from relgym.config import ModelConfig
+from relgym.envs.model_files import made_how
 from relgym.errors import ConfigError
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.learning import Learning
@@ -94,7 +95,7 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
             window=window,
             background=background,
             bad_observations=bad_observations,
-            metadata={"env": None if env.spec is None else env.spec.id},
+            metadata=made_how(env.spec),
         )
 
     # ------------------------------------------------------------------ the Gymnasium contract

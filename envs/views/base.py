@@ -1,4 +1,4 @@
-"""What every view offers: an env's observations as scenes, and scenes as observations (design §5)."""
+"""What every view offers: an env's observations as scenes, and scenes as observations."""
 
 from __future__ import annotations
 

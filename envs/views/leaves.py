@@ -61,7 +61,7 @@ class Leaf:
         if array.size != self.size or (array.ndim > 0 and array.shape != (self.space.shape or ())):
             raise ObservationError(
                 f"{self._place()}expected {self.size} numbers as {self.space} says, got an array of shape "
-                f"{array.shape}; mend the env's observation_space, or give a view of your own"
+                f"{array.shape}; fix the env's observation_space, or give a view of your own"
             )
         return array.ravel()
 

@@ -1,4 +1,4 @@
-"""Reward and termination as properties of the bodiless object `task` (design §4)."""
+"""Reward and termination as properties of the bodiless object `task`."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class Classifier(Protocol):
 def refuse_gaps(*parts: Any) -> None:
     """Raise `ObservationError` where an example holds NaN or infinity: what remembers sums would never be rid of it."""
     if not all(np.isfinite(part).all() for part in parts):
-        raise ObservationError("an example holds NaN or infinity: leave it out or mend it")
+        raise ObservationError("an example holds NaN or infinity: leave it out or fix it")
 
 
 class Memory:

@@ -148,7 +148,7 @@ def predicted_changes(
         Rows of numbers, shape ``(n, d)``, and what changed, shape ``(n, m)``, in the order in which they came; at least
         two.
     once
-        Whether also those speak that are fitted once: to the first half, of the second (NaN in the first).
+        Whether those that are fitted once are compared too: to the first half, of the second (NaN in the first).
     seed
         Of everything random.
     last

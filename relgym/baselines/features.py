@@ -91,7 +91,7 @@ class ThesisFeatures:
         if layout.names != self.schema.order:
             raise SchemaError(
                 f"the thesis' features need all of {self.schema.order}, the scenes have {layout.names}: "
-                "a row of fixed length can't tell who is missing (§4.9); use the contact features"
+                "a row of fixed length can't tell which is missing (§4.9); use the contact features"
             )
         target = layout.index(self.target)
         order = [target, *(i for i in range(len(layout.names)) if i != target)]

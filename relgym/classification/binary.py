@@ -55,7 +55,7 @@ class BinaryClassifier:
     scope
         Names it may use.
     context
-        Which objects its clauses speak of.
+        Which objects its clauses mention.
     definition
         Clauses for mode `i`, or for mode `j` if it is negated (§3.4.5).
     clause_trees

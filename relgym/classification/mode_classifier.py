@@ -313,7 +313,7 @@ class ModeClassifier:
         return {pair: Lesson(view, at, labels[pair][at] > 0, weights[at]) for pair, at in rows.items()}
 
     def _labels(self, pairs: Iterable[tuple[int, int]]) -> dict[tuple[int, int], NDArray[np.int8]]:
-        """Which exemplars teach each pair, and which of its modes they speak for: see `pair_labels`."""
+        """Which exemplars teach each pair, and for which of its modes they are examples: see `pair_labels`."""
         assigned, fits, modes = self.exemplars.assigned, self.exemplars.columns["fits"], self.modes
         if self.config.ambiguous == "keep":  # the thesis' arbitrary labels
             return {(i, j): (assigned == i).astype(np.int8) - (assigned == j) for i, j in pairs}

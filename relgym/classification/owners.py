@@ -2,7 +2,7 @@
 
 Examples are assigned to the simplest mode that explains them, and sometimes that is the wrong one by chance: a ball at
 the top of its flight is as fast as one at rest. No number tells, but relations do: where it flies, all that is beyond
-doubt belongs to flying. Left alone such an example would speak for rest against all other modes.
+doubt belongs to flying. Left alone such an example would count for rest against all other modes.
 """
 
 from __future__ import annotations

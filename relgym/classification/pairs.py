@@ -1,4 +1,4 @@
-"""One pair of modes over time: its classifier, and whether that has become stale (design §5)."""
+"""One pair of modes over time: its classifier, and whether that has become stale."""
 
 from __future__ import annotations
 
@@ -146,9 +146,9 @@ class PairState:
 def pair_labels(
     assigned: Any, owners: Any, fits: Any, modes: tuple[int, ...], i: int, j: int
 ) -> NDArray[np.int8]:
-    """1 where an example speaks for mode `i`, -1 where it speaks for `j`, 0 where it teaches nothing.
+    """1 for an example of mode `i`, -1 for one of `j`, 0 for one that isn't used.
 
-    An example speaks for the mode it belongs to (`Owners`), and for every mode that *covers* that one, against one that
+    An example counts for the mode it belongs to (`Owners`), and for every mode that *covers* that one, against one that
     doesn't explain it. Bouncing covers sliding: a slide must not let a third mode win against bouncing, or votes go
     round in circles. A mode that explains some of another's examples by chance covers nothing.
 

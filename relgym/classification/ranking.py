@@ -68,7 +68,7 @@ class Ranking:
     margin
         Votes between winner and runner-up in the last count; infinite if there is one mode only.
     familiar
-        False if no clause spoke for the winner and nothing like the example was seen in training: the winner
+        False if no clause voted for the winner and nothing like the example was seen in training: the winner
         is a guess.
     """
 

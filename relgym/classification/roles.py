@@ -83,7 +83,7 @@ class RoleDescription:
         return typical
 
     def score(self, world: World, target: int, candidate: int) -> float | None:
-        """Log-odds that a candidate is bound to the role; none if nothing speaks for it."""
+        """Log-odds that a candidate is bound to the role; none if no clause covers it."""
         if self.definition is None:
             return 0.0
         for clause, coverage in zip(self.definition.clauses, self.definition.coverage, strict=True):
@@ -94,7 +94,7 @@ class RoleDescription:
         return _log_odds(missed) if missed.positives > 0 else None
 
     def holds(self, world: World, target: int, candidate: int) -> bool:
-        """Whether some clause speaks for a candidate; true without a definition."""
+        """Whether some clause covers a candidate; true without a definition."""
         if self.definition is None:
             return True
         return any(satisfiable(clause, world, (target, candidate)) for clause in self.definition.clauses)

@@ -28,7 +28,7 @@ from relgym.logic.facts import Facts
 __all__ = ["CONTEXTS", "Context", "Scope", "View", "bound_features", "lift", "projection"]
 
 Context: TypeAlias = Literal["approached", "touching", "all"]
-"""Which objects clauses speak of: what the target approaches fastest, those close to it, or every one."""
+"""Which objects clauses may mention: what the target approaches fastest, those close to it, or every one."""
 
 CONTEXTS: Final[tuple[Context, ...]] = ("approached", "touching", "all")
 """All contexts, the narrowest first."""

@@ -166,7 +166,7 @@ class Voting:
         return [*alive, *reversed(out)], margin
 
     def _cast(self, view: View) -> tuple[NDArray[np.int64], Bools]:
-        """Votes that each mode gets from its pair with each other one, and whether a clause spoke for it.
+        """Votes that each mode gets from its pair with each other one, and whether a clause voted for it.
 
         Shapes ``(n, M, M)`` and ``(n, M)``.
         """
@@ -184,7 +184,7 @@ class Voting:
         return cast, spoken
 
     def _spoke(self, mode: int, outcomes: Sequence[int]) -> bool:
-        """Whether a clause of some pair spoke for a mode."""
+        """Whether a clause of some pair voted for a mode."""
         for classifier, outcome in zip(self._classifiers, outcomes, strict=True):
             if classifier.positive == mode:
                 if classifier.outcomes[outcome].stage < len(classifier.definition.clauses):

@@ -84,7 +84,7 @@ def least_examples(y: NDArray[np.float64], scale: Scale, config: ClusteringConfi
 
 
 def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
-    """By how many bits an example that fits a function speaks for it: those that tell its value from all seen."""
+    """Bits of evidence that an example which fits a function gives for it: those that tell its value from all seen."""
     spread = float(np.ptp(y)) if len(y) else 0.0
     return math.log2(max(spread / scale.tolerance, 2.0))
 

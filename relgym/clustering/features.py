@@ -29,6 +29,7 @@ __all__ = [
     "Library",
     "check_entries",
     "functions_of",
+    "known_kinds",
     "library_of",
     "offered",
     "register_function",
@@ -87,6 +88,11 @@ def functions_of(entries: Iterable[str]) -> dict[str, Function]:
     """Registered functions that entries of ``ModelConfig.features`` name, by name."""
     kinds = [match["kind"] for entry in entries if (match := _ENTRY.fullmatch(entry))]
     return {kind: _functions[kind] for kind in kinds if kind in _functions}
+
+
+def known_kinds() -> tuple[str, ...]:
+    """All kinds of features that there are, registered functions last."""
+    return ("trig", *_DEGREES, *sorted(_functions))
 
 
 @dataclass(frozen=True, slots=True)

@@ -155,7 +155,7 @@ class Population:
     def _cost(
         self, ids: NDArray[np.intp], errors: NDArray[np.float64], held: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """What speaks against each mode where noise is large, in nats, shape ``(n, modes)``.
+        """Evidence against each mode where noise is large, in nats, shape ``(n, modes)``.
 
         Its error; that it holds few examples in the same relational state; and each parameter.
 

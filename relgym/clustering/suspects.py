@@ -32,7 +32,7 @@ MEDIAN = 0.4549
 """Median of a standard normal variable's square."""
 
 CONVINCING = 12.0
-"""Bits by which the examples must speak for a function beyond what it takes to state it."""
+"""Evidence, in bits, that a function needs beyond what it takes to state it."""
 
 MOST = 1_000
 """At most so many suspects are looked at, the newest."""

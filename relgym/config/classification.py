@@ -1,4 +1,4 @@
-"""Parameters of classification: when a mode holds, and which object plays which role (§3.4, §3.5)."""
+"""Parameters of classification: when a mode holds, and which objects its roles are bound to (§3.4, §3.5)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["ClassificationConfig"]
 @refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class ClassificationConfig:
-    """Preconditions: when does a mode hold, and which object plays which role (§3.4, §3.5).
+    """Parameters of mode and role classifiers: when a mode holds, and role binding (§3.4, §3.5).
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class ClassificationConfig:
         Default true: a pair says nothing sensible of examples of a third mode. False: the most votes win, as in
         the thesis.
     context
-        Which objects clauses of mode classifiers speak of. ``"approached"``: the target and what it approaches
+        Which objects clauses of mode classifiers may mention. ``"approached"``: the target and what it approaches
         fastest (a contact fact). ``"touching"``: the target and all that touch it, or else the nearest one.
         ``"all"``: every object. ``"auto"`` (default): these are tried for every pair, the narrowest first, until a
         short definition makes no error; else the one with fewest errors is taken, of equals that of fewest bits, then
@@ -43,7 +43,7 @@ class ClassificationConfig:
         Boundaries of friction and halting become one threshold.
     ambiguous
         What to do with an example that several modes explain. ``"drop"`` (default): it teaches nothing to a
-        pair of them. Against all others it speaks for the mode it was assigned to, the simplest; or for another
+        pair of them. Against all others it counts for the mode it was assigned to, the simplest; or for another
         one of them, if only that one was seen beyond doubt in the same relations
         (`relgym.classification.owners`). ``"keep"``: it counts for the mode it was assigned to, as in the thesis.
     both_polarities
@@ -85,7 +85,7 @@ class ClassificationConfig:
         Deepest tree, in splits. Default 6, range >= 1.
     class_balance
         Exponent in [0, 1] by which classes are balanced: each is weighted by (its share) ** -class_balance.
-        Default 0: description length counts a rare class' examples dearly already; 1 gives both classes equal
+        Default 0: description length gives a rare class' examples weight already; 1 gives both classes equal
         say, which makes frequent modes suffer where the data are noisy.
     exemplars_per_state
         Examples kept per mode and relational state, those that contradicted a classifier first. Default 10,

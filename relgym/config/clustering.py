@@ -50,7 +50,7 @@ class ClusteringConfig:
         A mode is refitted when its examples have grown by this factor. Default 2.
     approximate
         Whether, where no exact law explains most examples, the best sparse function is taken that leaves at most a
-        tenth of the change, with its residuals as noise. Default true; the thesis had no such thing.
+        tenth of the change, with its residuals as noise. Default true; the thesis has no such thing.
     stickiness
         Whether, of the modes that explain an example equally well, those with fewest parameters win
         ("simple", default) or, as in the original program, whichever is nearest ("nearest").

@@ -124,8 +124,8 @@ class Arm:
         Whether objects of one type are exchanged and distances resampled: in dreams, or without a model in the
         replay buffer (objects only).
     doubted
-        Whether the model must earn its trust (`ModelAcceptance`), or is accepted as soon as it speaks, as in MBPO: nets
-        that are never exact would hardly ever be accepted, and that arm would be SAC.
+        Whether the model's error must be small first (`ModelAcceptance`), or it is accepted as soon as it predicts, as
+        in MBPO: nets that are never exact would hardly ever be accepted, and that arm would be SAC.
     """
 
     name: str

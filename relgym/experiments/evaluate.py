@@ -199,7 +199,7 @@ def _chunks(episodes: Iterable[Episode]) -> Iterator[list[Episode]]:
 
 
 def _results(model: WorldModel, part: Sequence[Episode], modes: AnalyticModes | None) -> _Parts:
-    """Per target, arrays of shape ``(n, 4)``: residual, did a mode speak, true mode, does it count."""
+    """Per target, arrays of shape ``(n, 4)``: residual, did a mode predict, true mode, does it count."""
     layout, results = part[0].layout, _Parts()
     prediction = model.predict_batch(layout, np.concatenate([b.vectors[:-1] for b in part]))
     after = np.concatenate([b.vectors[1:] for b in part])

@@ -13,16 +13,20 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 
 import relgym  # noqa: F401 - registers the envs
-from relgym.errors import ConfigError
+from relgym.envs.views import View
+from relgym.errors import RelgymError
 from relgym.model.text import Cell, indented, table
 from relgym.scene.objects import Scene
 from relgym.scene.schema import SceneSchema
 from relgym.scene.state import relational_state
+from relgym.wrappers.views import settled, view_of
 
-__all__ = ["Finding", "diagnosis", "inspected"]
+__all__ = ["Finding", "diagnosis", "inspected", "space_text"]
 
 _REQUIRED = ("numpy", "scipy", "gymnasium", "pymunk", "python-fcl", "typer", "rich")
 _OPTIONAL = {
@@ -56,37 +60,45 @@ class Finding:
     required: bool = True
 
 
-def inspected(env: gym.Env[Any, Any], *, seed: int = 0) -> str:
-    """An env's schema and the relations of its first scene, as text.
+def inspected(env: gym.Env[Any, Any], view: View | None = None, *, seed: int = 0) -> str:
+    """What relgym sees of an env, as text: spaces, view, objects, and the first scene with its relations.
 
     Parameters
     ----------
     env
-        An env with a schema; it is reset.
+        Any env; it is reset.
+    view
+        How it is seen; default: as `relgym.wrappers.ModelLearner` does by default.
     seed
         Of the reset.
 
     Raises
     ------
     ConfigError
-        The env has no schema.
+        Spaces that need a view of the user's.
     """
-    if not env.has_wrapper_attr("schema"):
-        raise ConfigError(f"{env} has no attribute `schema`: only envs of scenes can be inspected")
-    schema: SceneSchema = env.get_wrapper_attr("schema")
-    _, info = env.reset(seed=seed)
-    scene: Scene = info["scene"]
-    relations: list[list[Cell]] = [
-        [name, ", ".join(f"({', '.join(objects)})" for objects in sorted(found))]
-        for name, found in relational_state(scene).relations.items()
+    view = view_of(env) if view is None else view
+    observation, info = env.reset(seed=seed)
+    view = settled(view, [observation])
+    schema, scene = view.schema, view.scene(observation, info)
+    env.action_space.seed(seed)
+    scene = view.with_action(scene, env.action_space.sample())
+    related = relational_state(scene).relations if scene.layout.bodies else {}
+    relations = [
+        f"{name}: {', '.join('(' + ', '.join(objects) + ')' for objects in sorted(found))}"
+        for name, found in related.items()
         if found
     ]
     parts = {
+        "observations": space_text(env.observation_space),
+        "actions": space_text(env.action_space),
+        "seen as": _manner(view),
         "types": table(["type", "parent", "shape", "properties"], _type_rows(schema)),
         "objects": table(["object", "type"], [list(pair) for pair in schema.objects]),
         "learned": "\n".join(map(str, schema.targets or ())) or "every property that changes",
         "derived": "\n".join(map(str, _laws(schema))) or "nothing",
-        "relations in the first scene": "\n".join(f"{name}: {found}" for name, found in relations),
+        "the first scene, with an action": "\n".join(_values(scene)),
+        "relations in it": "\n".join(relations) or "none: spatial relations hold between bodies",
     }
     return "\n\n".join(f"{title}\n{indented(text)}" for title, text in parts.items())
 
@@ -100,6 +112,53 @@ def diagnosis() -> tuple[Finding, ...]:
     findings += [_tried(env_id, partial(_step, env_id)) for env_id in _plain_envs()]
     findings.append(_tried("temporary files", _write))
     return tuple(findings)
+
+
+_MANNERS: dict[str, str] = {
+    "scene": "scenes: the env's own objects",
+    "flat": "numbers: properties of one object, or of one per key",
+    "table": "a table: its rows are objects, its columns their properties",
+    "task": "reward or termination beside the state",
+}
+
+
+def _manner(view: View) -> str:
+    """What kind of view it is, for people; one of the user's own goes by its class."""
+    own = type(view).__name__
+    try:
+        kind = view.to_json().get("kind", "")
+    except RelgymError:
+        kind = ""
+    return f"{_MANNERS.get(kind, 'what a function of your own finds')}  ({own})"
+
+
+def space_text(space: spaces.Space[Any]) -> str:
+    """What a space holds, in a line: Gymnasium writes down every bound.
+
+    Examples
+    --------
+    >>> space_text(spaces.Box(-2.0, 2.0, (1,)))
+    '1 number from -2 to 2 (float32)'
+    >>> space_text(spaces.Dict(car=spaces.Box(-np.inf, np.inf, (3,), np.float64), gear=spaces.Discrete(5)))
+    'Dict of car: 3 numbers (float64); gear: Discrete(5)'
+    """
+    if isinstance(space, spaces.Dict):
+        return "Dict of " + "; ".join(f"{key}: {space_text(part)}" for key, part in space.items())
+    if not isinstance(space, spaces.Box):
+        return str(space)
+    low, high = float(space.low.min()), float(space.high.max())
+    same = (space.low == low).all() and (space.high == high).all() and np.isfinite([low, high]).all()
+    count = " x ".join(map(str, space.shape)) or "1"
+    limits = f" from {low:g} to {high:g}" if same else ""
+    return f"{count} number{'' if count == '1' else 's'}{limits} ({space.dtype})"
+
+
+def _values(scene: Scene) -> list[str]:
+    shown = []
+    for o in scene:
+        values = zip(o.type.properties, o.values.tolist(), strict=True)
+        shown.append(f"{o.name}: " + ", ".join(f"{prop} = {value:.4g}" for prop, value in values))
+    return shown
 
 
 def _type_rows(schema: SceneSchema) -> list[list[Cell]]:

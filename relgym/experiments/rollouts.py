@@ -14,7 +14,7 @@ from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
 
-__all__ = ["STRAY", "RolloutErrors", "imagined", "largest_errors", "rollouts"]
+__all__ = ["STRAY", "RolloutErrors", "imagined", "largest_errors", "outside", "rollouts"]
 
 STRAY = 1e-2
 """A roll-out has failed when a position is off by more than this at some step, in units."""
@@ -108,14 +108,14 @@ def imagined(model: WorldModel, vectors: Float2D, layout: SceneLayout) -> tuple[
     What comes from outside the world (actions, exogenous properties) is taken from `vectors`; rows beyond the
     last prediction repeat it.
     """
-    outside = _outside(layout)
+    given = outside(layout)
     result = np.repeat(vectors[:1], len(vectors), axis=0)
     for k in range(1, len(vectors)):
         step = model.predict_batch(layout, result[k - 1 : k])
         if not step.ok[0]:
             return result, k - 1
         result[k:] = step.vectors[0]
-        result[k, outside] = vectors[k, outside]
+        result[k, given] = vectors[k, given]
     return result, len(vectors) - 1
 
 
@@ -126,7 +126,7 @@ def _roll(
 
     `truth` has shape ``(trials, steps + 1, width)``.
     """
-    outside, places = _outside(layout), _positions(layout)
+    given, places = outside(layout), _positions(layout)
     now = truth[:, 0].copy()
     largest, stopped = np.zeros(len(truth)), np.zeros(len(truth), dtype=np.bool_)
     for k in range(1, truth.shape[1]):
@@ -136,13 +136,13 @@ def _roll(
         step = model.predict_batch(layout, now[going])
         stopped[going[~step.ok]] = True
         now[going] = step.vectors
-        now[:, outside] = truth[:, k][:, outside]
+        now[:, given] = truth[:, k][:, given]
         off = np.abs(now[:, places] - truth[:, k][:, places]).max(axis=1)
         largest = np.where(stopped, largest, np.maximum(largest, off))
     return largest, stopped
 
 
-def _outside(layout: SceneLayout) -> list[int]:
+def outside(layout: SceneLayout) -> list[int]:
     """Columns that no model predicts: actions and exogenous properties."""
     return [
         layout.column(i, prop)

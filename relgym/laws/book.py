@@ -1,4 +1,4 @@
-"""The laws of a world in force: what they say of the next velocities in a batch of scenes."""
+"""The laws learned so far, and the next velocities that they predict in a batch of scenes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SPREAD = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What the laws say of n scenes.
+    """What the laws predict for n scenes.
 
     Attributes
     ----------
@@ -36,10 +36,10 @@ class Motion:
         Next velocities of all K bodies, and behind them their spins where some type has one; shape
         ``(d [+ 1], n, K)``.
     known
-        Whether that is a claim, shape ``(n, K)``: no alternative law disagrees, and it lies within experience. False
-        for bodies that aren't movers.
+        Whether that is a prediction, shape ``(n, K)``: no alternative law disagrees, and it lies within experience.
+        False for bodies that aren't movers.
     stated
-        Whether the laws say anything at all, shape ``(n, K)``.
+        Whether any law applies, shape ``(n, K)``.
     touched
         Whether the body touches something, shape ``(n, K)``.
     columns
@@ -235,7 +235,7 @@ class LawBook:
 
 
 def _chosen(law: PairLaw, kinds: tuple[Kind, ...]) -> NDArray[np.intp]:
-    """Number of the law of each pair along each axis, shape ``(axes, P)``; -1 where none is to be trusted."""
+    """Number of the law of each pair along each axis, shape ``(axes, P)``; -1 where none is reliable."""
     numbers = np.full((len(law.axes), len(kinds)), -1, dtype=np.intp)
     for k, laws in enumerate(law.axes):
         for pair, kind in enumerate(kinds):

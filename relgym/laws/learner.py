@@ -1,9 +1,9 @@
 """Learns laws of motion from a stream of transitions: a free law per type, one law of touching pairs.
 
-Single contacts teach the law of pairs; transitions in which a body has several check how laws compose. Every
-contact is evaluated before it is learned from. One that the laws don't explain is news: the law of pairs is
-sought again, in all frames, among the bounded number of contacts kept. When a free law turns out to have been
-over-specific, all that was derived from it is derived again from the raw contacts.
+The law of pairs is learned from single contacts; transitions in which a body has several test how laws compose. Every
+contact is predicted before it is learned from. When the laws don't explain one, the law of pairs is searched for again,
+in all frames, among the bounded number of contacts kept. When a free law turns out to have been over-specific, all that
+was derived from it is derived again from the raw contacts.
 """
 
 from __future__ import annotations

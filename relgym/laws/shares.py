@@ -13,7 +13,7 @@ from relgym.scene.geometry.vectors import FloatArray, dot
 __all__ = ["EXTENT", "find_share", "share_values"]
 
 EXTENT = "extent"
-"""Name under which shares speak of a body's size."""
+"""Name of a body's size in shares."""
 
 FEWEST = 3
 """Contacts in which something passed between the bodies that found a share."""

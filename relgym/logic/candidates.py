@@ -119,7 +119,7 @@ def _bound_numeric(
     variables: tuple[int, ...],
     arity: int,
 ) -> Iterator[Block]:
-    """Thresholds on functions of objects that the clause already speaks of."""
+    """Thresholds on functions of objects that the clause already mentions."""
     cuts = Cuts(stack, growing.marginal(variables), weights)
     numbers = tuple(arity + variable for variable in variables)
     for op, counts in cuts.some():
@@ -129,7 +129,7 @@ def _bound_numeric(
 def _free_numeric(
     stack: NumericStack, growing: Growing, weights: Weights, score: Score, tables: Tables
 ) -> Iterator[Block]:
-    """Thresholds on functions of some object not spoken of yet, or of all objects."""
+    """Thresholds on functions of some object not mentioned yet, or of all objects."""
     total = growing.marginal(())
     fresh = tables.arity + growing.existentials
     cuts = Cuts(stack, total * tables.exists.astype(np.float32), weights)

@@ -46,7 +46,7 @@ class DescriptionLength:
         """Return a conjunction's bits: names, signs, arguments and thresholds; the order is free.
 
         What a single thing is costs as much as how two stand. By its arguments alone it would be cheaper, and a
-        clause that speaks of kinds says nothing of other kinds that stand the same way.
+        clause that mentions kinds says nothing of other kinds that stand the same way.
         """
         bits, variables = 0.0, arity
         for literal in literals:

@@ -79,6 +79,10 @@ class Advice:
     spoken: int = 0
 
     def __str__(self) -> str:
+        return self.told(f"ModelConfig(features={self.features})")
+
+    def told(self, remedy: str) -> str:
+        """What is lacking, as text, with `remedy` for what switches the features on."""
         now = self._now()
         if math.isnan(self.remains):
             return now
@@ -89,7 +93,7 @@ class Advice:
             close = "explains it" + ("" if self.remains <= FINE else f" but for {_percent(self.remains)}")
         if self.remains > GOOD:
             now += "; no library of features that was tried explains it"
-        return f"{now}; ModelConfig(features={self.features}) {close}: {self.law}"
+        return f"{now}; {remedy} {close}: {self.law}"
 
     def _now(self) -> str:
         rough = (

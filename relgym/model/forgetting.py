@@ -1,4 +1,4 @@
-"""Bounded memory: of a long history a uniform choice is kept, and all that is rare (design §5).
+"""Bounded memory: of a long history a uniform choice is kept, and all that is rare.
 
 Which examples stay is decided by hashes of their serial numbers, the smallest ones first. That is a uniform reservoir
 without a random number: it depends on nothing but how many examples came, and it needs no weights.

@@ -1,10 +1,10 @@
-"""A best guess where nothing is explained: what least squares make of all examples, and never a claim.
+"""Guesses: sparse least squares over all examples, used as fallback values where no mode or law predicts.
 
-Of a property that follows from what nobody sees (a driver's intentions) no mode speaks, and it would keep its value; of
-a car's position that is far off. A guess is a sparse function of what the target and bodiless objects have, features
-included, that predicts best what it wasn't fitted to. It has no modes, no conditions and no say about what is a law:
-its outcome stays `UNEXPLAINED`. An approximation that errs more gives way to it, and where it doesn't speak
-(`relgym.model.scope`) a guess fitted to what happens there stands in.
+Where a property depends on something unobserved (a driver's intentions) no mode holds, and the fallback would be that
+it keeps its value: for a car's position that is far off. A guess is a sparse function of what the target and bodiless
+objects have, features included, that predicts best what it wasn't fitted to. It has no modes and no conditions, and its
+outcome stays `UNEXPLAINED`. It replaces an approximation that errs more; and where approximations aren't used
+(`relgym.model.scope`), a guess fitted to the examples there is.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ MEMORY = 300.0
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """A function of last resort.
+    """The function of a guess, and how much of the change it leaves.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Guesses:
 
     @property
     def superior(self) -> bool:
-        """Whether the guess is better than what modes say.
+        """Whether the guess is better than the modes' predictions.
 
         Its root mean square error must be smaller, and by a greater factor than the typical error (the square of the
         mean root) is larger: rare large errors must not decide over what is mostly right.

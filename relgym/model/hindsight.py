@@ -1,9 +1,9 @@
-"""How a target's own predictions came out on steps that it had not learned yet: whether its clauses choose well.
+"""How often a target's own predictions were wrong on steps not learned yet: whether its clauses choose well.
 
-Modes that together cover all examples explain nothing if nobody can tell which of them holds when: of an env whose
+Modes that together cover all examples explain nothing if no condition tells which of them holds: of an env whose
 state is the number of a cell, a few constants and offsets cover every step. What gives them away is that the mode that
-wins the vote was the wrong one. So whoever asks a model before each step tells it afterwards
-(`WorldModel.look_back`); a model that is only taught is never evaluated.
+wins the vote was the wrong one. So a learner that predicts before each step reports the outcome afterwards
+(`WorldModel.look_back`); of a model that only learns nothing is counted.
 """
 
 from __future__ import annotations
@@ -103,9 +103,9 @@ class Hindsight:
 def look_back(
     parts: Parts, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
 ) -> None:
-    """Tell each target how its predictions of a step came out; arguments as of `WorldModel.look_back`.
+    """Report to each target how its predictions of a step came out; arguments as of `WorldModel.look_back`.
 
-    Only what a mode said counts: neither fallback values nor laws of motion, which know by themselves where they fail.
+    Only predictions of modes count: neither fallback values nor laws of motion, which abstain where they don't hold.
     What rests on another property's next value that was off isn't evaluated, since the fault is that one's.
     """
     layout = prediction.scene.layout

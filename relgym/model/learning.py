@@ -1,4 +1,4 @@
-"""Learning from one transition: one example per target of every object that stays (design §5)."""
+"""Learning from one transition: one example per target of every object that stays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From scenes to what the learners see: relations, rows and situations, once for all targets (design §5)."""
+"""From scenes to what the learners see: relations, rows and situations, once for all targets."""
 
 from __future__ import annotations
 
@@ -281,7 +281,7 @@ class Percept:
         contacts = relations.contacts(body)
         gaps = contacts[..., perception.gaps].copy()
         at = perception.approach
-        # Contact facts are facts of touching pairs (design §4): a normal towards something far says nothing.
+        # Contact facts are facts of touching pairs: a normal towards something far says nothing.
         contacts[~relations.touched(body)] = np.nan
         parting = contacts[..., at] > relations.parting(body)
         # Where bodies part, the contact does nothing any more, whichever way it faces: only that they part is said.

@@ -1,4 +1,4 @@
-"""What a model says of the next step: values, and how they came about."""
+"""Predictions of the next step: values, and how they came about."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ __all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
 class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
-    Only `PREDICTED` is a mode's word. With every other outcome the value is a fallback, not a claim: what is
-    unexplained is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes, and so it is
-    where an approximation isn't good (`relgym.model.scope`); or, where modes cover the examples but nothing tells which
-    of them holds when, it is what the vote's winner says; outside experience it is what the mode says that would win
-    the vote; what depends on such a fallback value follows from it; else the property keeps its value.
+    Only `PREDICTED` is the prediction of a mode or a law. With every other outcome the value is a fallback, not a
+    claim: what is unexplained is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes,
+    and so it is where an approximation isn't good (`relgym.model.scope`); or, where modes cover the examples but
+    nothing tells which of them holds when, it is what the vote's winner says; outside experience it is what the mode
+    says that would win the vote; what depends on such a fallback value follows from it; else the property keeps its
+    value.
     """
 
     PREDICTED = "predicted by a mode"
@@ -55,7 +56,7 @@ class Prediction:
         Id of the mode; 0 if none. With `Outcome.UNEXPLAINED` the one that won the vote: its value is no claim, since
         the winner was too often the wrong one (`relgym.model.hindsight`).
     roles
-        Names of the objects that play the mode's roles, the target first.
+        Names of the objects bound to the mode's roles, the target first.
     margin
         Lead of the mode over its runner-up, in log-odds; infinite with a single mode, 0 with none.
     frame
@@ -129,7 +130,7 @@ class BatchPrediction:
     parts
         The (object, property) of each target, in causal order.
     modes
-        Ids of the modes, shape ``(n, len(parts))``; 0 where none said anything.
+        Ids of the modes, shape ``(n, len(parts))``; 0 where none predicted.
     outcomes
         Position in `OUTCOMES`, shape ``(n, len(parts))``.
     margins

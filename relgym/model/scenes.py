@@ -38,7 +38,7 @@ def stays(before: Scene, after: Scene, index: int) -> bool:
 
 
 def mismatch(schema: SceneSchema, known: SceneSchema) -> str:
-    """What keeps a model of one schema from speaking of scenes of another; empty if nothing does."""
+    """Why a model of one schema can't predict scenes of another; empty if it can."""
     if (schema.up, schema.planar) != (known.up, known.planar):
         return f"up={schema.up!r}, planar={schema.planar} instead of up={known.up!r}, planar={known.planar}"
     types = {t.name: t for t in known.types}

@@ -1,11 +1,11 @@
-"""How far modes go: where they speak, and the changes that an approximation may predict.
+"""Where modes are used for prediction, and the largest changes that approximations may predict.
 
-Examples that no mode explains, or comes close to, lie together more often than not: a lander's law of flight says
-nothing of its legs' touch, and far less of a crash, where features lead anywhere; of an end that was seen nine times no
-mode is known yet, and what is known of other ends would promise their prize. A decision tree over the target's own
-numbers and the action's (§3.4.4), of reward and termination over next values too, tells where; there modes don't speak:
-the outcome is `UNEXPLAINED`, and the value a guess (`relgym.model.guess`). And since no law says how far approximations
-and guesses go, they never go far beyond the changes that were seen.
+Examples that no mode explains, or comes close to, lie together more often than not: a lander's law of flight doesn't
+hold when its legs touch, let alone in a crash; an end that was seen nine times has no mode yet, and the modes of other
+ends would predict their rewards for it. A decision tree over the target's own numbers and the action's (§3.4.4), of
+reward and termination over next values too, tells where; there modes aren't used: the outcome is `UNEXPLAINED`, and the
+value a guess (`relgym.model.guess`). And since no law says how far approximations and guesses go, they never go far
+beyond the changes that were seen.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ BEYOND: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """How far what is said of a target goes.
+    """Where modes of a target are used, and how large a change may be.
 
     Attributes
     ----------
@@ -62,13 +62,13 @@ class Scope:
     )
 
     def covers_one(self, x: Sequence[float], signature: SlotSignature) -> bool:
-        """Whether modes speak of one row; they do where a number that the tree looks at isn't there."""
+        """Whether modes are used for one row; they are where a number that the tree tests is missing."""
         if self.tree is None or (places := self.places(signature)) is None:
             return True
         return self.tree.predict_one([x[k] for k in places])
 
     def covers(self, x: NDArray[np.float64], signature: SlotSignature) -> NDArray[np.bool_]:
-        """Whether modes speak of rows ``(n, d)``, shape ``(n,)``; equal to `covers_one` of each."""
+        """Whether modes are used for rows ``(n, d)``, shape ``(n,)``; equal to `covers_one` of each."""
         if self.tree is None or (places := self.places(signature)) is None:
             return np.ones(len(x), dtype=np.bool_)
         return self.tree.predict_batch(x[:, list(places)])
@@ -99,7 +99,7 @@ class Scope:
         return found
 
     def beyond(self) -> tuple[str, ...]:
-        """Tests of the places where modes don't speak: ``py <= 0.1 ∧ left > 0.5``."""
+        """Tests of the places where modes aren't used: ``py <= 0.1 ∧ left > 0.5``."""
         if self.tree is None:
             return ()
         return tuple(self.tree.path(leaf) for leaf in self.tree.leaves if not self.tree.says_yes(leaf))
@@ -139,7 +139,7 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable, *, guessing: bool)
     table
         The rows of the examples.
     guessing
-        Whether a guess stands in where modes don't speak. Then they abstain where they err by more than `CLOSE` of
+        Whether a guess replaces modes that aren't used. Then modes aren't used where they err by more than `CLOSE` of
         what mostly changes; without one only where it is closer to say that nothing changes: a law that is off there is
         better than none.
 

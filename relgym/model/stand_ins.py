@@ -1,4 +1,4 @@
-"""What stands in where modes don't speak: guesses, within what was seen."""
+"""Fallback values where modes aren't used: guesses, within the range of what was seen."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class StandIns(ModeFunctions):
     guesses
         The best guess, where nothing is explained.
     scope
-        Where modes speak, and how far guesses and approximations go.
+        Where modes are used, and how far guesses and approximations go.
     """
 
     def __init__(self, clusterer: ModeClusterer, casting: Casting, config: ModelConfig) -> None:
@@ -65,11 +65,11 @@ class StandIns(ModeFunctions):
 
     @property
     def guess_beyond(self) -> Guess | None:
-        """What stands in where approximations don't speak, if it is known better than the best guess of all."""
+        """The guess used where approximations aren't, if it is better than the best guess of all."""
         return self.guesses.beyond if self._guessable and self.scope.tree is not None else None
 
     def guess_at(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Guess | None:
-        """The guess that speaks of one object of a single scene; arguments as of `predict_one`."""
+        """The guess for one object of a single scene; arguments as of `predict_one`."""
         if self.guess_beyond is None:
             return self.guess
         x = percept.rows(index, following[None], ordered=False)[0].tolist()
@@ -77,7 +77,7 @@ class StandIns(ModeFunctions):
         return self.guess if covered else self.guess_beyond
 
     def beyond(self, percept: Percept, index: int, following: NDArray[np.float64]) -> str:
-        """Tests of the place where no mode speaks, if one object of a single scene lies in one; else empty."""
+        """Tests of the place where modes aren't used, if one object of a single scene lies in one; else empty."""
         row = percept.rows(index, following[None], ordered=False)[0].tolist()
         signature = percept.situation(index).signature
         return "" if self.scope.covers_one(row, signature) else self.scope.place(row, signature)
@@ -85,7 +85,7 @@ class StandIns(ModeFunctions):
     def guessed(
         self, percept: Percept, index: int, following: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
-        """What guesses say of one object of n scenes, shape ``(n,)``, NaN where nobody has one; None if there is none.
+        """What guesses say of one object of n scenes, shape ``(n,)``, NaN where there is none; None if there is none.
 
         Arguments as of `predict_batch`.
         """
@@ -111,7 +111,7 @@ class StandIns(ModeFunctions):
         return None if known[1] is None or known[1].open else known[1]
 
     def within(self, value: float, signature: SlotSignature, row: NDArray[np.float64]) -> float:
-        """What a mode says of a row ``(1, d)``, or as far as approximations go."""
+        """What a mode predicts for a row ``(1, d)``, or as far as approximations go."""
         if not self.clusterer.approximate:
             return value
         return float(self.scope.within(np.array([value]), signature, row, self.clusterer.target)[0])

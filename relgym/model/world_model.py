@@ -1,4 +1,4 @@
-"""The whole model of a world: one property model per target, composed (§1.2.6, design §5)."""
+"""The whole model of a world: one property model per target, composed (§1.2.6)."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 A ball that bounces and a ball that leaves have the same spatial relations; the sign of the relative
 velocity along the contact normal tells them apart (§4.8's main failure). None of the features names an
-axis's or a surface's meaning: they hold for any pair of bodies. They are beyond the thesis (design §4).
+axis's or a surface's meaning: they hold for any pair of bodies. They are beyond the thesis.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One state of the world: its layout, scenes, the objects in them, and transitions between two (design §4).
+"""One state of the world: its layout, scenes, the objects in them, and transitions between two.
 
 A *scene* is one state of the world: the objects that are present, each with its type's property vector. All
 of them share one flat float64 array, the thesis' state vector (§1.2.1): the concatenation of the property

@@ -1,4 +1,4 @@
-"""Spatial relations of all pairs of bodies, extracted from batches of scenes (§3.4; design §4).
+"""Spatial relations of all pairs of bodies, extracted from batches of scenes (§3.4).
 
 Binary relations, for bodies A and B (`BoxRelations` has the exact definitions of those on bounding boxes):
 

@@ -1,4 +1,4 @@
-"""The schema of scenes: which types and objects there may be, and what is declared of them (design §4)."""
+"""The schema of scenes: which types and objects there may be, and what is declared of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["SceneSchema"]
 @refusing_fields(SchemaError)
 @dataclass(frozen=True)
 class SceneSchema:
-    """Everything about a family of scenes that never changes while an env lives (design §4).
+    """Everything about a family of scenes that never changes while an env lives.
 
     Parameters
     ----------

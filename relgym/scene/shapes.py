@@ -1,6 +1,6 @@
 """Canonical shapes of object types: one per type, of unit size; a scene's `sx sy sz` scale them.
 
-A shape lives in the schema, its size and pose in the observation (design §4). Canonical coordinates are
+A shape lives in the schema, its size and pose in the observation. Canonical coordinates are
 scaled by the extents, rotated about the world axes by `rx`, then `ry`, then `rz` (R = Rz Ry Rx), and moved
 to the position. So `sx sy sz` are the full extents along x, y, z before the rotation, for every shape that
 fills the unit cube.

@@ -54,7 +54,7 @@ def test_only_contacts_can_tell_of_a_missing_object() -> None:
     room = next(iter(ball_episodes(alone, seed=100, episodes=1)))
     layout = EPISODE.schema.layout(room.layout.names)
     assert ContactFeatures(EPISODE.schema, "ball").rows(layout, room.vectors).shape == (201, 26)
-    with pytest.raises(SchemaError, match="can't tell who is missing"):
+    with pytest.raises(SchemaError, match="can't tell which is missing"):
         ThesisFeatures(EPISODE.schema, "ball").rows(layout, room.vectors)
 
 

@@ -522,7 +522,7 @@ def test_verdicts_are_finite_numbers(what: str, told: Any) -> None:
     dream = LearnedModelEnv(cart_model(), **{what: lambda *_: told})
     dream.reset(seed=0)
     was = dream.scene
-    with pytest.raises(ConfigError, match=r"of a dreamed step is .*: expected a finite number; mend the"):
+    with pytest.raises(ConfigError, match=r"of a dreamed step is .*: expected a finite number; fix the"):
         dream.step(PUSH)
     assert dream.scene is was
 
@@ -641,7 +641,7 @@ def test_a_reward_that_is_no_number_is_refused_and_nothing_has_changed(
     dream = LearnedModelEnv(cart.model, reward=lambda *_: bad, horizon=1)
     dream.reset(seed=0)
     was = dream.scene
-    with pytest.raises(ConfigError, match="expected a finite number; mend the reward function"):
+    with pytest.raises(ConfigError, match="expected a finite number; fix the reward function"):
         dream.step(PUSH)
     assert dream.scene is was
 
@@ -805,7 +805,11 @@ def test_what_a_file_says_of_the_env_survives(truck: ModelLearner) -> None:
     data = json.loads(json.dumps(record.to_json()))
     assert EnvRecord.from_json(data, truck.model.schema) == record
     assert len(record.starts) == 12
-    assert record.metadata == {"env": "relgym/TruckPush-v0", "render_fps": truck.metadata["render_fps"]}
+    assert record.metadata == {
+        "env": "relgym/TruckPush-v0",
+        "arguments": {"n_boxes": 1, "resample": "step"},
+        "render_fps": truck.metadata["render_fps"],
+    }
 
 
 def test_spaces_survive_json() -> None:

@@ -1,4 +1,4 @@
-"""A model speaks of scenes with other objects of the types it knows, and abstains where it knows nothing."""
+"""A model predicts scenes with other objects of the types it knows, and abstains where it knows nothing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far modes go: where they speak, and the changes that an approximation may predict."""
+"""How far modes go: where they are used, and the changes that an approximation may predict."""
 
 from __future__ import annotations
 

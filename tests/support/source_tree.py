@@ -29,9 +29,9 @@ class Module:
     path: Path
 
     @property
-    def room(self) -> str:
+    def package(self) -> str:
         """The part of relgym it belongs to: ``scene`` for relgym.scene.objects; empty for the façade."""
-        return room_of(self.name)
+        return package_of(self.name)
 
     @property
     def file(self) -> str:
@@ -51,7 +51,7 @@ class Module:
         return tuple(_imports(self.tree))
 
 
-def room_of(name: str) -> str:
+def package_of(name: str) -> str:
     """Second part of a dotted name below relgym; empty for relgym itself."""
     return name.split(".")[1] if "." in name else ""
 

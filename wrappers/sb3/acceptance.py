@@ -1,4 +1,4 @@
-"""Whether to trust a model: decided by how well it predicted what then really happened, with hysteresis."""
+"""Whether a model is good enough to train in: decided by its prequential error, with hysteresis."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One real step, as predicted and as it came.
+    """One real step: how far the prediction was off, and how much changed.
 
     Attributes
     ----------
     residuals
         Observed minus predicted value, by (type or task, property); the largest where several objects have it.
-        Empty where the model didn't speak.
+        Empty where the model made no prediction.
     changes
-        Observed change of the same properties: what a model that says *nothing changes* is off by.
+        Observed change of the same properties: the error of a model that predicts no change.
     """
 
     residuals: Mapping[Key, float]
@@ -49,22 +49,21 @@ class Verdict:
 
 
 class ModelAcceptance:
-    """Opens when a model's prequential error is small, shuts when it has grown large.
+    """Accepts a model when its prequential error is small, and rejects it when the error has grown large.
 
-    The error of a step is the largest ratio, over all properties, of how far the predicted value was off to
-    how far the property usually moves, cut off at 1; the acceptance's error is its mean over the latest steps. A
-    model that says *nothing changes* scores about 1, an exact one 0. Steps of which the model said nothing
-    don't count: nobody dreams them.
+    The error of a step is the largest ratio, over all properties, of the prediction error to how much the property
+    usually changes in a step, clipped at 1; `error` is its mean over the latest steps. A model that predicts no change
+    scores about 1, an exact one 0. Steps that the model doesn't predict don't count: roll-outs end there.
 
     Parameters
     ----------
     accept_at, reject_at
-        The acceptance opens at an error of at most `accept_at` and shuts at one of at least `reject_at`; in between it
-        stays as it is.
+        The model is accepted at an error of at most `accept_at` and rejected at one of at least `reject_at`; in between
+        nothing changes.
     window
         How many of the latest steps count.
     least
-        With fewer of them the acceptance stays shut.
+        With fewer of them the model isn't accepted.
 
     Examples
     --------
@@ -84,31 +83,31 @@ class ModelAcceptance:
         self.accepted = False
         self.switches = 0
         self._errors: deque[float] = deque(maxlen=window)
-        self._spoke: deque[bool] = deque(maxlen=window)
+        self._predicted: deque[bool] = deque(maxlen=window)
         self._spreads: dict[Key, Spread] = {}
 
     @property
     def error(self) -> float:
-        """Mean error of the latest steps that the model spoke of; 1 while it hasn't spoken."""
+        """Mean error of the latest steps that the model predicted; 1 while there are none."""
         return sum(self._errors) / len(self._errors) if self._errors else 1.0
 
     @property
     def known(self) -> float:
-        """Share of the latest steps that the model spoke of."""
-        return sum(self._spoke) / len(self._spoke) if self._spoke else 0.0
+        """Share of the latest steps that the model predicted."""
+        return sum(self._predicted) / len(self._predicted) if self._predicted else 0.0
 
     def count(self, verdict: Verdict) -> None:
-        """Take up one real step; `accepted` is up to date afterwards."""
+        """Count one real step; `accepted` is up to date afterwards."""
         for key, change in verdict.changes.items():
             self._spreads.setdefault(key, Spread()).add(change)
-        self._spoke.append(bool(verdict.residuals))
+        self._predicted.append(bool(verdict.residuals))
         if verdict.residuals:
             self._errors.append(max(self._ratio(key, off) for key, off in verdict.residuals.items()))
         self._decide()
 
     def _ratio(self, key: Key, off: float) -> float:
         scale = self._spreads[key].scale if key in self._spreads else 0.0
-        if scale == 0.0:  # it never moved: any error is a whole one
+        if scale == 0.0:  # it never changed: any error counts as 1
             return float(abs(off) > 1e-9)
         return min(1.0, abs(off) / scale)
 

@@ -15,57 +15,57 @@ __all__ = ["DynaConfig", "checked_config"]
 
 @dataclass(frozen=True, slots=True)
 class DynaConfig:
-    """How an agent trains in its model while it acts in the world.
+    """Parameters of `Dyna`: how an agent trains in its model while it acts in the world.
 
     Parameters
     ----------
     real_ratio
-        Share of every batch that really happened, 0 to 1. 0.05 is MBPO's; raising it costs the model's help.
+        Share of real transitions in every batch, 0 to 1. 0.05 is MBPO's; raising it uses the model less.
     horizon
-        Decisions that a dream lasts at most, at least 1: the k of k-step branches. Dreams from first scenes
-        last as long, so that with the task's time limit as horizon they are whole episodes.
+        Length of a roll-out in decisions, at least 1: the k of k-step branches. With the task's time limit as horizon,
+        roll-outs from first scenes are whole episodes.
     from_start
-        Share of the dreams that begin in first scenes of episodes; the others branch off anywhere.
+        Share of the roll-outs that begin in first scenes of episodes; the others begin in any scene that was seen.
     dreams
-        How many scenes are dreamed on at once. Raising it refreshes the imagined transitions faster.
+        How many roll-outs are made at once. Raising it refreshes the imagined transitions faster.
     every
-        Real steps between two rounds of dreams.
+        Real steps between two rounds of roll-outs.
     capacity
-        How many imagined transitions are kept, the latest. Small enough that those of old policies and
-        models are soon forgotten.
+        How many imagined transitions are kept, the latest. It should be small enough that those of old policies and
+        models are soon dropped.
     updates, updates_alone
-        Gradient steps per real step while the model is accepted, and while it isn't; the latter none: as many as
-        the algorithm was made for.
+        Gradient steps per real step while the model is accepted, and while it isn't; ``None`` for the latter: as many
+        as the algorithm was made with.
     catch_up
-        Gradient steps at once, in fresh dreams all the while, the first time that the model is accepted and the
-        algorithm's random steps are over, and again whenever a learned reward model has come to know of another reward
-        or end (`LearnedRewardModel.verdicts`); 0: none. A model of few objects is often exact long before real steps at
-        `updates` each have trained a policy: raising it trades computing for real steps. Should hold `updates` *
-        `every`, a round of dreams, many times.
+        Catch-up updates: gradient steps made at once, with fresh roll-outs throughout, the first time that the model is
+        accepted and the algorithm's random steps are over, and again whenever a learned reward model has learned
+        another reward or end (`LearnedRewardModel.verdicts`); 0: none. A model of few objects is often exact long
+        before real steps at `updates` each have trained a policy: raising it trades computing time for real steps. It
+        should be many times `updates` * `every`, which belong to one round of roll-outs.
     permute
-        Whether dreams exchange the roles of objects of one type. The model licenses that, a net doesn't.
+        Whether objects of one type are exchanged in the scenes where roll-outs begin. A relational model is invariant
+        to that, a neural net isn't.
     resample
-        Whether dreams resample properties of bodiless objects that no law but their own mentions, between the
-        smallest and the largest value seen at the start of episodes. The model licenses that too; where nothing has a
-        body, nothing is resampled.
+        Whether properties of bodiless objects that no law but their own mentions are drawn anew where roll-outs begin,
+        between the smallest and the largest value seen at the start of episodes. Where nothing has a body, nothing is
+        resampled.
     perturb_velocity
-        Share of the dreams in which moving bodies begin with other velocities, up to twice as fast as they were ever
-        seen. So dreams get where no real step has led yet: exploring starts (Sutton & Barto 2018, §5.3), which the
-        world doesn't offer and a model does. Helps where a goal lies behind what only a fast body gets over.
+        Share of the roll-outs that begin with other velocities of moving bodies, up to twice as fast as were ever seen:
+        exploring starts (Sutton & Barto 2018, §5.3). Helps where only a fast body reaches the goal.
     shuffle
-        The model learns transitions in random order, out of a stock of so many. What stays the same
-        throughout an episode would otherwise pass for a law; 0: as they come.
+        The model learns transitions in random order, out of a buffer of so many; 0: as they come. In order, what is
+        constant within an episode could be taken for a law.
     accept_at, reject_at
-        The model is accepted when its prequential error falls to `accept_at`, until it rises to `reject_at`
+        The model is accepted when its prequential error falls to `accept_at`, and rejected when it rises to `reject_at`
         (`ModelAcceptance`).
     renew
-        A model that was accepted and is no more gets a replacement that learns the same steps from nothing, and
-        takes its place if it is accepted first (`ModelTrainer`); one that isn't accepted within so many real steps
-        begins anew. 0: no replacements.
+        Beside a model that was accepted and then rejected, a replacement learns the same steps from nothing, and takes
+        its place if it is accepted first (`ModelTrainer`). A replacement that isn't accepted within so many real steps
+        starts anew. 0: no replacements.
     window, least
-        Latest real steps that the error is a mean of, and how many there must be.
+        The error is a mean over so many of the latest real steps; with fewer than `least` the model isn't accepted.
     seed
-        Of everything that dreams draw.
+        Seed of everything that is drawn for roll-outs.
     """
 
     real_ratio: float = 0.05

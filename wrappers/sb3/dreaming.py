@@ -1,4 +1,4 @@
-"""Training inside the dream: a vector env for on-policy algorithms, and check-ups in the real world."""
+"""Training in model roll-outs alone: a vector env for any algorithm, and check-ups in the real world."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["DreamCheckup", "DreamVecEnv", "explore"]
 
 
 def explore(trainer: ModelTrainer, env: gym.Env[Any, Any], steps: int, *, seed: int) -> None:
-    """Let a model watch random actions in the real world.
+    """Let a model learn from random actions in the real env.
 
     Parameters
     ----------
@@ -57,10 +57,10 @@ def explore(trainer: ModelTrainer, env: gym.Env[Any, Any], steps: int, *, seed: 
 
 
 class DreamVecEnv(VecEnv):  # type: ignore[misc]
-    """Many dreams at once, as a vector env of Stable-Baselines3 in which any of its algorithms can train.
+    """Many model roll-outs (dreams) at once, as a vector env in which any algorithm of Stable-Baselines3 can train.
 
-    Dreams begin in scenes that were really seen, varied as far as the model licenses, and end like real
-    episodes; or when the horizon is reached, or where the model doesn't know on: then they count as truncated.
+    Dreams begin in scenes that were seen, varied as `DynaConfig` says, and end like real episodes; or they are
+    truncated, when the horizon is reached or the model makes no prediction.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
         return [getattr(self, method_name)(*args, **kwargs) for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Dreams have no wrappers: the lens does what they do."""
+        """Dreams have no wrappers; `Lens` does what they would do."""
         return [False for _ in self._get_indices(indices)]
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
@@ -168,15 +168,15 @@ class DreamVecEnv(VecEnv):  # type: ignore[misc]
 
 
 class DreamCheckup(BaseCallback):  # type: ignore[misc]
-    """Lets an agent that trains in its dream act in the real world now and then.
+    """Tests an agent that trains in dreams in the real env now and then.
 
-    The model predicts every real step, is evaluated by it and learns from it. Once it is accepted no more,
-    training stops, with a warning: what an agent learns in a dream gone wrong is worth nothing.
+    The model predicts each real step, is compared with it and learns from it. Once it is rejected, training stops with
+    a warning: what an agent learns in a wrong model is worth nothing.
 
     Parameters
     ----------
     trainer
-        The model at work.
+        The trainer of the model.
     env
         The real env, in the wrappers that the dream imitates.
     every
@@ -189,7 +189,7 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
     Attributes
     ----------
     history : list of (int, int, float, float)
-        Of every check-up: dreamed steps, real steps so far, share of successes, the acceptance's error.
+        Of every check-up: imagined steps, real steps so far, share of successes, the model's prequential error.
 
     Raises
     ------
@@ -226,7 +226,7 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
             raise ConfigError(
                 f"the model isn't accepted: its error is {acceptance.error:.3g}, it is accepted at "
                 f"{acceptance.accept_at:g}, and it predicted {acceptance.known:.0%} of the latest real steps: let it "
-                "watch more of them (explore) before an agent trains in its dreams"
+                "learn from more of them (explore) before an agent trains in it"
             )
         if (
             self.history and self.num_timesteps < self.history[-1][0]
@@ -247,8 +247,8 @@ class DreamCheckup(BaseCallback):  # type: ignore[misc]
         self.logger.record("relgym/error", acceptance.error)
         if not acceptance.accepted:
             warnings.warn(
-                f"training stops after {self.num_timesteps} dreamed steps: the model's error in the real world is "
-                f"{acceptance.error:.3g}, and it is accepted no more from {acceptance.reject_at:g} on",
+                f"training stops after {self.num_timesteps} imagined steps: the model's error in the real world is "
+                f"{acceptance.error:.3g}, and from {acceptance.reject_at:g} on it is rejected",
                 stacklevel=2,
             )
         return acceptance.accepted

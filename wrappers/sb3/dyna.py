@@ -34,10 +34,10 @@ _SHORT: Final = 500
 class Dyna(BaseCallback):  # type: ignore[misc]
     """Lets SAC, TD3 or DQN train in a model that learns while they act.
 
-    At every real step the model predicts it, is evaluated by what happened, and learns. While its prequential
-    error is small (`ModelAcceptance`), every few steps the policy dreams on from scenes that were seen, and batches
-    mix what it dreamed with what was real. While it isn't, the algorithm is the one that Stable-Baselines3
-    ships.
+    Before each real step the model predicts what will follow; the prediction is compared with what happens, and then
+    the model learns. While its prequential error is small (`ModelAcceptance`), the policy is rolled out in the model
+    every few steps, from scenes that were seen, and the algorithm's batches mix imagined with real transitions. While
+    it is large, the algorithm runs exactly as Stable-Baselines3 ships it.
 
     Parameters
     ----------
@@ -46,8 +46,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     config
         Free parameters.
     reward_model
-        Reward and termination of dreams; default: the env's own ``task``. ``"learned"``: by what a neural model learns
-        of them with the rest, or beside any other by a `LearnedRewardModel`.
+        Reward and termination of imagined steps; default: the env's own ``task``. ``"learned"``: a neural model
+        predicts them itself, and beside any other model a `LearnedRewardModel` learns them.
     like
         An env in the same wrappers as those that the agent acts in; needed where these run in other
         processes.
@@ -57,9 +57,9 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     Raises
     ------
     ConfigError
-        When training begins: an algorithm that isn't off-policy, a replay buffer that can't mix or discounts otherwise,
-        an env without a `TransitionRecorder`, spaces or schemas that don't match, no reward function. While it goes on:
-        a reward function that returns NaN.
+        When training begins: an algorithm that isn't off-policy, a replay buffer that can't mix or has another
+        discount, an env without a `TransitionRecorder`, spaces or schemas that don't match, no reward function. While
+        it goes on: a reward function that returns NaN.
     QueryError
         A frozen model that knows none of its targets.
 
@@ -69,8 +69,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
     ``relgym/dreams_known``, ``relgym/renewals`` (how often a replacement took the model's place: `ModelTrainer`),
     ``relgym/learning_seconds`` and ``relgym/dreaming_seconds``.
 
-    The model that was passed stays that of the world it learned: where a replacement has taken its place,
-    that is `world`.
+    A model that is replaced is left as it is: `world` is the one that is used now.
 
     Examples
     --------
@@ -112,12 +111,12 @@ class Dyna(BaseCallback):  # type: ignore[misc]
 
     @property
     def world(self) -> DreamModel:
-        """The model at work: the one that was given, until a replacement takes its place (`ModelTrainer`)."""
+        """The model in use: the one that was passed, until a replacement takes its place (`ModelTrainer`)."""
         return self._given if self._trainer is None else self._trainer.model
 
     @property
     def trainer(self) -> ModelTrainer:
-        """The model at work: acceptance, stock of scenes, time spent; `ConfigError` before training began."""
+        """The model's trainer: acceptance, stock of scenes, time spent; `ConfigError` before training began."""
         if self._trainer is None:
             raise ConfigError("training has not begun: call algorithm.learn(..., callback=dyna) first")
         return self._trainer
@@ -189,7 +188,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self.buffer.accepted = False  # without this callback nobody refreshes what was dreamed
 
     def _begin_anew(self) -> None:
-        """Dream in the model that has taken the other one's place; what was dreamed before is of another world."""
+        """Use the replacement model from now on; what was imagined before belongs to another world."""
         assert self._imagination is not None, "made when training begins"
         self._imagination = Imagination(self.world, self._imagination.lens, self.trainer.reward_model)
         self._renewals, self._made_up = self.trainer.renewals, -1
@@ -199,14 +198,14 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         self.model.gradient_steps, self._lent = self._usual, None
 
     def _complain(self) -> None:
-        """Warn where no dream was ever accepted, with what the learners lack: else it would go unnoticed."""
+        """Warn if the model was never accepted, and say which features it lacks: else it would go unnoticed."""
         acceptance = self.trainer.acceptance
         if acceptance.switches or self.num_timesteps < _SHORT:
             return
         parts: tuple[Any, ...] = (self.world, getattr(self.trainer.reward_model, "model", None))
         lacks = [f"{each.target}: {each}." for p in parts if hasattr(p, "advice") for each in p.advice()]
         warnings.warn(
-            f"the model was never accepted in {self.num_timesteps:,} steps, and nothing was dreamed: its error was "
+            f"the model was never accepted in {self.num_timesteps:,} steps, and nothing was imagined: its error was "
             f"{acceptance.error:.2g}, to be accepted it must fall to {acceptance.accept_at:g}, and it predicted "
             f"{acceptance.known:.0%} of the latest steps. {' '.join(lacks) or 'Give it more steps.'} Features of the "
             "model are switched on in its ModelConfig, those of reward and termination in that of "
@@ -225,7 +224,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         return bool(self.num_timesteps - self._dreamed_at >= self.config.every)
 
     def _awake(self) -> bool:
-        """Whether the algorithm still gathers its first steps, and what is dreamed would be stale before use."""
+        """Whether the algorithm is still collecting its first steps: what is imagined now would be stale before use."""
         return bool(self.num_timesteps + self.config.every < self.model.learning_starts)
 
     def _gradient_steps(self, accepted: bool) -> int:
@@ -235,10 +234,10 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         return each * int(self.training_env.num_envs * self.model.train_freq.frequency)
 
     def _catch_up(self, accepted: bool) -> None:
-        """Train at once as much as many real steps would have brought: when the model is first accepted.
+        """Catch-up updates: gradient steps made at once when the model is first accepted.
 
-        And again when the reward model has learned of something else that is paid for or ends episodes: what was
-        dreamed before didn't know of it, nor does the policy that was trained in it.
+        And again when the reward model has learned a reward or an end that it didn't know: neither what was imagined
+        before nor the policy trained on it knows of that.
         """
         if not accepted or self.num_timesteps <= self.model.learning_starts or not self.buffer.size():
             return
@@ -328,14 +327,14 @@ def lens_of(training_env: Any, like: gym.Env[Any, Any] | None) -> Lens:
 def reward_model_of(
     lens: Lens, reward_model: RewardModel | Literal["learned"] | None, model: DreamModel
 ) -> RewardModel:
-    """Reward and termination of dreams: those given, learned ones, or else the env's own."""
+    """The reward model: the one given, a learned one, or else the env's own task."""
     if reward_model is not None:
         return checked_reward_model(reward_model, model, lens.recorder.view.schema, lens.acting)
     recorder = lens.recorder
     task = recorder.get_wrapper_attr("task") if recorder.has_wrapper_attr("task") else None
     if task is None:
         raise ConfigError(
-            "nothing says what a dream is worth: pass reward_model='learned', or reward_model= an object with "
+            "imagined steps have no reward: pass reward_model='learned', or reward_model= an object with "
             "evaluate(layout, before, actions, after), or give the env a task"
         )
     return checked_reward_model(task, model, recorder.view.schema)

@@ -1,4 +1,4 @@
-"""Dreams by the hundred: a policy acts in scenes that a model predicts, and a task evaluates."""
+"""Model roll-outs by the hundred: a policy acts in predicted scenes, and a reward model gives rewards and ends."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Imagined:
     terminated
         Where the task said that the episode was over, shape ``(m,)``.
     cut
-        Where a dream ended for another reason: its time was up, or the model didn't know on. Shape ``(m,)``.
+        Where a roll-out was truncated: at the horizon, or where the model made no prediction. Shape ``(m,)``.
     known
-        Share of the decisions that the model could follow.
+        Share of the decisions that the model could predict.
     """
 
     observations: Observations
@@ -79,9 +79,8 @@ class Imagination:
 
     Notes
     -----
-    A dream ends where the model doesn't speak or leaves the observation space: that step isn't kept, and the
-    one before it counts as cut off, never as terminated. Cost: one `predict_batch` per env step for all
-    dreams together.
+    A dream ends where the model makes no prediction or leaves the observation space: that step isn't kept, and the one
+    before it counts as truncated, never as terminated. Cost: one `predict_batch` per env step for all dreams together.
     """
 
     def __init__(self, model: DreamModel, lens: Lens, reward_model: RewardModel) -> None:
@@ -105,7 +104,7 @@ class Imagination:
 
         Returns
         -------
-        None if the model didn't know a single step.
+        None if the model predicted no step at all.
 
         Raises
         ------
@@ -136,7 +135,7 @@ class Imagination:
         seen: Observations,
         policy: Policy,
     ) -> tuple[_Step, Float2D]:
-        """One decision in every dream; those that the model can't follow drop out."""
+        """One decision in every dream; those that the model can't predict drop out."""
         actions, kept = policy(seen)
         after, rewards, ended, known = self.follow(layout, vectors, self.lens.actions(actions))
         following = self.lens.observations(layout, after)
@@ -160,8 +159,8 @@ class Imagination:
 
         Returns
         -------
-        State vectors, rewards, where the episode ended, and where the model knew. What it didn't know of
-        stays where it was.
+        State vectors, rewards, where the episode ended, and where the model made a prediction; elsewhere the state
+        stays as it was.
         """
         after, rewards = vectors.copy(), np.zeros(len(vectors))
         ended, known = np.zeros(len(vectors), dtype=bool), np.ones(len(vectors), dtype=bool)
@@ -170,14 +169,14 @@ class Imagination:
             if not len(going):
                 break
             before, done = after[going], actions[going]
-            following, spoke = self._predict(layout, before, done)
+            following, predicted = self._predict(layout, before, done)
             evaluated = self.reward_model.evaluate(layout, before, done, following)
             if getattr(self.reward_model, "learned", False):
-                spoke &= np.isfinite(evaluated.rewards)
-            check_rewards(evaluated.rewards[spoke], self.reward_model)
-            after[going] = np.where(spoke[:, None], following, before)
-            rewards[going] += np.where(spoke, evaluated.rewards, 0.0)
-            ended[going], known[going] = evaluated.terminated & spoke, spoke
+                predicted &= np.isfinite(evaluated.rewards)
+            check_rewards(evaluated.rewards[predicted], self.reward_model)
+            after[going] = np.where(predicted[:, None], following, before)
+            rewards[going] += np.where(predicted, evaluated.rewards, 0.0)
+            ended[going], known[going] = evaluated.terminated & predicted, predicted
         return after, rewards, ended, known
 
     def _predict(
@@ -192,7 +191,7 @@ class Imagination:
 
 
 def _collected(steps: list[_Step], asked: int) -> Imagined | None:
-    """The steps in the order of their dreams; the last of each that didn't terminate counts as cut."""
+    """The steps in the order of their dreams; the last of each that didn't terminate counts as truncated."""
     dreams = np.concatenate([step.dreams for step in steps])
     if not len(dreams):
         return None

@@ -46,8 +46,8 @@ class Lens:
     Raises
     ------
     ConfigError
-        No recorder, or outside it a wrapper that changes rewards, or a space in a way that nobody can follow, or that
-        shows or does what depends on earlier steps (`gymnasium.wrappers.DelayObservation`).
+        No recorder, or outside it a wrapper that changes rewards, or a space in a way that can't be computed for
+        predicted scenes, or that depends on earlier steps (`gymnasium.wrappers.DelayObservation`).
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
@@ -78,8 +78,8 @@ class Lens:
         own = vars(layer).get("num_repeats" if gymnasiums else "repeat")
         if isinstance(layer, _REWARDING):
             raise ConfigError(
-                f"{type(layer).__name__} changes rewards outside the TransitionRecorder, where dreams would be paid "
-                "otherwise: put it inside, and pass reward_model='learned' or a reward model that pays as it does"
+                f"{type(layer).__name__} changes rewards outside the TransitionRecorder, where dreams would "
+                "get other rewards: put it inside, and pass reward_model='learned' or a reward model that does the same"
             )
         if isinstance(own, int):
             self.repeat *= own
@@ -91,7 +91,7 @@ class Lens:
             layer.env.action_space,
         ):
             raise ConfigError(
-                f"{type(layer).__name__} changes a space, and nobody knows how a dream could follow: make it a "
+                f"{type(layer).__name__} changes a space, and a dream can't do the same: make it a "
                 "gymnasium.ObservationWrapper or ActionWrapper, or put it inside the TransitionRecorder"
             )
 
@@ -154,13 +154,13 @@ class Lens:
 def _refuse_memory(layer: gym.Wrapper[Any, Any, Any, Any]) -> None:
     """Raise `ConfigError` for a wrapper that keeps what happens in an episode: it would mix up dreams and the world.
 
-    Who has nothing to keep has nothing to do at a reset but what the base class does.
+    A wrapper without memory needs no `reset` of its own.
     """
     base = gym.ObservationWrapper if isinstance(layer, gym.ObservationWrapper) else gym.ActionWrapper
     if type(layer).reset is not base.reset:
         raise ConfigError(
-            f"{type(layer).__name__} keeps count of the real episode (it has a reset of its own), and nobody knows how "
-            "a dream could follow: put it inside the TransitionRecorder"
+            f"{type(layer).__name__} keeps count of the real episode (it has a reset of its own), and a dream "
+            "can't do the same: put it inside the TransitionRecorder"
         )
 
 
@@ -179,7 +179,7 @@ def _stacked(seen: list[Any]) -> Observations:
 
 @contextmanager
 def _still(layers: list[Any]) -> Iterator[None]:
-    """Keep wrappers that learn from what they show, such as NormalizeObservation, from learning of dreams."""
+    """Keep wrappers that learn from observations, such as NormalizeObservation, from learning from imagined ones."""
     learning = [layer for layer in layers if getattr(layer, "update_running_mean", False)]
     for layer in learning:
         layer.update_running_mean = False

@@ -20,8 +20,8 @@ __all__ = ["PermutedReplay"]
 class PermutedReplay(BaseCallback):  # type: ignore[misc]
     """Stores every real transition several times more, with objects of the same type renamed.
 
-    It is the part of a relational model's licence that holds without a model: names mean nothing. Which object
-    stands where is another matter (`relgym.wrappers.sb3.stock.permuted`).
+    This holds without a model: names of objects mean nothing. Exchanging which object stands where needs a model
+    (`relgym.wrappers.sb3.stock.permuted`).
 
     Parameters
     ----------

@@ -49,11 +49,11 @@ class Experience:
 
 
 class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
-    """Keeps the latest 10,000 steps until somebody takes them; what the env returns stays as it is.
+    """Records the latest 10,000 steps until `take` is called; what the env returns stays as it is.
 
-    It goes directly round an env, inside all wrappers that change observations or actions: what these hide, scale or
-    repeat, the model sees as it is. Where observations aren't scenes they are seen as one object of numbers, or one per
-    key, or as `view` says.
+    It goes directly round an env, inside all wrappers that change observations or actions: the model learns from what
+    lies inside, unscaled and unrepeated. Where observations aren't scenes they are seen as one object of numbers, or
+    one per key, or as `view` says.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Who says what a dreamed step is worth: the env's own task, or what was learned of it."""
+"""Reward models: reward and termination of imagined steps, learned from real ones or predicted by a neural model."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _REVIEW: Final = 10
 class RewardModel(Protocol):
     """Reward and termination of n steps; a `relgym.envs.tasks.Task` is one.
 
-    One that learns says so (``learned = True``): where it doesn't know, its rewards are NaN. Of any other NaN is an
+    A reward model with ``learned = True`` gives NaN where it has not learned the reward; from any other, NaN is an
     error.
     """
 
@@ -62,16 +62,16 @@ def check_rewards(rewards: NDArray[np.float64], reward_model: RewardModel) -> No
     if not np.isfinite(rewards).all():
         bad = rewards[~np.isfinite(rewards)][0]
         raise ConfigError(
-            f"{type(reward_model).__name__} gave a reward of {bad}: expected finite numbers; mend the reward function"
+            f"{type(reward_model).__name__} gave a reward of {bad}: expected finite numbers; fix the reward function"
         )
 
 
 class LearnedRewardModel(RewardFunctions):
     """Learns reward and termination as properties of the bodiless object `task`, with modes and clauses.
 
-    They are functions of the scene, the action and the next scene, so the reward model's own little world has no
-    bodies: an object ``now`` with the properties of all objects that are the only one of their type, an object
-    ``next`` with those of them that change, the action, and the task.
+    They are functions of the scene, the action and the next scene. So its model has a schema of its own, without
+    bodies: an object ``now`` with the properties of all objects that are the only one of their type, an object ``next``
+    with those of them that change, the action, and the task.
 
     Parameters
     ----------
@@ -80,10 +80,9 @@ class LearnedRewardModel(RewardFunctions):
     changing
         (type, property) pairs that change.
     config
-        Free parameters of the model; laws of motion have nothing to say here.
+        Parameters of the model; laws of motion don't apply.
     acting
-        Puts actions into scenes; default: as the env does in which `Dyna` or `explore` let it predict rewards, else by
-        the schema's affine maps.
+        Puts actions into scenes; default: as the env of `Dyna` or `explore` does, else by the schema's affine maps.
 
     Attributes
     ----------
@@ -92,16 +91,16 @@ class LearnedRewardModel(RewardFunctions):
 
     Notes
     -----
-    What depends on one among several objects of a type can't be learned so.
+    A reward that depends on one among several objects of a type can't be learned.
 
     It evaluates steps as an env's task does, so `LearnedModelEnv` takes it as its ``task``. Where nothing is known,
     rewards are NaN.
 
     The reward may depend on whether the step ends the episode, as a bonus for success does: it is learned given that.
 
-    Policies seek out what a reward model is wrong about. Where the bonus is a mode of its own, its clauses'
-    thresholds and those of termination differ by a hair: in between, it would be paid without an end, again and again.
-    So where the two modes never were right of one and the same real step, the reward model doesn't know.
+    Policies exploit errors of a reward model. The thresholds learned for a bonus and for termination differ slightly:
+    in between, the bonus would be paid without an end, again and again. So where a mode of the reward and one of
+    termination were never right of the same real step, the reward is NaN.
     """
 
     learned: Final = True
@@ -135,13 +134,13 @@ class LearnedRewardModel(RewardFunctions):
         self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
 
     def adopt(self, acting: Acting) -> None:
-        """Take over how actions come into scenes, as an env has it, where nobody said so when it was made."""
+        """Put actions into scenes as an env does, unless that was said at construction."""
         self._acting = self._acting or acting
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the reward model to one file, atomically, with all that further learning needs; `load` reads it.
 
-        The file is a model's, of the reward model's own little world: `relgym.WorldModel.load` reads that alone.
+        The file is that of `model`, which `relgym.WorldModel.load` reads, with the rest beside it.
         """
         remembered = {"ends": self._ends, "latest": self._latest, "earlier": self._earlier}
         data: dict[str, Any] = {name: [v.tolist() for v in part] for name, part in remembered.items()}
@@ -157,7 +156,7 @@ class LearnedRewardModel(RewardFunctions):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, acting: Acting | None = None) -> LearnedRewardModel:
-        """Read what `save` wrote: it evaluates and learns on as if it had never been saved.
+        """Read what `save` wrote; evaluating and learning go on as if it had never been saved.
 
         Parameters
         ----------
@@ -169,7 +168,7 @@ class LearnedRewardModel(RewardFunctions):
         Raises
         ------
         ModelFileError
-            No file of a reward model, a damaged one, or one of another version.
+            Not the file of a reward model, a damaged one, or one of another version.
         """
         model, extra = WorldModel.load_with_extra(path)
         if _FILE not in extra:
@@ -222,7 +221,7 @@ class LearnedRewardModel(RewardFunctions):
         return sum(len(self.model.modes(TASK, prop)) for prop in _TOLD)
 
     def learn_step(self, transition: Transition, reward: float, *, terminated: bool) -> None:
-        """Take up what the task said of a real step."""
+        """Learn the reward and the end of a real step."""
         before, after = transition.before, transition.after
         values: dict[str, list[float]] = {
             _NOW: [before[name][prop] for name, prop in self._now],
@@ -253,7 +252,7 @@ class LearnedRewardModel(RewardFunctions):
             self._earlier[place] = oldest
 
     def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
-        """What the modes say; NaN where none does."""
+        """Rewards and ends as modes predict them; NaN where none does."""
         small = self.model.schema.layout()
         vectors = np.zeros((len(before), small.width))
         for k, name in enumerate(small.names):
@@ -274,7 +273,7 @@ class LearnedRewardModel(RewardFunctions):
         return np.array([pair in self._together for pair in _pairs(found)], dtype=bool)
 
     def _right_together(self) -> set[tuple[int, int]]:
-        """Modes of reward and termination that give what was said of some remembered step."""
+        """Modes of reward and termination that are right of some remembered step."""
         lessons = [*self._ends, *self._latest, *self._earlier]
         if not lessons:
             return set()
@@ -341,7 +340,7 @@ class NeuralRewardModel:
         self._acting = self._acting or acting
 
     def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
-        """What the model says; the next scene doesn't matter to it."""
+        """As the model predicts; the next scene isn't used."""
         acting = self._acting or partial(acting_all, self.model.schema)
         rewards, ended = self.model.predict_rewards(*acting(layout, before, actions))
         return TaskOutcome(rewards, ended, np.zeros(len(before), dtype=bool))

@@ -1,4 +1,4 @@
-"""Real scenes to dream on from, and what a model licenses to vary in them."""
+"""Real scenes in which roll-outs begin, and what may be varied in them without leaving what the model knows."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class DreamModel(Protocol):
         """What it predicts."""
 
     def learn_one(self, transition: Transition) -> Any:
-        """Take up one real transition."""
+        """Learn from one real transition."""
 
     def predict_one(self, scene: Scene) -> ScenePrediction:
         """Predict what follows a scene with an action in it."""
@@ -36,7 +36,7 @@ class DreamModel(Protocol):
 
 
 class SceneStock:
-    """Scenes that were seen, the latest of them, by which objects they show.
+    """A buffer of the latest scenes that were seen, grouped by the objects in them.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class SceneStock:
             Which objects they show; default: drawn, as often as each was seen.
         """
         if not self._all:
-            raise ConfigError("no scenes to dream on from: add some that were really seen")
+            raise ConfigError("no scenes to begin roll-outs in: add some that were seen (explore)")
         if layout is None:
             counts = np.array([len(scenes) for scenes in self._all.values()], dtype=np.float64)
             layout = list(self._all)[int(rng.choice(len(counts), p=counts / counts.sum()))]
@@ -99,7 +99,7 @@ class SceneStock:
         rng: np.random.Generator,
         layout: SceneLayout | None = None,
     ) -> tuple[SceneLayout, NDArray[np.float64]]:
-        """Draw n scenes for dreams to begin in, varied as far as `config` says.
+        """Draw n scenes in which roll-outs begin, varied as `config` says.
 
         Parameters
         ----------
@@ -171,8 +171,8 @@ class SceneStock:
 def free_properties(model: DreamModel) -> frozenset[tuple[str, str]]:
     """(type, property) of bodiless objects that no law but its own mentions.
 
-    Action and task apart. A model without readable modes licenses nothing, and so do scenes in which nothing has a
-    body: there bodiless objects are all there is, and one part of their state goes with another.
+    Action and task apart. Empty for a model without modes, and for scenes in which nothing has a body: there the parts
+    of a state depend on each other.
     """
     modes = getattr(model, "modes", None)
     if modes is None or not any(t.has_body for t in model.schema.types):

@@ -1,4 +1,4 @@
-"""A model beside an agent: it predicts every real step, is evaluated by it, and then learns from it."""
+"""Trains a model beside an agent: each real step is predicted, compared with what happened, and then learned from."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ __all__ = ["ModelTrainer", "check_model", "checked_reward_model"]
 
 
 class ModelTrainer:
-    """Predicts, is evaluated, learns; test, then train (Dawid 1984).
+    """Lets a model predict each real step, measures the error, and lets it learn: test, then train (Dawid 1984).
 
-    A model that was accepted and is no more may be one of a world that has changed: what it learned before counts
-    on, and nothing in a scene tells what holds when. So a replacement begins to learn the same steps from nothing, and
-    whichever is accepted first goes on (Gama et al. 2004 begin anew from such a point on).
+    A model that was accepted and then rejected may be one of a world that has changed: its old examples still count,
+    and nothing in a scene tells old from new. So a replacement starts to learn the same steps from nothing, and
+    whichever of the two is accepted first is used from then on (Gama et al. 2004 start anew at such a point).
 
     Parameters
     ----------
     model
-        The model; one that is frozen (``model.frozen``) is evaluated all the same, but doesn't learn, nor does it get a
-        replacement. Replacements need a method ``untaught`` of the model's, as `WorldModel.untaught`.
+        The model. A frozen one (``model.frozen``) is measured too, but neither learns nor is replaced. Replacing needs
+        a method ``untaught``, such as `WorldModel.untaught`.
     reward_model
         Reward and termination; one that learns (`LearnedRewardModel`) learns from every step as it comes.
         ``"learned"``: as for `Dyna`.
@@ -58,11 +58,11 @@ class ModelTrainer:
     Attributes
     ----------
     stock : SceneStock
-        Real scenes to dream on from.
+        Real scenes in which roll-outs begin.
     seconds : float
         Time spent on predicting and learning.
     renewals : int
-        How often a replacement has taken the model's place.
+        How often the model has been replaced.
     """
 
     def __init__(
@@ -82,16 +82,16 @@ class ModelTrainer:
 
     @property
     def model(self) -> DreamModel:
-        """The model at work: the one that was given, until a replacement takes its place."""
+        """The model in use: the one that was passed, until a replacement takes its place."""
         return self._trainee.model
 
     @property
     def acceptance(self) -> ModelAcceptance:
-        """Whether to trust the model."""
+        """Whether the model is accepted."""
         return self._trainee.acceptance
 
     def take_up(self, real: Experience) -> None:
-        """Predict a real step, evaluate the model by it, and learn from it or from an earlier one."""
+        """Predict a real step, compare, and learn from it or from an earlier one."""
         started = perf_counter()
         self.acceptance.count(self._evaluated(self.model, real))
         self.stock.add(real.start, first=real.first)
@@ -99,7 +99,7 @@ class ModelTrainer:
         if replacement is not None:
             replacement.acceptance.count(self._evaluated(replacement.model, real))
         if hasattr(self.reward_model, "learn_step"):
-            # At once: a reward model sees but what is there once, and what there is to learn is rare at first.
+            # At once, not shuffled: rewards and ends are rare at first.
             self.reward_model.learn_step(real.transition, real.reward, terminated=real.terminated)
         self._trainee.learn(real)
         if replacement is not None:
@@ -109,13 +109,13 @@ class ModelTrainer:
         self.seconds += perf_counter() - started
 
     def catch_up(self) -> None:
-        """Learn what is still waiting for its turn; there may be no more steps to wait for."""
+        """Learn from the transitions that are still waiting; there may be no more steps to mix them with."""
         started = perf_counter()
         self._trainee.catch_up()
         self.seconds += perf_counter() - started
 
     def _challenge(self) -> _Trainee | None:
-        """The replacement of a model that was accepted and is no more, if it has one."""
+        """The replacement of a model that was accepted and then rejected, if it has one."""
         patience, own = self._config.renew, self._trainee
         alone = isinstance(self.reward_model, NeuralRewardModel)  # which is the model itself
         if own.acceptance.accepted or not own.acceptance.switches or alone or not (patience and own.learns):
@@ -140,14 +140,14 @@ class ModelTrainer:
                 continue
             for prop in o.type.properties:
                 key, now = (o.type.name, prop), after[o.name][prop]
-                # What changes though no target covers it was predicted to stay.
+                # A property without a target is predicted to stay as it is.
                 if key in moving or (now != o[prop] and prop not in o.type.exogenous):
                     _widen(changes, key, now - o[prop])
                     _widen(residuals, key, now - predicted.scene[o.name][prop])
         if predicted.ok:
             residuals |= self._task_residuals(real, predicted.scene)
-        spoke = predicted.ok and all(map(math.isfinite, residuals.values()))
-        return Verdict(residuals if spoke else {}, changes)
+        known = predicted.ok and all(map(math.isfinite, residuals.values()))
+        return Verdict(residuals if known else {}, changes)
 
     def _task_residuals(self, real: Experience, predicted: Scene) -> dict[Key, float]:
         layout = real.start.layout
@@ -166,7 +166,7 @@ class ModelTrainer:
 
 
 class _Trainee:
-    """A model, whether it is accepted, and the lessons that wait for their turn."""
+    """A model, whether it is accepted, and the transitions that are still to be learned from."""
 
     def __init__(self, model: DreamModel, config: DynaConfig, rng: np.random.Generator) -> None:
         self.model = model
@@ -179,7 +179,7 @@ class _Trainee:
         self._shuffle, self._rng = config.shuffle, rng
 
     def learn(self, real: Experience) -> None:
-        """A stock of `shuffle` experiences is learned from in random order, one for every new one."""
+        """Keep `shuffle` transitions waiting; for each new one learn from a random one of them."""
         self.steps += 1
         if not self.learns:
             return
@@ -190,7 +190,7 @@ class _Trainee:
             self._teach(self._waiting.pop())
 
     def catch_up(self) -> None:
-        """Learn all that waits."""
+        """Learn from all that are waiting."""
         for k in self._rng.permutation(len(self._waiting)).tolist():
             self._teach(self._waiting[k])
         self._waiting.clear()
@@ -205,21 +205,21 @@ class _Trainee:
 def checked_reward_model(
     reward_model: Any, model: DreamModel, schema: SceneSchema, acting: Acting | None = None
 ) -> RewardModel:
-    """A reward model, made where it is to be ``"learned"``.
+    """The reward model that an argument stands for; ``"learned"`` makes one.
 
     Parameters
     ----------
     reward_model
         What the user passed.
     model
-        Whose dreams are evaluated.
+        The model whose roll-outs it is for.
     schema, acting
         Of the scenes, as `LearnedRewardModel` takes them.
 
     Raises
     ------
     ConfigError
-        It can't say what steps are worth.
+        It has no method ``evaluate``.
     """
     if isinstance(reward_model, str) and reward_model == "learned":
         if hasattr(model, "predict_rewards"):
@@ -240,23 +240,23 @@ def checked_reward_model(
 
 
 def check_model(model: Any, lens: Lens, *, at_once: bool = False) -> None:
-    """Raise an error unless a model can speak of the env's scenes.
+    """Raise an error unless a model can predict the env's scenes.
 
     Parameters
     ----------
     model
         The model.
     lens
-        What it is to speak of.
+        What the agent sees and does.
     at_once
-        Whether dreams begin before it has learned any more.
+        Whether roll-outs begin before it has learned any more.
 
     Raises
     ------
     ConfigError
         It isn't a model, or one of other scenes.
     QueryError
-        It knows none of its targets, and can't learn or is to be dreamed in at once.
+        It knows none of its targets, and can't learn or is needed at once.
     """
     missing = [
         name for name in ("schema", "targets", "predict_one", "predict_batch") if not hasattr(model, name)
@@ -275,7 +275,7 @@ def check_model(model: Any, lens: Lens, *, at_once: bool = False) -> None:
     if frozen and not model.targets:
         raise ConfigError(
             "the model knows none of the targets and can't learn (it was loaded without its history): load one that "
-            "was taught, or save with history=True"
+            "has learned, or save with history=True"
         )
 
 

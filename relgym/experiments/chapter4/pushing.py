@@ -51,7 +51,7 @@ def lesson(*, learner: str, seed: int, repeats: int = 2) -> dict[str, Any]:
 
 
 def _config(learner: str) -> ModelConfig:
-    """The learner's, but clauses may speak of every object.
+    """The learner's, but clauses may mention every object.
 
     Table 3.2 tells stacks of three by a box on one that the truck doesn't touch: no clause about what it touches can.
     """

@@ -2,7 +2,7 @@
 
 Geometry keeps components first and scenes last: ``(d, ..., n)``. Every sum is written out element by
 element. A BLAS product, `einsum` or `sum` may group terms differently for different batch sizes, and then a
-scene's result would depend on its company (design §4: single and batched prediction agree bit for bit).
+scene's result would depend on its company (single and batched prediction agree bit for bit).
 """
 
 from __future__ import annotations

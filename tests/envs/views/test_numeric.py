@@ -203,7 +203,7 @@ def test_an_angle_that_leaves_the_circle_was_none() -> None:
     [
         (np.array([1.0, np.nan, 0.0, 0.0]), "'self', number 'x1': expected a finite number, got nan"),
         (np.array([1.0, 0.0, -np.inf, 0.0]), "number 'x2': expected a finite number, got -inf"),
-        (np.zeros(3), r"expected 4 numbers.*got an array of shape \(3,\); mend the env's observation_space"),
+        (np.zeros(3), r"expected 4 numbers.*got an array of shape \(3,\); fix the env's observation_space"),
         (np.zeros((2, 2)), r"shape \(2, 2\)"),
         ("four", "expected numbers, got 'four'"),
         (None, "expected"),

@@ -103,13 +103,13 @@ def test_training_stops_when_the_model_is_accepted_no_more() -> None:
     model.model.off = 2.0  # type: ignore[attr-defined]  # the world is another now
     agent = PPO("MlpPolicy", env, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
     with pytest.warns(
-        UserWarning, match=r"training stops after \d+ dreamed steps: .* accepted no more from 0.2"
+        UserWarning, match=r"training stops after \d+ imagined steps: .* from 0.2 on it is rejected"
     ):
         agent.learn(1_000, callback=check)
     assert agent.num_timesteps < 100
     assert not model.acceptance.accepted
     with pytest.raises(
-        ConfigError, match=r"the model isn't accepted: .*let it watch more of them \(explore\)"
+        ConfigError, match=r"the model isn't accepted: .*let it learn from more of them \(explore\)"
     ):
         agent.learn(1_000, callback=check)
 
@@ -187,7 +187,7 @@ def test_a_task_can_be_learned_while_exploring() -> None:
 def test_refusals_name_the_remedy() -> None:
     from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv, explore
 
-    with pytest.raises(ConfigError, match="no scenes to dream on from"):
+    with pytest.raises(ConfigError, match="no scenes to begin roll-outs in"):
         DreamVecEnv(ModelTrainer(LineModel(), LineTask(), QUICK), world())
     with pytest.raises(ConfigError, match="num_envs=0: expected at least 1"):
         DreamVecEnv(trainer(), world(), num_envs=0)

@@ -456,7 +456,7 @@ def test_refusals_name_the_remedy() -> None:
         by_episode.learn(5, callback=Dyna(LineModel()))
     taskless = flat()
     taskless.unwrapped.task = None  # type: ignore[attr-defined]
-    with pytest.raises(ConfigError, match="nothing says what a dream is worth"):
+    with pytest.raises(ConfigError, match="imagined steps have no reward"):
         refused(taskless)
     with pytest.raises(ConfigError, match=r"object is no model to dream with: it lacks \['schema'"):
         refused(flat(), object())
@@ -491,7 +491,7 @@ def test_a_reward_that_is_no_number_is_said_to_be_none() -> None:
             never = np.zeros(len(after), dtype=bool)
             return TaskOutcome(np.full(len(after), np.nan), never, never)
 
-    with pytest.raises(ConfigError, match=r"Odd gave a reward of nan: .*mend the reward function"):
+    with pytest.raises(ConfigError, match=r"Odd gave a reward of nan: .*fix the reward function"):
         refused(flat(), reward_model=Odd())
 
 

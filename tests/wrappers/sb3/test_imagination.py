@@ -114,7 +114,7 @@ class _Broken:
 def test_errors_name_the_remedy() -> None:
     with pytest.raises(ConfigError, match="horizon=0: expected at least 1 decision"):
         imagination().dream(LAYOUT, vectors(0.0), forwards, horizon=0)
-    with pytest.raises(ConfigError, match=r"_Broken gave a reward of nan.*mend the reward function"):
+    with pytest.raises(ConfigError, match=r"_Broken gave a reward of nan.*fix the reward function"):
         imagination(reward_model=_Broken()).dream(LAYOUT, vectors(0.0), forwards, horizon=1)
     with pytest.raises(ConfigError, match="has no TransitionRecorder: put one directly round the bare env"):
         Lens(Flat(LineEnv()))

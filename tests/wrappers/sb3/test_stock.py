@@ -1,4 +1,4 @@
-"""Scenes to dream on from: drawn, permuted and resampled without leaving what the model licenses."""
+"""Scenes in which roll-outs begin: drawn, permuted and resampled without leaving what the model knows."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_forgets_the_oldest(rng: np.random.Generator) -> None:
 
 
 def test_nothing_to_draw_from(rng: np.random.Generator) -> None:
-    with pytest.raises(ConfigError, match="no scenes to dream on from"):
+    with pytest.raises(ConfigError, match="no scenes to begin roll-outs in"):
         SceneStock().draw(1, from_start=0.5, rng=rng)
     with pytest.raises(ConfigError, match="capacity=0: expected at least 1"):
         SceneStock(capacity=0)

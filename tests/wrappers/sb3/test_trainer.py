@@ -47,7 +47,7 @@ def test_only_a_model_of_this_world_is_accepted(halved: bool, rng: np.random.Gen
     for real in steps(200, seed=2):
         trainer.take_up(real)
         opened.append(trainer.acceptance.accepted)
-    assert trainer.acceptance.known > 0.95  # it speaks with as much confidence
+    assert trainer.acceptance.known > 0.95  # it predicts as many of them
     assert any(opened) is not halved
     assert (trainer.acceptance.error > 0.25) is halved
     assert model.seen == seen  # a frozen model is evaluated, and learns nothing

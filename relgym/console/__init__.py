@@ -1,0 +1,1 @@
+"""What the commands of ``relgym`` do, behind the declarations of their options in `relgym.cli`."""
