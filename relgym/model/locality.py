@@ -77,8 +77,8 @@ def check_size(parts: Parts, layout: SceneLayout) -> None:
     if movers * bodies > MOST_MOVERS:
         raise ConfigError(
             f"the scene has {bodies} bodies of more than {NEAREST} types, and {movers} of them are to be learned of: "
-            f"at most {MOST_MOVERS // bodies} of so many; name the targets that matter (targets=['type.property', ...]), "
-            "or give bodies that behave alike one type"
+            f"at most {MOST_MOVERS // bodies} of so many; name the targets that matter "
+            "(targets=['type.property', ...]), or give bodies that behave alike one type"
         )
 
 
