@@ -47,7 +47,7 @@ test-sb3: $(SB3) ## the tests that need Stable-Baselines3 (installs torch)
 	$(PYTEST) -m "sb3 and not slow"
 
 test-cluster: $(DEV) ## the tests that start clusters (installs dask and ray)
-	$(PIP) -e '.[viz,dev,baselines,dask,ray]'
+	$(PIP) -e '.[viz,dev,baselines,dask,ray,minari,pettingzoo]'
 	$(PYTEST) -m cluster
 
 slow: $(DEV)     ## the tests that take minutes
@@ -131,7 +131,7 @@ $(DYNA): $(VIZ)
 	@touch $@
 
 $(DEV): $(VIZ)
-	$(PIP) -e '.[viz,dev,baselines]'
+	$(PIP) -e '.[viz,dev,baselines,minari,pettingzoo]'
 	@touch $@
 
 $(DOCS): $(VIZ)
@@ -139,5 +139,5 @@ $(DOCS): $(VIZ)
 	@touch $@
 
 $(SB3): $(DEV)
-	$(PIP) -e '.[viz,dev,baselines,sb3]'
+	$(PIP) -e '.[viz,dev,baselines,sb3,minari,pettingzoo]'
 	@touch $@

@@ -10,6 +10,8 @@ if __name__ != "relgym.envs":
     )
 
 _HOMES = {
+    "AgentsEnv": "relgym.envs.agents",
+    "AgentsSpace": "relgym.envs.agents",
     "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
     "BallGoalEnv": "relgym.envs.ball_goal",
     "EnvState": "relgym.envs.base",
@@ -27,6 +29,8 @@ _HOMES = {
 """Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""
 
 __all__ = [
+    "AgentsEnv",
+    "AgentsSpace",
     "BallBoxRampEnv",
     "BallGoalEnv",
     "EnvState",

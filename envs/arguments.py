@@ -15,6 +15,7 @@ from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from relgym.config.checks import checked_count
 from relgym.errors import ActionError, ConfigError
 from relgym.scene.objects import Float1D
 from relgym.scene.schema import SceneSchema
@@ -41,13 +42,6 @@ __all__ = [
 
 Coefficient: TypeAlias = float | Mapping[str, float]
 """One number for all objects, or numbers by object name or kind."""
-
-
-def checked_count(what: str, count: Any, least: int, most: int) -> int:
-    """`count` as an int; `ConfigError` unless it is a whole number within the limits."""
-    if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or not least <= count <= most:
-        raise ConfigError(f"{what}={count!r}: expected a whole number from {least} to {most}")
-    return int(count)
 
 
 def checked_least(what: str, value: Any, least: float) -> float:

@@ -88,7 +88,7 @@ class SceneEnv(gym.Env[Observation, Any]):
     schema : SceneSchema
         Constant for the env's life; wrapped envs give it with ``env.get_wrapper_attr("schema")``.
     task : Task or None
-        Reward and termination as pure functions, by which dreams can be evaluated too.
+        Reward and termination as pure functions, which dreams use too.
     flat_spec : FlatSpec
         What flat views of the env show unless told otherwise.
     """

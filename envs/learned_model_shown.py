@@ -12,6 +12,7 @@ from gymnasium.vector.utils import concatenate, create_empty_array
 from numpy.typing import NDArray
 
 from relgym.envs.actions import BatchActions, acting
+from relgym.envs.agents import AgentsSpace
 from relgym.envs.arguments import checked_actions
 from relgym.envs.views import SceneView, TaskView, View
 from relgym.envs.views.base import in_batches_too, is_whole, limits_of
@@ -286,6 +287,11 @@ class ViewDeeds:
     """
 
     def __init__(self, view: View, layout: SceneLayout, space: spaces.Space[Any]) -> None:
+        if isinstance(space, AgentsSpace):
+            raise ConfigError(
+                "dreams of several agents are dreamt one at a time: gym.make('relgym/LearnedModel-v0', ...), or "
+                "gym.vector.SyncVectorEnv of such"
+            )
         self._view, self._space, self._bare = view, space, layout
 
     @cached_property

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from relgym.envs.agents import AgentsSpace
 from relgym.errors import ConfigError, ModelFileError
 
 __all__ = ["space_from_json", "space_to_json"]
@@ -19,15 +20,17 @@ def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        A space other than Box, Discrete, MultiDiscrete, MultiBinary, Dict and Tuple.
+        A space of somebody's own; all of Gymnasium's can be written.
     """
-    if isinstance(space, spaces.Dict):
+    if isinstance(space, (spaces.Dict, spaces.Tuple, spaces.OneOf, spaces.Sequence, spaces.Graph)):
+        return _of_parts(space)
+    if isinstance(space, spaces.Text):
         return {
-            "kind": "dict",
-            "spaces": [[name, space_to_json(part)] for name, part in space.spaces.items()],
+            "kind": "text",
+            "min_length": space.min_length,
+            "max_length": space.max_length,
+            "charset": space.characters,
         }
-    if isinstance(space, spaces.Tuple):
-        return {"kind": "tuple", "spaces": [space_to_json(part) for part in space.spaces]}
     if isinstance(space, spaces.MultiDiscrete):
         return {"kind": "multi-discrete", "nvec": space.nvec.tolist(), "start": space.start.tolist()}
     if isinstance(space, spaces.MultiBinary):
@@ -42,8 +45,24 @@ def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
             "dtype": str(space.dtype),
         }
     raise ConfigError(
-        f"a model file can hold Box, Discrete, MultiDiscrete, MultiBinary, Dict and Tuple spaces, got {space}"
+        f"a model file can hold the spaces that come with Gymnasium, got {space} ({type(space).__name__}); show "
+        "another one inside the learner (gymnasium.wrappers.TransformObservation, TransformAction)"
     )
+
+
+def _of_parts(space: spaces.Space[Any]) -> dict[str, Any]:
+    if isinstance(space, spaces.Dict):
+        return {
+            "kind": "agents" if isinstance(space, AgentsSpace) else "dict",
+            "spaces": [[name, space_to_json(part)] for name, part in space.spaces.items()],
+        }
+    if isinstance(space, spaces.Sequence):
+        return {"kind": "sequence", "space": space_to_json(space.feature_space), "stack": space.stack}
+    if isinstance(space, spaces.Graph):
+        edges = None if space.edge_space is None else space_to_json(space.edge_space)
+        return {"kind": "graph", "nodes": space_to_json(space.node_space), "edges": edges}
+    kind = "tuple" if isinstance(space, spaces.Tuple) else "one-of"
+    return {"kind": kind, "spaces": [space_to_json(part) for part in getattr(space, "spaces", ())]}
 
 
 def space_from_json(data: dict[str, Any]) -> spaces.Space[Any]:
@@ -58,8 +77,31 @@ def _dict(data: dict[str, Any]) -> spaces.Space[Any]:
     return spaces.Dict({name: space_from_json(part) for name, part in data["spaces"]})
 
 
+def _agents(data: dict[str, Any]) -> spaces.Space[Any]:
+    return AgentsSpace({name: space_from_json(part) for name, part in data["spaces"]})
+
+
 def _tuple(data: dict[str, Any]) -> spaces.Space[Any]:
     return spaces.Tuple([space_from_json(part) for part in data["spaces"]])
+
+
+def _one_of(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.OneOf([space_from_json(part) for part in data["spaces"]])
+
+
+def _sequence(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Sequence(space_from_json(data["space"]), stack=bool(data["stack"]))
+
+
+def _graph(data: dict[str, Any]) -> spaces.Space[Any]:
+    edges = None if data["edges"] is None else space_from_json(data["edges"])
+    return spaces.Graph(space_from_json(data["nodes"]), edges)
+
+
+def _text(data: dict[str, Any]) -> spaces.Space[Any]:
+    return spaces.Text(
+        int(data["max_length"]), min_length=int(data["min_length"]), charset=str(data["charset"])
+    )
 
 
 def _discrete(data: dict[str, Any]) -> spaces.Space[Any]:
@@ -81,10 +123,15 @@ def _box(data: dict[str, Any]) -> spaces.Space[Any]:
 
 
 _READERS: dict[str, Callable[[dict[str, Any]], spaces.Space[Any]]] = {
+    "agents": _agents,
     "box": _box,
     "dict": _dict,
     "discrete": _discrete,
+    "graph": _graph,
     "multi-binary": _multi_binary,
     "multi-discrete": _multi_discrete,
+    "one-of": _one_of,
+    "sequence": _sequence,
+    "text": _text,
     "tuple": _tuple,
 }

@@ -35,10 +35,10 @@ class Args:
     """seed of everything random"""
 
 
-def make_env(*, truncated: bool = False) -> gym.Env[Any, Any]:
+def make_env(*, short: bool = False) -> gym.Env[Any, Any]:
     """Scenes for the model, decisions and short vectors for the agent."""
     env: gym.Env[Any, Any] = gym.make("relgym/BallGoal-v0")
-    if truncated:  # four episodes of five last 10 decisions: what follows can be dreamed, other rooms can't
+    if short:  # four episodes of five last 10 decisions: what follows can be dreamed, other rooms can't
         env = TruncatedEpisodes(env, 50)
     return FlatView(ActionRepeat(TransitionRecorder(env), 5))
 
@@ -48,7 +48,7 @@ def main(args: Args) -> None:
     from stable_baselines3 import SAC
     from stable_baselines3.common.logger import Logger
 
-    env = make_env(truncated=True)
+    env = make_env(short=True)
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))
     # Episodes are long: dreams branch off anywhere and look some decisions ahead. Goals and walls stay where they are;

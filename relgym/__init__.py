@@ -8,7 +8,7 @@ from typing import Any
 
 import gymnasium
 
-__all__ = ["WorldModel", "envs", "wrappers"]
+__all__ = ["Dataset", "WorldModel", "data", "envs", "fit", "progressive", "score", "wrappers"]
 
 # Python started in a checkout takes ./relgym before an installed wheel; envs/ and wrappers/ lie beside it.
 _ROOT = Path(__file__).resolve().parent.parent
@@ -25,8 +25,14 @@ gymnasium.register(
 )
 gymnasium.register("relgym/TruckPush-v0", "relgym.envs.truck_push:TruckPushEnv", max_episode_steps=40)
 
-_LAZY_MODULES = ("envs", "wrappers")
-_LAZY_NAMES = {"WorldModel": "relgym.model.world_model"}
+_LAZY_MODULES = ("data", "envs", "wrappers")
+_LAZY_NAMES = {
+    "Dataset": "relgym.data.dataset",
+    "WorldModel": "relgym.model.world_model",
+    "fit": "relgym.data.learner",
+    "progressive": "relgym.data.learner",
+    "score": "relgym.data.learner",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -181,7 +181,7 @@ def rules(
 @app.command()
 def explain(
     model: ModelFile,
-    step: Annotated[int, typer.Option(help="Which scene of the episode.", min=0)] = 0,
+    step: Annotated[int, typer.Option(help="Random steps to take before.", min=0)] = 0,
     env_id: OtherEnv = None,
     arg: Arguments = None,
     view: ViewOption = None,
@@ -351,13 +351,13 @@ def _show_lessons(learned: Callable[..., Iterator[Round]], lesson: Lesson, as_js
     from relgym.console.next_steps import next_steps
 
     rounds: list[Round] = []
-    with _progress(TimeRemainingColumn(), TextColumn("{task.fields[wrong]}")) as bar:
-        task = bar.add_task("learning", total=lesson.steps, wrong="")
+    with _progress(TimeRemainingColumn(), TextColumn("{task.fields[wrong]}")) as progress:
+        task = progress.add_task("learning", total=lesson.steps, wrong="")
 
         def tick(done: int, wrong: float) -> None:
-            if done < bar.tasks[0].completed:  # another round
-                bar.reset(task, total=lesson.steps, wrong="")
-            bar.update(task, completed=done, wrong=f"wrong lately: {wrong:.1%}")
+            if done < progress.tasks[0].completed:  # another round
+                progress.reset(task, total=lesson.steps, wrong="")
+            progress.update(task, completed=done, wrong=f"wrong lately: {wrong:.1%}")
 
         for number, found in enumerate(learned(lesson, tick), start=1):
             rounds.append(found)

@@ -4,6 +4,7 @@ __all__ = [
     "ActionError",
     "ClusterError",
     "ConfigError",
+    "DataError",
     "ModelFileError",
     "ObservationError",
     "QueryError",
@@ -32,6 +33,10 @@ class ShapeError(RelgymError, ValueError):
 
 class ObservationError(RelgymError, ValueError):
     """Raised when an observation holds NaN or infinity, a wrong length, or an unknown object or type."""
+
+
+class DataError(RelgymError, ValueError):
+    """Raised when recorded data can't be learned from: lengths that differ, NaN, other dtypes, nothing in it."""
 
 
 class ActionError(RelgymError, ValueError):

@@ -332,4 +332,4 @@ def test_angles_that_a_first_observation_shows_are_kept() -> None:
 def test_what_nothing_explains_stops_a_roll_out_and_is_named() -> None:
     run("learn", "test/Dice-v0", "--steps", 60, "--out", "d.json")
     text = run("rollout", "d.json", "--trials", 3)
-    assert "0 of 3 roll-outs" in text and "for want of a prediction of self.x" in text
+    assert "0 of 3 roll-outs" in text and "without a prediction of self.x" in text

@@ -134,7 +134,7 @@ MISTAKES = {
     "eval slider.json --world ball": ["no option --world", "--env"],
     "eval slider.json --arg lenth=3": ["no argument 'lenth'", "did you mean 'length'?"],
     "rollout slider.json --trials 0": ["'--trials'"],
-    "explain slider.json --step 5000": ["the episode was over after 1000 steps"],
+    "explain slider.json --step -1": ["'--step'"],
     "inspect test/Camera-v0": ["an image"],
     "demo --out other.json": ["other.json is a file, and a folder is needed"],
 }

@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 from relgym.cli import app
 
 GUIDE = (Path(__file__).parents[1] / "docs" / "guides" / "console.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```(console|sh)\n(.*?)^```$", GUIDE, re.DOTALL | re.MULTILINE)
+FENCES = re.findall(r"^```(console|sh)\n(.*?)^```$", GUIDE, re.DOTALL | re.MULTILINE)
 SHOWN = re.compile(r"^\$ relgym (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 BARE = re.compile(r"^relgym (.*?)(?:\s+#.*)?(\n)", re.MULTILINE)
-TYPED = [typed for kind, text in BLOCKS for typed in (SHOWN if kind == "console" else BARE).findall(text)]
+TYPED = [typed for kind, text in FENCES for typed in (SHOWN if kind == "console" else BARE).findall(text)]
 
 
 def test_commands_are_there() -> None:

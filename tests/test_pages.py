@@ -26,6 +26,7 @@ def named(path: Path) -> str:
     return path.relative_to(pages.ROOT).as_posix()
 
 
+@pytest.mark.filterwarnings("ignore::UserWarning:minari")  # more could be said of a data set than a page says
 @pytest.mark.parametrize(
     "path", [pytest.param(path, id=named(path), marks=NEEDS.get(named(path), ())) for path in pages.pages()]
 )

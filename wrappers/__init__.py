@@ -11,6 +11,7 @@ if __name__ != "relgym.wrappers":
 
 _HOMES = {
     "ActionRepeat": "relgym.wrappers.action_repeat",
+    "AgentsView": "relgym.envs.views",
     "Angle": "relgym.envs.views",
     "FlatView": "relgym.wrappers.flat",
     "FunctionView": "relgym.envs.views",
@@ -18,11 +19,11 @@ _HOMES = {
     "ModelLearner": "relgym.wrappers.model_learner",
     "NumbersView": "relgym.envs.views",
     "Part": "relgym.envs.views",
-    "Prequential": "relgym.wrappers.prequential",
+    "Prequential": "relgym.model.prequential",
     "Rows": "relgym.envs.views",
     "SceneView": "relgym.envs.views",
     "Static": "relgym.envs.views",
-    "StepReport": "relgym.wrappers.prequential",
+    "StepReport": "relgym.model.prequential",
     "TableView": "relgym.envs.views",
     "VectorFlatView": "relgym.wrappers.flat",
     "VectorModelLearner": "relgym.wrappers.vector_model_learner",
@@ -33,6 +34,7 @@ _HOMES = {
 
 __all__ = [
     "ActionRepeat",
+    "AgentsView",
     "Angle",
     "FlatView",
     "FunctionView",

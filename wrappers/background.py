@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from relgym.clustering.features import functions_of, register_function
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError, RelgymError
+from relgym.model.prequential import Prequential, compared
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.prequential import Prequential, compared
 
 __all__ = ["Background"]
 

@@ -11,9 +11,9 @@ from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, View
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import ScenePrediction
+from relgym.model.prequential import Prequential
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.observer import Observer
-from relgym.wrappers.prequential import Prequential
 
 __all__ = ["Learning"]
 

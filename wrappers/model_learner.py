@@ -11,15 +11,15 @@ from gymnasium.utils import RecordConstructorArgs
 
 from relgym.arguments import refusing
 from relgym.config import ModelConfig
-from relgym.envs.model_files import made_how
 from relgym.errors import ConfigError
+from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.learning import Learning
 from relgym.wrappers.observer import STARTS, Observer, Step
 from relgym.wrappers.settings import PlainTarget
 from relgym.wrappers.study import NOTHING
-from relgym.wrappers.views import ViewLike, readable, recordable, view_of
+from relgym.wrappers.views import ViewLike, metadata_of, readable, recordable, view_of
 
 __all__ = ["STARTS", "ModelLearner"]
 
@@ -60,7 +60,8 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
         and `model` and `prequential` are those of the last `catch_up`. What finds the queue full is left out, and
         counted in `dropped`. Default ``None``: learn in `step`.
     model
-        A model file to go on from, instead of an empty model; it keeps its targets and config.
+        What to go on from, instead of an empty model: a `WorldModel`, which then learns here itself (with `background`
+        a copy does), or the path of a model file. It keeps its targets and config.
     window
         How many steps count as the latest in `prequential`.
 
@@ -73,7 +74,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
     Notes
     -----
     Copies have models of their own, and so does what ``gym.make(env.spec)`` or a vector env makes of this one.
-    ``env.spec.to_json()`` can hold all but views made of functions.
+    ``env.spec.to_json()`` can hold all but views made of functions, and models that aren't files.
 
     Examples
     --------
@@ -101,7 +102,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
         learn_termination: bool = False,
         bad_observations: BadObservations = "raise",
         background: int | None = None,
-        model: str | os.PathLike[str] | None = None,
+        model: WorldModel | str | os.PathLike[str] | None = None,
         window: int = 1000,
     ) -> None:
         _refuse_vector_env(env)
@@ -117,9 +118,9 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
             window=window,
             background=background,
             bad_observations=bad_observations,
-            metadata=made_how(env.spec) | {"render_fps": env.metadata.get("render_fps")},
+            metadata=metadata_of(env),
         )
-        # Plain data only: recorded arguments are deep-copied, and a learner among them would be forked.
+        # Recorded arguments are deep-copied: what a spec makes goes on from a copy of the model as it now is.
         RecordConstructorArgs.__init__(
             self,
             **self._observer.arguments,

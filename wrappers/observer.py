@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -13,14 +14,14 @@ from gymnasium.error import ResetNeeded
 from relgym.config import ModelConfig
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, NumbersView, TaskView, View
-from relgym.errors import ObservationError, RelgymError
+from relgym.errors import ConfigError, ObservationError, RelgymError
 from relgym.model.prediction import ScenePrediction
+from relgym.model.prequential import StepReport
 from relgym.model.storage import target_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations, Follower, Look
-from relgym.wrappers.prequential import StepReport
-from relgym.wrappers.settings import PlainTarget, config_of, model_of, target_of
+from relgym.wrappers.settings import PlainTarget, check_model, model_of, target_of
 from relgym.wrappers.study import NOTHING, Study
 from relgym.wrappers.views import is_open, remembered, settled, upheld
 
@@ -94,7 +95,7 @@ class Observer:
         envs: int = 1,
         targets: Sequence[PlainTarget] | None = None,
         config: ModelConfig | Mapping[str, Any] | None = None,
-        model: str | os.PathLike[str] | None = None,
+        model: WorldModel | str | os.PathLike[str] | None = None,
         learn: bool = True,
         predict: bool = True,
         window: int = 1000,
@@ -103,8 +104,9 @@ class Observer:
         metadata: Mapping[str, Any] | None = None,
     ) -> None:
         self._targets = None if targets is None else [target_of(t) for t in targets]
-        self._config = None if config is None else config_of(config)
-        self._file = model
+        self._config = None if config is None else ModelConfig.of(config)
+        check_model(model)
+        self._given = model
         self._learn = learn
         self._manner = (predict, window, background)
         self._spaces = (observation_space, action_space)
@@ -224,8 +226,7 @@ class Observer:
         scene = self.followers[number].begin(*first, look)
         if scene is not None and len(self._starts) < STARTS:
             self._starts.append(scene)
-            # So that model.save, too, writes a file to dream from.
-            self.study.model.extra = self.extra()
+            self.note()
 
     # ------------------------------------------------------------------ angles
     def _regard(self, observations: Sequence[Any]) -> bool:
@@ -255,7 +256,7 @@ class Observer:
         self._starts = [view.scene(self.view.observation(scene)) for scene in self._starts]
         self.view, self._study = view, study
         if self._starts:
-            study.model.extra = self.extra()
+            self.note()
         for follower in self.followers:
             if first:
                 follower.view = view
@@ -301,7 +302,7 @@ class Observer:
             self._study.close()
 
     def _begun(self, view: View) -> Study:
-        model = model_of(view.schema, config=self._config, targets=self._targets, path=self._file)
+        model = model_of(view.schema, config=self._config, targets=self._targets, given=self._given)
         predict, window, background = self._manner
         return Study(
             model,
@@ -315,11 +316,11 @@ class Observer:
     # ------------------------------------------------------------------ files
     @property
     def arguments(self) -> dict[str, Any]:
-        """Targets, config and file as plain data."""
+        """Targets and config as plain data; the model as a path, or itself if it was given so."""
         return {
             "targets": None if self._targets is None else [target_to_json(t) for t in self._targets],
             "config": None if self._config is None else self._config.to_json(),
-            "model": None if self._file is None else os.fspath(self._file),
+            "model": os.fspath(self._given) if isinstance(self._given, (str, os.PathLike)) else self._given,
         }
 
     @property
@@ -330,6 +331,14 @@ class Observer:
     def extra(self) -> dict[str, Any]:
         """All that a model file says of the env: its record and its view."""
         return self.record.to_json() | {"view": self.view.to_json()}
+
+    def note(self) -> None:
+        """Tell the model of its env, so that `WorldModel.save`, too, writes a file to dream from.
+
+        Of a space of somebody's own, which no file can hold, nothing is told.
+        """
+        with suppress(ConfigError):
+            self.study.model.extra = self.extra()
 
     def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
         """Write model, spaces, view and some first scenes to one file, atomically."""

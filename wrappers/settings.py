@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
-from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
+from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.model.scenes import mismatch
 from relgym.model.storage import target_from_json
@@ -15,7 +15,7 @@ from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["PlainTarget", "config_of", "model_of", "target_of"]
+__all__ = ["PlainTarget", "check_model", "model_of", "target_of"]
 
 PlainTarget: TypeAlias = Target | str | Sequence[Any]
 """A target, its name (``"ball.vx"``), or ``(type, property)``."""
@@ -34,61 +34,49 @@ def target_of(given: PlainTarget) -> Target:
     raise ConfigError(f"target {given!r}: expected 'ball.vx', ('ball', 'vx') or a Target")
 
 
-def config_of(given: ModelConfig | Mapping[str, Any]) -> ModelConfig:
-    """The parameters that are meant: a dict holds those that differ from the default."""
-    if isinstance(given, ModelConfig):
-        return given
-    if not isinstance(given, Mapping):
-        raise ConfigError(
-            f"config={given!r}: expected a ModelConfig, or a dict of what differs from the default, such as "
-            "{'features': ('trig',)}"
-        )
-    features = given.get("features", ())
-    try:
-        parts = {
-            "clustering": ClusteringConfig(**given.get("clustering", {})),
-            "classification": ClassificationConfig(**given.get("classification", {})),
-            "features": tuple(features) if isinstance(features, list) else features,
-        }
-        return ModelConfig(**{**given, **parts})
-    except TypeError as error:
-        raise ConfigError(f"config={dict(given)!r}: {error}; see relgym.config.ModelConfig") from None
-
-
 def model_of(
     schema: SceneSchema,
     *,
     config: ModelConfig | None,
     targets: Sequence[Target] | None,
-    path: str | os.PathLike[str] | None,
+    given: WorldModel | str | os.PathLike[str] | None,
 ) -> WorldModel:
-    """An empty model, or the one in a file.
+    """An empty model, the one that was given, or the one in a file.
 
     Raises
     ------
     ConfigError
-        The file's model was learned in another world, or targets or config are given beside it.
+        The model was learned in another world, it is none, or targets or config are given beside it.
     """
-    if path is None:
+    if given is None:
         return WorldModel(schema, config, targets=targets)
     if config is not None or targets is not None:
-        raise ConfigError("a loaded model keeps its targets and config: pass either model or those")
-    model = WorldModel.load(path)
+        raise ConfigError("a model keeps its targets and config: pass either model or those")
+    check_model(given)
+    model, what = (given, "model") if isinstance(given, WorldModel) else (WorldModel.load(given), given)
     if replace(model.schema, precision=schema.precision) != schema:  # it keeps its own
-        raise ConfigError(_another_world(path, schema, model.schema))
+        raise ConfigError(_another_world(what, schema, model.schema))
     return model
 
 
-def _another_world(path: str | os.PathLike[str], schema: SceneSchema, known: SceneSchema) -> str:
+def check_model(given: Any) -> None:
+    """Raise `ConfigError` unless it is a model, the path of one, or None."""
+    if given is not None and not isinstance(given, (WorldModel, str, os.PathLike)):
+        raise ConfigError(
+            f"model={given!r}: expected a WorldModel or the path of a model file, got {type(given).__name__}"
+        )
+
+
+def _another_world(what: str | os.PathLike[str], schema: SceneSchema, known: SceneSchema) -> str:
     """What differs, and what to do about it."""
     if set(known.order) ^ set(schema.order) == {TASK}:
         then, now = ("with", "without") if TASK in known.order else ("without", "with")
         return (
-            f"{path}: the model was learned {then} reward or termination, and the env is wrapped {now}: in another "
+            f"{what}: the model was learned {then} reward or termination, and the env is wrapped {now}: in another "
             "world; pass the learn_reward and learn_termination that it was learned with"
         )
     difference = mismatch(schema, known) or f"objects {list(schema.order)}, expected {list(known.order)}"
     return (
-        f"{path}: the model was learned in another world than the env's: {difference}; make and wrap the env with the "
+        f"{what}: the model was learned in another world than the env's: {difference}; make and wrap the env with the "
         "arguments it was learned with"
     )

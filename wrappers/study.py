@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 from relgym.errors import ConfigError
+from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import ScenePrediction
+from relgym.model.prequential import Prequential, StepReport
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers.background import Background
-from relgym.wrappers.prequential import Prequential, StepReport, compared
 
 __all__ = ["NOTHING", "Study"]
 
@@ -105,13 +106,12 @@ class Study:
             if self._learn:
                 self._background.put(transition)
             return NOTHING
-        residuals, wrong = compared(prediction, transition.after, self._precision)
+        report = compare_and_learn(
+            self.model, transition, prediction, precision=self._precision, learn=self._learn
+        )
         if prediction is not None:
-            self.prequential.count(residuals, wrong)
-            if self._learn:
-                self.model.look_back(prediction, residuals, self._precision)
-        learned = self.model.learn_one(transition) if self._learn else None
-        return StepReport(prediction, residuals, wrong, learned)
+            self.prequential.count(report.residuals, report.wrong)
+        return report
 
     def catch_up(self) -> WorldModel:
         """Wait until all that is queued was learned; the model as it then is."""

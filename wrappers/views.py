@@ -10,8 +10,10 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from relgym.envs.agents import AgentsSpace
 from relgym.envs.arguments import checked_action, checked_function
-from relgym.envs.views import NumbersView, SceneView, TaskView, View, view_from_json
+from relgym.envs.model_files import made_how
+from relgym.envs.views import AgentsView, NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
 from relgym.model.world_model import WorldModel
 from relgym.scene.schema import SceneSchema
@@ -22,9 +24,11 @@ __all__ = [
     "ViewLike",
     "chosen_view",
     "is_open",
+    "metadata_of",
     "readable",
     "recordable",
     "remembered",
+    "schema_of",
     "settled",
     "upheld",
     "view_of",
@@ -39,8 +43,9 @@ def view_of(
 ) -> View:
     """The view of an env.
 
-    An env with a ``schema`` (`relgym.envs.SceneEnv`) shows scenes already. Any other is seen as numbers: one
-    object, or one per key of a Dict (`NumbersView`).
+    An env with a ``schema`` (`relgym.envs.SceneEnv`) shows scenes already, and one of several agents
+    (`relgym.envs.AgentsEnv`) an object per agent. Any other is seen as numbers: one object, or one per key of a Dict
+    (`NumbersView`).
 
     Parameters
     ----------
@@ -56,10 +61,25 @@ def view_of(
     """
     if not isinstance(env, gym.Env):
         raise ConfigError(f"expected an env, got {env!r}: gym.make makes one of an id")
-    schema = env.get_wrapper_attr("schema") if env.has_wrapper_attr("schema") else None
     return chosen_view(
-        given, env.observation_space, env.action_space, schema=schema, reward=reward, terminated=terminated
+        given,
+        env.observation_space,
+        env.action_space,
+        schema=schema_of(env),
+        reward=reward,
+        terminated=terminated,
     )
+
+
+def schema_of(env: gym.Env[Any, Any]) -> SceneSchema | None:
+    """The schema of an env whose observations are scenes; ``None`` of others."""
+    schema = env.get_wrapper_attr("schema") if env.has_wrapper_attr("schema") else None
+    return schema if isinstance(schema, SceneSchema) else None  # an attribute of that name may be anything
+
+
+def metadata_of(env: gym.Env[Any, Any]) -> dict[str, Any]:
+    """What model files say of an env: how it was made, and for renderers."""
+    return made_how(env.spec) | {"render_fps": env.metadata.get("render_fps")}
 
 
 def chosen_view(
@@ -91,10 +111,12 @@ def chosen_view(
     """
     view: Any
     if given is None:
-        if not isinstance(schema, SceneSchema):  # an attribute of that name may be anything
-            view = NumbersView(observation_space, action_space)
-        else:
+        if isinstance(schema, SceneSchema):  # an attribute of that name may be anything
             view = SceneView(schema, observation_space, action_space)
+        elif isinstance(observation_space, AgentsSpace):
+            view = AgentsView(observation_space, action_space)
+        else:
+            view = NumbersView(observation_space, action_space)
     elif isinstance(given, Mapping):
         view = view_from_json(given)
     else:
@@ -129,8 +151,8 @@ def upheld(view: View, observation: Any) -> View:
     return view.upheld(observation) if isinstance(view, (NumbersView, TaskView)) else view
 
 
-def remembered(view: View, path: str | os.PathLike[str]) -> View:
-    """The view that a model file holds, where it differs from an open one in its angles at most.
+def remembered(view: View, model: WorldModel | str | os.PathLike[str]) -> View:
+    """The view that a model or its file holds, where it differs from an open one in its angles at most.
 
     What was guessed of these when the model was learned stands, and so does what was taken back.
 
@@ -138,12 +160,13 @@ def remembered(view: View, path: str | os.PathLike[str]) -> View:
     ----------
     view
         The view of the env.
-    path
-        The model's file.
+    model
+        The model, or its file.
     """
     if not is_open(view):
         return view
-    held = WorldModel.load_with_extra(path)[1].get("view")
+    extra = model.extra if isinstance(model, WorldModel) else WorldModel.load_with_extra(model)[1]
+    held = extra.get("view")
     return view_from_json(held) if held and _but_angles(held) == _but_angles(view.to_json()) else view
 
 

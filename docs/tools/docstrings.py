@@ -13,6 +13,7 @@ import griffe
 ROOT = Path(__file__).resolve().parents[2]
 FACADES = {
     "relgym.config": "relgym/config/__init__.py",
+    "relgym.data": "relgym/data/__init__.py",
     "relgym.envs": "envs/__init__.py",
     "relgym.envs.views": "envs/views/__init__.py",
     "relgym.errors": "relgym/errors.py",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from relgym.envs.views.agents import AgentsView
 from relgym.envs.views.base import View
 from relgym.envs.views.function import FunctionView
 from relgym.envs.views.numeric import NumbersView
@@ -17,6 +18,7 @@ from relgym.errors import ModelFileError
 __all__ = [
     "REWARD",
     "TERMINATED",
+    "AgentsView",
     "Angle",
     "FunctionView",
     "NumbersView",
@@ -53,6 +55,7 @@ def view_from_json(data: Mapping[str, Any]) -> View:
 
 
 _READERS: dict[str, Callable[[Mapping[str, Any]], View]] = {
+    "agents": AgentsView.from_json,
     "flat": NumbersView.from_json,
     "scene": SceneView.from_json,
     "table": TableView.from_json,

@@ -6,9 +6,11 @@ import math
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from relgym.errors import ConfigError
 
-__all__ = ["at_least", "one_of", "plain", "unit"]
+__all__ = ["at_least", "checked_count", "one_of", "plain", "unit"]
 
 LARGEST = 2**63 - 1
 """Whole numbers beyond this fit no file, and no seed."""
@@ -63,3 +65,10 @@ def unit(config: object, *names: str) -> None:
     for name in names:
         if not 0 <= getattr(config, name) <= 1:
             raise ConfigError(f"{name} must lie in [0, 1], got {getattr(config, name)!r}")
+
+
+def checked_count(what: str, count: Any, least: int, most: int) -> int:
+    """`count` as an int; `ConfigError` unless it is a whole number within the limits."""
+    if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or not least <= count <= most:
+        raise ConfigError(f"{what}={count!r}: expected a whole number from {least} to {most}")
+    return int(count)

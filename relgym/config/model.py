@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
@@ -74,6 +75,41 @@ class ModelConfig:
         if not isinstance(features, (tuple, list)) or not all(isinstance(entry, str) for entry in features):
             raise ConfigError(f"features must be a tuple of names, such as ('trig',), got {features!r}")
 
+    @classmethod
+    def of(cls, given: ModelConfig | Mapping[str, Any] | None) -> ModelConfig:
+        """The parameters that are meant.
+
+        Parameters
+        ----------
+        given
+            A `ModelConfig`, a dict of those that differ from the default
+            (``{"seed": 1, "clustering": {"draws": 500}}``), or ``None``: the default.
+
+        Raises
+        ------
+        ConfigError
+            Something else, unknown names, or values outside their range.
+        """
+        if given is None:
+            return cls()
+        if isinstance(given, ModelConfig):
+            return given
+        if not isinstance(given, Mapping):
+            raise ConfigError(
+                f"config={given!r}: expected a ModelConfig, or a dict of what differs from the default, such as "
+                "{'features': ('trig',)}"
+            )
+        features = given.get("features", ())
+        try:
+            parts = {
+                "clustering": _part(ClusteringConfig, given.get("clustering", {})),
+                "classification": _part(ClassificationConfig, given.get("classification", {})),
+                "features": tuple(features) if isinstance(features, list) else features,
+            }
+            return cls(**{**given, **parts})
+        except TypeError as error:
+            raise ConfigError(f"config={dict(given)!r}: {error}; see relgym.config.ModelConfig") from None
+
     @property
     def classifying(self) -> ClassificationConfig:
         """`classification`, with no more examples of a mode than a short history has room for: a twentieth of it."""
@@ -141,3 +177,8 @@ class ModelConfig:
                 "features": tuple(data.get("features", ())),
             }
         )
+
+
+def _part(kind: type[Any], given: Any) -> Any:
+    """One half of the parameters: a record as it is, or a dict of what differs from the default."""
+    return given if isinstance(given, kind) else kind(**given)

@@ -163,6 +163,13 @@ def _check_names(spec: EnvSpec, given: Mapping[str, Any]) -> None:
             raise ConfigError(
                 f"{spec.id} has no argument {name!r}{did_you_mean(name, (*known, *_FOR_MAKE))}{_listed(spec)}"
             )
+    needed = [
+        name for name, p in known.items() if p.default is p.empty and name not in {*given, *spec.kwargs}
+    ]
+    if needed:
+        raise ConfigError(
+            f"{spec.id} needs {' and '.join(f'--arg {name}=VALUE' for name in needed)}{_listed(spec)}"
+        )
 
 
 def _listed(spec: EnvSpec) -> str:

@@ -1,8 +1,8 @@
-"""Envs that nobody here wrote, through views, as benchmarks (``python -m relgym.experiments.any_env``).
+"""Other people's envs, through views, as benchmarks (``python -m relgym.experiments.any_env``).
 
 Every env is learned twice from the same transitions: with the default configuration, and with the features that the
 default's own advice recommends. Errors are *nRMSE-d*: root mean square error of one step over the standard deviation of
-the change, per property, on fresh episodes, where steps at a limit (a wall, a clip) are evaluated apart: an error over
+the change, per property, on fresh episodes, where steps at a limit (a wall, a clip) are measured apart: an error over
 everything would measure the rare kind only.
 """
 
@@ -36,7 +36,7 @@ from relgym.experiments.any_env_fleet import fleet
 from relgym.experiments.any_env_flight import flight
 from relgym.experiments.any_env_memory import LIVES, memory
 from relgym.experiments.any_env_stream import prequential
-from relgym.experiments.criterion import Measure, measured, report
+from relgym.experiments.criterion import Measure, measured, one_of, report
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.model.world_model import WorldModel
 
@@ -183,7 +183,8 @@ def benchmark(name: str, seeds: Pairs, *, quick: bool, steps: int | None = None)
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line: benchmarks, ``--seeds N``, ``--tuning`` for the tuning seeds, ``--quick`` for few transitions."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("benchmarks", nargs="*", default=list(BENCHMARKS), choices=[*BENCHMARKS, []])
+    names = ", ".join(BENCHMARKS)
+    parser.add_argument("benchmarks", nargs="*", type=one_of(BENCHMARKS), help=f"{names}; default: all")
     parser.add_argument("--seeds", type=int, default=1, help="how many training seeds, each with a test seed")
     parser.add_argument(
         "--steps", type=int, help="length of a long life (benchmarks 'memory…'), of which a fifth is kept"

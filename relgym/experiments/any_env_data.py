@@ -1,4 +1,4 @@
-"""Envs that nobody here wrote, as streams of transitions, and how errors of one step are measured on them."""
+"""Other people's envs, as streams of transitions, and how errors of one step are measured on them."""
 
 from __future__ import annotations
 

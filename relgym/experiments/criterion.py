@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any, Literal
 
 from relgym.model.text import Cell, table
 
-__all__ = ["Criterion", "Measure", "measured", "report"]
+__all__ = ["Criterion", "Measure", "measured", "one_of", "report"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,3 +95,14 @@ def report(title: str, measures: Sequence[Measure], notes: Iterable[str] = ()) -
     ]
     header = ["figure", "limit", "worst", "median", "of", ""]
     return "\n".join([title, table(header, rows), *notes])
+
+
+def one_of(names: Collection[str]) -> Callable[[str], str]:
+    """The type of a command line's argument that is one of these names; `choices` would refuse that none is given."""
+
+    def checked(text: str) -> str:
+        if text not in names:
+            raise ArgumentTypeError(f"{text!r}: expected one of {', '.join(names)}")
+        return text
+
+    return checked

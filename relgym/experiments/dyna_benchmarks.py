@@ -20,7 +20,7 @@ from typing import Final
 
 from relgym.errors import StoreError
 from relgym.experiments.chapter4.reproduce import Made, section
-from relgym.experiments.criterion import report
+from relgym.experiments.criterion import one_of, report
 from relgym.experiments.dyna_arms import ARMS
 from relgym.experiments.dyna_measures import BENCHMARKS, Benchmark, Found
 from relgym.experiments.jobs.run import run
@@ -118,20 +118,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run what isn't run yet of the benchmarks named on the command line, then report them."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("benchmarks", nargs="*", choices=[*BENCHMARKS, []], default=list(BENCHMARKS))
+    names = ", ".join(BENCHMARKS)
+    parser.add_argument("benchmarks", nargs="*", type=one_of(BENCHMARKS), help=f"{names}; default: all")
     parser.add_argument("--arms", nargs="+", choices=list(ARMS), default=list(ARMS))
     parser.add_argument("--seeds", type=int, default=len(TRAINING_SEEDS), help="so many, at most 5")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, default=Path("out/dyna"))
     parser.add_argument("--page", type=Path, help="where to write the page of results")
     chosen = parser.parse_args(given)
+    asked = chosen.benchmarks or list(BENCHMARKS)
     store = ResultStore(chosen.out / "cache")
-    tasks = [
-        t for n in chosen.benchmarks for t in wanted(BENCHMARKS[n], seeds=chosen.seeds, arms=chosen.arms)
-    ]
+    tasks = [t for n in asked for t in wanted(BENCHMARKS[n], seeds=chosen.seeds, arms=chosen.arms)]
     for progress in run(tasks, store, workers=chosen.jobs):
         print(f"{progress.done} of {progress.total} runs", file=sys.stderr, flush=True)
-    for name in chosen.benchmarks:
+    for name in asked:
         command = shlex.join(["python", "-m", "relgym.experiments.dyna_benchmarks", name])
         print(shown(name, store, chosen.out, command).text, flush=True)
     if chosen.page is not None:

@@ -60,9 +60,9 @@ class Horizons:
         How many stayed with the real episode to its end: never off by more than `TOLERANCE` of a property's spread,
         or, where bodies have positions, by more than `STRAY` in one of them.
     stopped
-        How many ended early, for want of a prediction.
+        How many ended early, without a prediction.
     lacking
-        Targets for want of which they ended.
+        Targets whose missing predictions ended them.
     bodies
         Whether positions decide.
     after
@@ -89,7 +89,7 @@ class Horizons:
             if self.bodies
             else "a property is off by more than 1 % of its spread"
         )
-        lacking = f", for want of a prediction of {', '.join(self.lacking)}" if self.lacking else ""
+        lacking = f", without a prediction of {', '.join(self.lacking)}" if self.lacking else ""
         head = (
             f"{self.kept} of {amount(self.trials, 'roll-out')} of up to {amount(self.longest, 'step')} stay with the "
             f"real episode to its end."

@@ -1,6 +1,6 @@
 """Benchmarks of learning the thesis' worlds: accuracy, cost, learning online, noise; each figure beside its limit.
 
-``python -m relgym.experiments.thesis_benchmarks ball-1 cost --json figures.json`` measures two of them and writes the
+``python -m relgym.experiments.thesis_benchmarks ball-1 noise --json figures.json`` measures two of them and writes the
 figures down as well.
 """
 

@@ -98,7 +98,7 @@ class Explanation:
             head = f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"
             return "\n".join([head, f"  laws      {first}", *(f"            {line}" for line in rest)])
         if self.mode is None:
-            said = f"-> {p.value:.{d}g}, a guess" if p.informed else "kept for want of a prediction"
+            said = f"-> {p.value:.{d}g}, a guess" if p.informed else "keeps its value: no prediction"
             lines = [f"{name}: {self.now:.{d}g} {said}", f"  outcome   {p.outcome.value}"]
             return "\n".join(
                 [*lines, f"  because   no mode speaks where {self.beyond}"] if self.beyond else lines

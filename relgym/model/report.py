@@ -32,7 +32,7 @@ __all__ = [
     "report",
 ]
 
-_OTHERWISE = "otherwise"
+_OTHERWISE = "else"
 
 
 def report(model: WorldModel, *, digits: int = 7) -> ModelReport:

@@ -46,7 +46,7 @@ class ClauseRow:
     Attributes
     ----------
     clause
-        The clause; ``otherwise`` for the examples that no clause covers (the thesis' row "Negative").
+        The clause; ``else`` for the examples that no clause covers (the thesis' row "Negative").
     correct, incorrect
         Training examples that were decided here, rightly and wrongly: those that just one of the two modes
         explains, whichever mode they belong to. Estimates, where only a sample of them is remembered.
@@ -69,7 +69,7 @@ class PairTable:
     mode
         The mode that the clauses speak for.
     other
-        The mode that holds otherwise.
+        The mode that holds if no clause does.
     rows
         Clauses in the order in which they are tried.
     """
@@ -222,7 +222,7 @@ def _role_table(roles: tuple[RoleRow, ...]) -> str:
     for r in roles:
         who = f"a {r.type} B with {r.rule}" if r.rule else f"any {r.type}"
         rows.append([r.mode, ", ".join(r.roles), who])
-    return table(["mode", "role", "who plays it"], rows)
+    return table(["mode", "role", "bound to"], rows)
 
 
 def _legend(targets: tuple[TargetReport, ...]) -> str:

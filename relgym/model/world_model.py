@@ -6,7 +6,7 @@ import copy
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryEr
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
+from relgym.model.fitting import Progress, as_transitions, progressive, transitions_of
 from relgym.model.hindsight import hindsight_to_json, look_back, restore_hindsight
 from relgym.model.journal import Journal
 from relgym.model.learning import LearnReport, finish, learn
@@ -36,6 +37,7 @@ from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.scenes import next_values, with_action
+from relgym.model.score import Score, scored
 from relgym.model.storage import read_model, write_model
 from relgym.scene.objects import ACTION, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
@@ -54,7 +56,8 @@ class WorldModel:
     schema
         The scenes' schema.
     config
-        Free parameters.
+        Free parameters: a `ModelConfig`, or a dict of those that differ from the default
+        (``{"seed": 1, "clustering": {"draws": 500}}``).
     targets
         What to learn, in causal order; default: the schema's targets, and if it names none, every property
         that changes (kinematics and exogenous properties apart).
@@ -80,13 +83,11 @@ class WorldModel:
     def __init__(
         self,
         schema: SceneSchema,
-        config: ModelConfig | None = None,
+        config: ModelConfig | Mapping[str, Any] | None = None,
         *,
         targets: Sequence[Target] | None = None,
     ) -> None:
-        if config is not None and not isinstance(config, ModelConfig):
-            raise ConfigError(f"config={config!r}: expected a ModelConfig")
-        self._state = Parts(schema, config or ModelConfig(), schema.targets if targets is None else targets)
+        self._state = Parts(schema, ModelConfig.of(config), schema.targets if targets is None else targets)
         self.seen = 0
         self.frozen = False
         self.extra: dict[str, Any] = {}
@@ -223,6 +224,130 @@ class WorldModel:
     def set_aside(self) -> int:
         """Number of transitions that held a gross error and weren't learned from."""
         return self._parts.screen.set_aside
+
+    def fit(
+        self,
+        observations: Any,
+        actions: Any = None,
+        next_observations: Any = None,
+        *,
+        terminations: Any = None,
+        truncations: Any = None,
+        precision: float | None = None,
+    ) -> Self:
+        """Learn from many transitions, in their order, as if they came one by one.
+
+        Each is predicted before it is learned from, as `relgym.wrappers.ModelLearner` does, so the model is the same
+        to the last byte. It goes on from what it knows; `untaught` gives a model that has learned nothing.
+        `relgym.fit` takes what an env showed: flat observations, episodes, Minari data sets.
+
+        Parameters
+        ----------
+        observations
+            Transitions (or records with a ``transition``, as `relgym.wrappers.sb3.TransitionRecorder` keeps them), and
+            nothing else; or the scenes before each step, as arrays in units of the properties:
+            ``{object name: shape (n, properties)}``, or all objects' properties side by side, in the order of the
+            schema, shape ``(n, width)``.
+        actions
+            Properties of the action object in physical units, shape ``(n, properties)``.
+        next_observations
+            Scenes after each step, as `observations`. Default: row k + 1 follows row k, but where an episode ends.
+        terminations, truncations
+            Where episodes ended, shape ``(n,)``; of use without `next_observations`.
+        precision
+            Relative precision of the numbers: 0 for float64, 5e-7 for float32. Default: the schema's.
+
+        Raises
+        ------
+        DataError
+            Lengths that differ, other shapes or dtypes, NaN or infinity, nothing to learn from; the model is unchanged.
+        ModelFileError
+            The model was loaded without its history and can't go on learning.
+
+        Examples
+        --------
+        >>> from relgym.scene.objects import ObjectType
+        >>> from relgym.scene.schema import SceneSchema
+        >>> schema = SceneSchema((ObjectType("ball", ("v",)),), (("b", "ball"),))
+        >>> v = np.linspace(1.0, 9.0, 40)[:, None]
+        >>> model = WorldModel(schema).fit(v, next_observations=0.5 * v)
+        >>> model.modes("ball", "v")[0].formula()
+        "v' = 0.5 v"
+        >>> model.score(v + 0.1, next_observations=0.5 * (v + 0.1)).right
+        1.0
+        """
+        for _ in self.progressive(
+            observations,
+            actions,
+            next_observations,
+            terminations=terminations,
+            truncations=truncations,
+            precision=precision,
+        ):
+            pass
+        return self
+
+    def progressive(
+        self,
+        observations: Any,
+        actions: Any = None,
+        next_observations: Any = None,
+        *,
+        terminations: Any = None,
+        truncations: Any = None,
+        precision: float | None = None,
+        every: int = 1,
+    ) -> Iterator[Progress]:
+        """Learn as `fit` does, and report how each transition was predicted before it was learned from.
+
+        As river's ``evaluate.iter_progressive_val_score``: what was measured was never seen before.
+
+        Parameters
+        ----------
+        observations, actions, next_observations, terminations, truncations, precision
+            As of `fit`.
+        every
+            A report after so many transitions, and one of what remains.
+        """
+        found = self._transitions(observations, actions, next_observations, terminations, truncations)
+        return progressive(self, found, every=every, precision=self._precision(precision))
+
+    def score(
+        self,
+        observations: Any,
+        actions: Any = None,
+        next_observations: Any = None,
+        *,
+        terminations: Any = None,
+        truncations: Any = None,
+        precision: float | None = None,
+    ) -> Score:
+        """How well it predicts transitions that it hasn't learned from: RMSE, R², share right, share abstained.
+
+        Nothing is learned. Arguments as of `fit`; cost: as `predict_batch`.
+        """
+        found = self._transitions(observations, actions, next_observations, terminations, truncations)
+        return scored(self, found, self._precision(precision))
+
+    def _precision(self, given: float | None) -> float:
+        return self.schema.precision if given is None else given
+
+    def _transitions(
+        self, observations: Any, actions: Any, next_observations: Any, terminations: Any, truncations: Any
+    ) -> list[Transition]:
+        arrays = isinstance(observations, (np.ndarray, Mapping)) or any(
+            given is not None for given in (actions, next_observations, terminations, truncations)
+        )
+        if not arrays:
+            return as_transitions(observations, self._parts.check)
+        return transitions_of(
+            self.schema,
+            observations,
+            actions,
+            next_observations,
+            terminations=terminations,
+            truncations=truncations,
+        )
 
     @refusing(ObservationError)
     def look_back(

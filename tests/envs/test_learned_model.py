@@ -822,5 +822,19 @@ def test_spaces_survive_json() -> None:
         }
     )
     assert space_from_json(json.loads(json.dumps(space_to_json(space)))) == space
-    with pytest.raises(ConfigError, match="MultiBinary, Dict and Tuple spaces"):
-        space_to_json(spaces.Text(2))
+    others = spaces.Tuple(
+        [
+            spaces.Text(5, min_length=0, charset="abc"),
+            spaces.Sequence(spaces.Box(0.0, 1.0, (2,)), stack=True),
+            spaces.Graph(spaces.Box(-1.0, 1.0, (3,)), spaces.Discrete(4)),
+            spaces.Graph(spaces.Discrete(4), None),
+            spaces.OneOf([spaces.Discrete(2), spaces.Text(3)]),
+        ]
+    )
+    assert space_from_json(json.loads(json.dumps(space_to_json(others)))) == others
+
+    class Own(spaces.Space[Any]):
+        pass
+
+    with pytest.raises(ConfigError, match=r"come with Gymnasium, got .*Own"):
+        space_to_json(Own())

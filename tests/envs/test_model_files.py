@@ -33,10 +33,10 @@ def test_how_it_is_shown_is_left_out() -> None:
 def test_arguments_are_plain_data_or_said_to_be_omitted() -> None:
     spec = gym.make("relgym/TruckPush-v0", friction_range=(0.1, np.float64(0.2))).spec
     assert spec is not None
-    spec.kwargs |= {"task": None, "judge": print, "places": np.zeros(2), "by": {"box": (1, 2)}}
+    spec.kwargs |= {"task": None, "referee": print, "places": np.zeros(2), "by": {"box": (1, 2)}}
     told = made_how(spec)
     assert told["arguments"] == {"friction_range": [0.1, 0.2], "task": None, "by": {"box": [1, 2]}}
-    assert told["omitted"] == ["judge", "places"]
+    assert told["omitted"] == ["referee", "places"]
     assert json.loads(json.dumps(told)) == told
 
 

@@ -1,4 +1,4 @@
-"""Envs that nobody here wrote: the table's machinery on few transitions, and one law that few suffice for."""
+"""Other people's envs: the table's machinery on few transitions, and one law that few suffice for."""
 
 from __future__ import annotations
 

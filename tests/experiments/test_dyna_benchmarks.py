@@ -124,3 +124,13 @@ def test_every_task_can_be_asked_for() -> None:
         every = dyna_benchmarks.wanted(benchmark, seeds=5, arms=list(ARMS))
         assert every == list(benchmark.tasks)
         assert dyna_benchmarks.wanted(replace(benchmark, tasks=()), seeds=5, arms=["sac"]) == []
+
+
+def test_all_benchmarks_are_meant_where_none_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(StoreError, match="nothing is known of truck: run it"):  # the first one
+        dyna_benchmarks.main(["--seeds", "0", "--arms", "sac5", "--out", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        dyna_benchmarks.main(["truk"])
+    assert "'truk': expected one of truck, truck-dream-only" in capsys.readouterr().err

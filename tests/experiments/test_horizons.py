@@ -49,7 +49,7 @@ def test_errors_after_so_many_steps(halving: WorldModel) -> None:
 def test_without_a_prediction_it_ends_and_says_of_what() -> None:
     found = horizons(WorldModel(SCHEMA), [episode(8.0, 4.0, 2.0)])
     assert (found.kept, found.stopped, found.lacking, found.after) == (0, 1, ("ball.v",), ())
-    assert "for want of a prediction of ball.v" in str(found)
+    assert "without a prediction of ball.v" in str(found)
 
 
 def test_where_objects_come_or_go_the_comparison_ends(halving: WorldModel) -> None:

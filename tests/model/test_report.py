@@ -59,7 +59,7 @@ def test_a_target_without_modes_says_so() -> None:
 def test_an_empty_model_explains_that_it_kept_the_value() -> None:
     text = WorldModel(SCHEMA).explain(SCHEMA.scene({"b": [1.25]}))
     assert text == (
-        "b.v: 1.25 kept for want of a prediction\n"
+        "b.v: 1.25 keeps its value: no prediction\n"
         "  outcome   no mode learned yet: learn from more transitions"
     )
 
@@ -89,7 +89,7 @@ def test_records_as_text_word_for_word() -> None:
         1,
         (
             ClauseRow("ramp(B) ∧ approaching(A, B)", 295.0, 1.0, ("F1 - F2 <= 0.5 -> yes (295 : 1)",)),
-            ClauseRow("otherwise", 15574.0, 26.0),
+            ClauseRow("else", 15574.0, 26.0),
         ),
     )
     target = TargetReport(
@@ -113,8 +113,8 @@ def test_records_as_text_word_for_word() -> None:
         "  mode 2 rather than 1  (training accuracy 0.9983)\n"
         "    ramp(B) ∧ approaching(A, B)      295          1  yes\n"
         "        F1 - F2 <= 0.5 -> yes (295 : 1)\n"
-        "    otherwise                     15,574         26  no\n\n"
-        "  mode  role          who plays it\n"
+        "    else                          15,574         26  no\n\n"
+        "  mode  role          bound to\n"
         "     2  box_a         a box B with on-top(C, B)\n"
         "     2  box_b, box_c  any box\n\n"
     )
@@ -125,14 +125,14 @@ def test_records_as_text_word_for_word() -> None:
 def test_long_lines_are_broken() -> None:
     clause = " ∧ ".join(f"x-greater-than(A, {letter})" for letter in "BCDEFG")
     function = "vx' = vx" + " - 2.5 box_a.friction" * 6
-    pair = PairTable(1, 2, (ClauseRow(clause, 1.0, 0.0), ClauseRow("otherwise", 1.0, 0.0)))
+    pair = PairTable(1, 2, (ClauseRow(clause, 1.0, 0.0), ClauseRow("else", 1.0, 0.0)))
     text = str(TargetReport("t.vx", "t", 0, (ModeRow(1, 1, function), ModeRow(2, 1, "vx' = 0")), (pair,), ()))
     assert max(map(len, text.split("\n"))) <= 100
     assert text.count("x-greater-than") == 6 and text.count("box_a.friction") == 6
 
 
 def test_a_pair_without_examples_is_not_wrong() -> None:
-    assert PairTable(1, 2, (ClauseRow("otherwise", 0.0, 0.0),)).performance == 1.0
+    assert PairTable(1, 2, (ClauseRow("else", 0.0, 0.0),)).performance == 1.0
 
 
 def test_truck_report_is_table_3_1(truck: tuple[WorldModel, Scene]) -> None:

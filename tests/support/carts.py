@@ -53,12 +53,12 @@ class CartEnv(gym.Env[Any, Any]):
         return {"cart": np.array([self.v])} if self.says is None else self.says
 
 
-def run(env: gym.Env[Any, Any], steps: int, *, seed: int = 0, episode: int = 25) -> list[Any]:
-    """Random actions, a new episode every `episode` steps; all that the env returned but its infos."""
+def run(env: gym.Env[Any, Any], steps: int, *, seed: int = 0, length: int = 25) -> list[Any]:
+    """Random actions, a new episode every `length` steps; all that the env returned but its infos."""
     seen: list[Any] = []
     env.action_space.seed(seed)
     for k in range(steps):
-        if k % episode == 0:
+        if k % length == 0:
             seen.append(env.reset(seed=seed + k)[0])
         observation, reward, terminated, truncated, _ = env.step(env.action_space.sample())
         seen.append((observation, reward, terminated, truncated))

@@ -290,7 +290,7 @@ def test_who_lies_on_the_floor_lies_there_in_float32_too(dtype: type, tmp_path: 
         static=[Static("floor", ground, shape=Box())],
     )
     learner = ModelLearner(env, view=view, targets=["crate.vx"])
-    run(learner, 300, episode=5)
+    run(learner, 300, length=5)
     wrong = learner.prequential.recent
     assert wrong < 0.1
     learner.save(tmp_path / "crates.json")

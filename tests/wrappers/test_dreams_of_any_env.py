@@ -17,7 +17,7 @@ from relgym.wrappers import ModelLearner
 
 def test_a_pendulum_swings_in_a_dream_as_in_truth(tmp_path: Path) -> None:
     env = ModelLearner(gym.make("Pendulum-v1"), config={"features": ("trig",)})
-    run(env, 300, episode=50)
+    run(env, 300, length=50)
     env.save(tmp_path / "pendulum.json")
     dream = gym.make("relgym/LearnedModel-v0", model=tmp_path / "pendulum.json")
     assert (dream.observation_space, dream.action_space) == (env.observation_space, env.action_space)

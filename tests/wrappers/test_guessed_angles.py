@@ -42,7 +42,7 @@ def test_a_refuted_guess_is_withdrawn_and_the_rest_is_learned_as_without_it(
     bad: Any, start: tuple[float, float], bound: float
 ) -> None:
     env = ModelLearner(Drifter(start, bound=bound), bad_observations=bad, predict=False)
-    run(env, 60, episode=60)
+    run(env, 60, length=60)
     assert env.withdrawn == PAIR
     assert properties(env) == PLAIN
     assert (env.model.seen, env.skipped) == (59, 0)  # all but the step that refuted it
@@ -117,10 +117,10 @@ def test_who_names_the_angle_has_declared_it(tmp_path: Path) -> None:
 @pytest.mark.parametrize("reward", [False, True])
 def test_a_model_goes_on_without_the_angle_that_it_had_to_take_back(reward: bool, tmp_path: Path) -> None:
     env = ModelLearner(Drifter(), learn_reward=reward, predict=False)
-    run(env, 60, episode=60)
+    run(env, 60, length=60)
     env.save(tmp_path / "drifter.json", history=True)
     again = ModelLearner(Drifter(), model=tmp_path / "drifter.json", learn_reward=reward, predict=False)
-    run(again, 5, episode=5)
+    run(again, 5, length=5)
     assert (properties(again), again.withdrawn, again.model.seen) == (PLAIN, (), env.model.seen + 5)
 
 

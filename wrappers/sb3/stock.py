@@ -19,7 +19,9 @@ __all__ = ["DreamModel", "SceneStock", "changing", "free_properties", "permuted"
 class DreamModel(Protocol):
     """What Dyna asks of a model: relational, neural or any other."""
 
-    schema: SceneSchema
+    @property
+    def schema(self) -> SceneSchema:
+        """The scenes' schema."""
 
     @property
     def targets(self) -> tuple[Target, ...]:

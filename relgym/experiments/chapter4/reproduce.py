@@ -24,7 +24,7 @@ from relgym.experiments.jobs.task import Task
 
 __all__ = ["Made", "compute", "make", "page", "section"]
 
-PAGES: Final = {"dream.md": "What dreaming is worth", "any-env.md": "Envs that nobody here wrote"}
+PAGES: Final = {"dream.md": "What dreaming is worth", "any-env.md": "Other people's envs"}
 """Pages of results beside this one, and their titles."""
 
 

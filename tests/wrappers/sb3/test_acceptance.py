@@ -1,4 +1,4 @@
-"""The trust acceptance: opens on small prequential errors, shuts on large ones, and doesn't flutter between."""
+"""Models are accepted on small prequential errors, rejected on large ones, and stay as they are in between."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ def step(off: float, change: float = 1.0) -> Verdict:
     return Verdict({KEY: off}, {KEY: change})
 
 
-def test_opens_after_enough_good_steps() -> None:
-    g = acceptance()
+def test_a_model_is_accepted_after_enough_good_steps() -> None:
+    a = acceptance()
     for k in range(5):
-        assert not g.accepted, k
-        g.count(step(0.0))
-    assert g.accepted
-    assert (g.error, g.known, g.switches) == (0.0, 1.0, 1)
+        assert not a.accepted, k
+        a.count(step(0.0))
+    assert a.accepted
+    assert (a.error, a.known, a.switches) == (0.0, 1.0, 1)
 
 
 def test_hysteresis() -> None:
-    g = acceptance(window=5)
+    a = acceptance(window=5)
     for off in (0, 0, 0, 0, 0):
-        g.count(step(off))
-    for off in (1, 1):  # 0.4: above what opens, below what shuts
-        g.count(step(off))
-    assert g.accepted
-    assert g.error == pytest.approx(0.4)
-    g.count(step(1.0))
-    assert not g.accepted
-    for off in (0, 0, 0, 0):  # 0.2: below what shuts, above what opens
-        g.count(step(off))
-    assert g.error == pytest.approx(0.2)
-    assert not g.accepted
-    g.count(step(0.0))
-    assert g.accepted
-    assert g.switches == 3
+        a.count(step(off))
+    for off in (1, 1):  # 0.4: too much to be accepted, too little to be rejected
+        a.count(step(off))
+    assert a.accepted
+    assert a.error == pytest.approx(0.4)
+    a.count(step(1.0))
+    assert not a.accepted
+    for off in (0, 0, 0, 0):  # 0.2: too little to be rejected, too much to be accepted
+        a.count(step(off))
+    assert a.error == pytest.approx(0.2)
+    assert not a.accepted
+    a.count(step(0.0))
+    assert a.accepted
+    assert a.switches == 3
 
 
 def test_errors_are_measured_in_what_the_property_moves() -> None:
@@ -58,31 +58,31 @@ def test_errors_are_measured_in_what_the_property_moves() -> None:
 
 
 def test_the_worst_property_decides_and_one_step_counts_once() -> None:
-    g = acceptance(least=1)
-    g.count(Verdict({KEY: 0.0, ("task", "reward"): -70.0}, {KEY: 1.0, ("task", "reward"): 1.0}))
-    assert g.error == 1.0
+    a = acceptance(least=1)
+    a.count(Verdict({KEY: 0.0, ("task", "reward"): -70.0}, {KEY: 1.0, ("task", "reward"): 1.0}))
+    assert a.error == 1.0
 
 
-def test_silence_neither_opens_nor_counts() -> None:
-    g = acceptance()
+def test_steps_without_a_prediction_neither_count_nor_accept() -> None:
+    a = acceptance()
     for _ in range(20):
-        g.count(Verdict({}, {KEY: 1.0}))
-    assert not g.accepted
-    assert (g.error, g.known) == (1.0, 0.0)
+        a.count(Verdict({}, {KEY: 1.0}))
+    assert not a.accepted
+    assert (a.error, a.known) == (1.0, 0.0)
 
 
 def test_what_never_moves_allows_no_error() -> None:
-    g = acceptance(least=1)
-    g.count(step(0.0, change=0.0))
-    assert g.error == 0.0
-    g.count(step(1e-3, change=0.0))
-    assert g.error == 0.5
+    a = acceptance(least=1)
+    a.count(step(0.0, change=0.0))
+    assert a.error == 0.0
+    a.count(step(1e-3, change=0.0))
+    assert a.error == 0.5
 
 
 @given(st.lists(st.floats(-3, 3), min_size=1, max_size=40))
-def test_open_only_below_shut_at(offs: list[float]) -> None:
-    g = acceptance(window=7, least=3)
+def test_accepted_only_below_reject_at(offs: list[float]) -> None:
+    a = acceptance(window=7, least=3)
     for off in offs:
-        g.count(step(off))
-        assert 0.0 <= g.error <= 1.0
-        assert not g.accepted or g.error < g.reject_at
+        a.count(step(off))
+        assert 0.0 <= a.error <= 1.0
+        assert not a.accepted or a.error < a.reject_at

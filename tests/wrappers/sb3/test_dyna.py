@@ -256,7 +256,7 @@ def test_a_decision_lasts_as_long_in_dreams() -> None:
 
 
 def test_a_wrong_model_is_never_dreamed_in() -> None:
-    """No harm: with the acceptance shut, training is Stable-Baselines3's own, to the last weight."""
+    """No harm: while the model is rejected, training is Stable-Baselines3's own, to the last weight."""
     from stable_baselines3.common.callbacks import BaseCallback
 
     from relgym.wrappers.sb3.dyna import Dyna
@@ -404,7 +404,7 @@ def test_what_a_accepted_model_could_have_taught_is_made_up_for_once() -> None:
         counts.append((algorithm._n_updates - before, dyna.trainer.acceptance.switches))
     assert counts[0] == (10 * 2 + 30, 1)  # the first 10 steps are random
     assert [switches for _, switches in counts] == [1, 2, 3]
-    assert counts[2][0] <= 30 * 2  # the acceptance opened again, and nothing was made up for
+    assert counts[2][0] <= 30 * 2  # accepted again, without catch-up updates
     shut = agent("SAC", flat())
     shut.learn(20, callback=Dyna(LineModel(off=1.0), DynaConfig(**QUICK, catch_up=30)))
     assert shut._n_updates == 10

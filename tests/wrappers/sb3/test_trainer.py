@@ -1,4 +1,4 @@
-"""Trust is earned on real steps: a model of the same world is accepted, one of half the friction never."""
+"""A model is accepted by its predictions of real steps: one of the same world is, one of half the friction never."""
 
 from __future__ import annotations
 

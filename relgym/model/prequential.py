@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from relgym.arguments import refusing
-from relgym.envs.arguments import checked_count
+from relgym.config.checks import checked_count
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.hindsight import WRONG
+from relgym.model.learning import LearnReport
 from relgym.model.prediction import ScenePrediction
 from relgym.model.text import Cell, table
-from relgym.model.world_model import LearnReport
-from relgym.scene.objects import Scene
+from relgym.scene.objects import Scene, Transition
 
 __all__ = ["WRONG", "Key", "Prequential", "StepReport", "compared"]
 
@@ -38,6 +38,8 @@ class StepReport:
         Those that were off by more than 1e-9 and what rounding explains, or that no mode predicted.
     learned
         What the transition taught; ``None`` when it wasn't learned from.
+    transition
+        What happened, as the model saw it; ``None`` where there was nothing to see.
     """
 
     # Gymnasium's checker asks that equally seeded episodes have equal infos. The env's are; what a learner thinks of
@@ -46,6 +48,7 @@ class StepReport:
     residuals: Mapping[Key, float] = field(compare=False)
     wrong: tuple[Key, ...] = field(compare=False)
     learned: LearnReport | None = field(compare=False)
+    transition: Transition | None = field(default=None, compare=False)
 
 
 class Prequential:

@@ -8,9 +8,9 @@ import pytest
 
 from relgym.errors import ConfigError
 from relgym.model.prediction import Outcome, Prediction, ScenePrediction
+from relgym.model.prequential import Prequential, compared
 from relgym.scene.objects import ObjectType
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.prequential import Prequential, compared
 
 A, B = ("ball", "vx"), ("ball", "vy")
 BALL = ObjectType("ball", ("vx", "vy"), optional=True)

@@ -1,0 +1,209 @@
+"""A policy that plans: it follows its plan while the world does what the model predicted, and plans anew when not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.envs.arguments import checked_count
+from relgym.errors import ConfigError
+from relgym.planning.actions import ActionCoder
+from relgym.planning.rollouts import Objective, Plan
+from relgym.planning.sequences import Search
+from relgym.planning.simulators import Simulator
+from relgym.planning.tree import TreeSearch
+from relgym.scene.objects import Float1D
+
+__all__ = ["Planner", "PlannerState"]
+
+
+@dataclass
+class PlannerState:
+    """How far one episode's plan has come; what `Planner.predict` returns beside the action.
+
+    Attributes
+    ----------
+    plan
+        What is being followed; None before the first decision.
+    taken
+        Decisions taken of it.
+    searches, surprises
+        How often the planner has searched, and how often because the world did something else than predicted.
+    """
+
+    plan: Plan | None = None
+    taken: int = 0
+    searches: int = 0
+    surprises: int = 0
+
+
+States: TypeAlias = tuple[Any, ...]
+"""What Stable-Baselines3 hands from one call of ``predict`` to the next: one `PlannerState` for each env."""
+
+
+@dataclass
+class Planner:
+    """Acts by searching in what a simulator predicts.
+
+    Parameters
+    ----------
+    simulator
+        Where to search: `ModelSimulator`, `EnvSimulator`, or anything with their methods.
+    search
+        How; default: `TreeSearch`.
+    objective
+        What for; default: the sum of rewards.
+    commit
+        Decisions of a plan that are taken before the next search; default: half the search's horizon, and all of a plan
+        that ends the episode. A surprise is followed by a search at once.
+    tolerance
+        How far a property may be off its prediction without a surprise, relative to its size (absolute below 1).
+    seconds
+        Time for one search; None: all its rounds.
+    source
+        Function from an observation to the scene (or observation of the model's env) that it shows; for agents whose
+        wrappers hide part of it: ``lambda _: env.get_wrapper_attr("scene")``. Default: the observation itself.
+    seed
+        Of the candidates.
+
+    Examples
+    --------
+    >>> import gymnasium as gym, relgym
+    >>> from relgym.planning import CrossEntropy, EnvSimulator, Planner
+    >>> env = gym.make("relgym/TruckPush-v0")
+    >>> planner = Planner(EnvSimulator(env), search=CrossEntropy(candidates=16, rounds=1))
+    >>> observation, info = env.reset(seed=0)
+    >>> action, state = planner.predict(observation)
+    >>> env.action_space.contains(action)
+    True
+
+    Notes
+    -----
+    `predict` has the signature of Stable-Baselines3's policies, so `evaluate_policy` and other loops take a planner for
+    one. The action is the plan's, whatever `deterministic` says.
+    """
+
+    simulator: Simulator
+    search: Search = field(default_factory=TreeSearch)
+    objective: Objective = field(default_factory=Objective)
+    commit: int | None = None
+    tolerance: float = 1e-6
+    seconds: float | None = None
+    source: Callable[[Any], Any] | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.simulator, Simulator):
+            raise ConfigError(
+                f"simulator={self.simulator!r}: expected a ModelSimulator(model), an EnvSimulator(env), or an object "
+                "with action_space, observation_space, state, prepare and step"
+            )
+        if self.commit is not None:
+            checked_count("commit", self.commit, 1, 10**9)
+        for name in ("tolerance", "seconds"):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, (int, float)) and 0.0 <= value < np.inf):
+                raise ConfigError(f"{name}={value!r}: expected a finite number of at least 0")
+        self.coder = ActionCoder(self.simulator.action_space)
+        self._rng = np.random.default_rng(checked_count("seed", self.seed, 0, 2**63))
+
+    def predict(
+        self,
+        observation: Any,
+        state: States | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Any, States]:
+        """Choose an action for an observation, or one for each of a batch.
+
+        Parameters
+        ----------
+        observation
+            One, or a batch with a leading axis as vector envs give it.
+        state
+            What the last call returned; None: episodes begin.
+        episode_start
+            Where an episode begins, shape ``(n,)``; plans of the last one are forgotten there.
+        deterministic
+            Without meaning here.
+
+        Returns
+        -------
+        The action or actions, and the state for the next call.
+
+        Raises
+        ------
+        ObservationError
+            The simulator can't read the observation.
+        """
+        count = self._batch(observation)
+        seen = [observation] if count is None else [_picked(observation, k) for k in range(count)]
+        begun = np.zeros(len(seen), dtype=np.bool_) if episode_start is None else np.asarray(episode_start)
+        threads = [
+            PlannerState() if state is None or begun.reshape(-1)[k] else state[k] for k in range(len(seen))
+        ]
+        actions = [self.act(one, thread) for one, thread in zip(seen, threads, strict=True)]
+        return (actions[0] if count is None else np.stack(actions)), tuple(threads)
+
+    def act(self, observation: Any, thread: PlannerState) -> Any:
+        """Choose an action for one observation, and note in `thread` how far the plan has come."""
+        shown = observation if self.source is None else self.source(observation)
+        now = self.simulator.state(shown)
+        if (plan := thread.plan) is None or self._due(plan, thread, now):
+            warm = None if plan is None else plan.latents[thread.taken :]
+            plan = self.plan(now, warm=warm)
+            thread.plan, thread.taken = plan, 0
+            thread.searches += 1
+        action = plan.actions[thread.taken]
+        thread.taken += 1
+        return action
+
+    def plan(self, now: Float1D, *, warm: NDArray[np.float64] | None = None) -> Plan:
+        """Search from a state vector; `warm`: latents to begin with."""
+        self.simulator.prepare()
+        deadline = None if self.seconds is None else perf_counter() + self.seconds
+        return self.search.plan(
+            self.simulator, self.coder, now, self.objective, warm=warm, rng=self._rng, deadline=deadline
+        )
+
+    def _due(self, plan: Plan, thread: PlannerState, now: Float1D) -> bool:
+        """Whether to search: the plan is used up, or the world did something else."""
+        taken = thread.taken
+        if taken >= len(plan.states):  # its outcome wasn't known
+            return True
+        expected = plan.states[taken]
+        off = np.abs(now - expected) > self.tolerance * np.maximum(1.0, np.abs(expected))
+        if now.shape != expected.shape or bool(off.any()):
+            thread.surprises += 1
+            return True
+        if taken >= len(plan.actions):
+            return True
+        if plan.terminates:
+            return False
+        return taken >= (self.commit or max(1, self.search.horizon // 2))
+
+    def _batch(self, observation: Any) -> int | None:
+        """How many observations there are; None: one, without a leading axis."""
+        if self.source is not None:
+            return (
+                None if not isinstance(observation, np.ndarray) or observation.ndim < 2 else len(observation)
+            )
+        space: Any = self.simulator.observation_space
+        own = next(iter(space.spaces.values())) if hasattr(space, "spaces") else space
+        one: Any = observation
+        if isinstance(observation, dict):
+            one = next(iter(observation.values()))
+        if not isinstance(one, np.ndarray) or one.ndim != len(own.shape or ()) + 1:
+            return None
+        return len(one)
+
+
+def _picked(observation: Any, k: int) -> Any:
+    if isinstance(observation, dict):
+        return {name: part[k] for name, part in observation.items()}
+    return observation[k]

@@ -1,0 +1,326 @@
+"""A search tree that spreads over the states that can be reached: for goals behind obstacles (§5.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.envs.arguments import checked_count
+from relgym.errors import ConfigError
+from relgym.planning.actions import ActionCoder
+from relgym.planning.rollouts import Objective, Plan
+from relgym.planning.sequences import Search
+from relgym.planning.simulators import Simulator
+from relgym.scene.objects import Float1D, Float2D
+
+__all__ = ["TreeSearch"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TreeSearch:
+    """Grows a tree of states where it has hardly been, and takes the best branch.
+
+    Sequences of actions that are drawn about a mean stay this side of an obstacle when the way round it pays less at
+    first. The tree goes wherever the world lets it: it keeps, of every cell of a coarse grid over the properties that
+    change, the best branch, and grows again from cells that were seldom grown from (cells as in Go-Explore, Ecoffet et
+    al. 2021; kinodynamic trees, LaValle and Kuffner 2001, the RRT that the thesis wished for, §5.1). Branches of
+    different lengths are compared as if what remains of the horizon paid the mean reward of all steps of the tree.
+
+    Parameters
+    ----------
+    horizon
+        Decisions that a branch lasts at most.
+    expansions
+        Branches tried.
+    batch
+        Branches tried at once: one call of the simulator for each decision of theirs.
+    hold
+        Most decisions that an action is held for.
+    cells
+        Intervals that the range of each changing property is cut into.
+    greedy
+        Share of the expansions that begin at the best branches so far, in [0, 1].
+    patience
+        Ends the search when so many expansions have not improved the best branch that ends the episode.
+    refine
+        A search over sequences that goes on from the tree's plan; None: the plan is the branch.
+
+    Notes
+    -----
+    Cost: ``expansions x (hold + 1) / 2`` decisions of the simulator; memory for as many states as there are cells.
+    Branches of which an outcome isn't known end there, at no worth.
+    """
+
+    horizon: int = 50
+    expansions: int = 4_096
+    batch: int = 128
+    hold: int = 3
+    cells: int = 16
+    greedy: float = 0.3
+    patience: int = 2_048
+    refine: Search | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("horizon", "expansions", "batch", "hold", "cells", "patience"):
+            checked_count(name, getattr(self, name), 1, 10**9)
+        if not 0.0 <= self.greedy <= 1.0:
+            raise ConfigError(f"greedy={self.greedy!r}: expected a share in [0, 1]")
+
+    def plan(
+        self,
+        simulator: Simulator,
+        coder: ActionCoder,
+        start: Float1D,
+        objective: Objective,
+        *,
+        warm: Float2D | None,
+        rng: np.random.Generator,
+        deadline: float | None,
+    ) -> Plan:
+        """See `Search.plan`; the last plan is not needed."""
+        tree = _Tree(start, self.cells, self.horizon)
+        fresh, tried = 0, 0
+        while tried < self.expansions and fresh < self.patience:
+            if tried and deadline is not None and perf_counter() >= deadline:
+                break
+            improved = self._expand(tree, simulator, coder, objective, rng)
+            tried += self.batch
+            # While none that ends the episode is the best of all there is no reason to stop.
+            settled = tree.ended >= 0 and tree.best(objective) == tree.ended
+            fresh = fresh + self.batch if settled and not improved else 0
+        plan = tree.branch(tree.best(objective), coder)
+        if self.refine is None:
+            return plan
+        return self._refined(plan, simulator, coder, start, objective, rng, deadline)
+
+    def _expand(
+        self,
+        tree: _Tree,
+        simulator: Simulator,
+        coder: ActionCoder,
+        objective: Objective,
+        rng: np.random.Generator,
+    ) -> bool:
+        """One batch of branches; whether the best one that ends the episode has become better."""
+        nodes = tree.chosen(self.batch, self.greedy, rng)
+        latents = rng.standard_normal((len(nodes), coder.size))
+        hold = min(int(rng.integers(1, self.hold + 1)), self.horizon)
+        actions = coder.actions(latents)
+        before = tree.ended_worth
+        alive = np.arange(len(nodes))
+        for _ in range(hold):
+            alive = alive[tree.depths[nodes[alive]] < self.horizon]
+            if not len(alive):
+                break
+            states = tree.states[nodes[alive]]
+            stepped = simulator.step(states, actions[alive])
+            worth = stepped.rewards
+            if objective.bonus is not None:
+                worth = worth + objective.bonus(states, actions[alive], stepped.states)
+            worth = objective.discount ** tree.depths[nodes[alive]] * worth
+            known = stepped.known
+            grown = tree.grow(
+                nodes[alive[known]],
+                stepped.states[known],
+                stepped.rewards[known],
+                worth[known],
+                latents[alive[known]],
+                stepped.terminated[known],
+            )
+            nodes = nodes.copy()
+            nodes[alive[known]] = grown
+            alive = alive[known & ~stepped.terminated]
+        tree.settle(nodes[alive])
+        return tree.ended_worth > before
+
+    def _refined(
+        self,
+        plan: Plan,
+        simulator: Simulator,
+        coder: ActionCoder,
+        start: Float1D,
+        objective: Objective,
+        rng: np.random.Generator,
+        deadline: float | None,
+    ) -> Plan:
+        """The plan, or what a search about it finds that is better."""
+        assert self.refine is not None, "asked only then"
+        other = self.refine.plan(
+            simulator, coder, start, objective, warm=plan.latents, rng=rng, deadline=deadline
+        )
+        return other if other.worth > plan.worth else plan
+
+
+@dataclass
+class _Tree:
+    """States that were reached, each with the decision that led to it."""
+
+    start: Float1D
+    cells: int
+    horizon: int
+    states: Float2D = field(init=False)
+    rewards: Float1D = field(init=False)
+    worths: Float1D = field(init=False)
+    depths: NDArray[np.intp] = field(init=False)
+    parents: NDArray[np.intp] = field(init=False)
+    latents: Float2D | None = field(init=False, default=None)
+    size: int = field(init=False, default=1)
+    ended: int = field(init=False, default=-1)
+    ended_worth: float = field(init=False, default=-np.inf)
+    worths_gained: float = field(init=False, default=0.0)
+
+    def __post_init__(self) -> None:
+        room = 1024
+        self.states = np.empty((room, len(self.start)))
+        self.states[0] = self.start
+        self.rewards, self.worths = np.zeros(room), np.zeros(room)
+        self.depths, self.parents = np.zeros(room, dtype=np.intp), np.full(room, -1, dtype=np.intp)
+        self._members: dict[bytes, int] = {}
+        self._visits: dict[bytes, int] = {}
+        self._low, self._high = self.start.copy(), self.start.copy()
+        self._sizes = np.full(len(self.start), np.inf)
+        self._root_visits = 0
+        self._place(np.zeros(1, dtype=np.intp))
+
+    def chosen(self, count: int, greedy: float, rng: np.random.Generator) -> NDArray[np.intp]:
+        """Nodes to grow from: the best of seldom visited cells, and of all the best. The root always is one."""
+        keys = [key for key, node in self._members.items() if self.depths[node] < self.horizon]
+        nodes = np.array([0, *(self._members[key] for key in keys)], dtype=np.intp)
+        visits = np.array([self._root_visits, *(self._visits[key] for key in keys)], dtype=np.float64)
+        weights = 1.0 / np.sqrt(1.0 + visits)
+        drawn = rng.choice(len(nodes), size=count, p=weights / weights.sum())
+        eager = rng.random(count) < greedy
+        if eager.any():
+            best = np.argsort(-self.scores(nodes), kind="stable")[: max(1, len(nodes) // 20)]
+            drawn[eager] = best[rng.integers(len(best), size=int(eager.sum()))]
+        for k in drawn.tolist():
+            if k:
+                self._visits[keys[k - 1]] += 1
+            else:
+                self._root_visits += 1
+        return nodes[drawn]
+
+    def scores(self, nodes: NDArray[np.intp]) -> Float1D:
+        """Worth of branches that go on, as if the rest of the horizon paid the mean of all steps so far."""
+        mean = float(self.worths_gained / max(self.size - 1, 1))
+        score: Float1D = self.worths[nodes] + (self.horizon - self.depths[nodes]) * mean
+        return score
+
+    def grow(
+        self,
+        parents: NDArray[np.intp],
+        states: Float2D,
+        rewards: Float1D,
+        worths: Float1D,
+        latents: Float2D,
+        ended: NDArray[np.bool_],
+    ) -> NDArray[np.intp]:
+        """Add a node to each parent; returns their numbers."""
+        count = len(parents)
+        self._make_room(self.size + count, latents.shape[1])
+        new = np.arange(self.size, self.size + count)
+        self.states[new], self.rewards[new] = states, rewards
+        self.worths[new] = self.worths[parents] + worths
+        self.depths[new], self.parents[new] = self.depths[parents] + 1, parents
+        self.worths_gained += float(worths.sum())
+        assert self.latents is not None, "made with room"
+        self.latents[new] = latents
+        self.size += count
+        if count:
+            np.minimum(self._low, states.min(axis=0), out=self._low)
+            np.maximum(self._high, states.max(axis=0), out=self._high)
+        if ended.any():
+            last = new[ended]
+            best = int(last[self.worths[last].argmax()])
+            if self.worths[best] > self.ended_worth:
+                self.ended, self.ended_worth = best, float(self.worths[best])
+        return new
+
+    def settle(self, nodes: NDArray[np.intp]) -> None:
+        """Let new nodes take the cells that they are the best of."""
+        if not len(nodes):
+            return
+        span = self._high - self._low
+        # Powers of two: ranges grow as the tree does, and cells are to stay what they are for a while.
+        sizes = np.exp2(np.ceil(np.log2(np.where(span > 0.0, span, 1.0)))) / self.cells
+        sizes[span == 0.0] = np.inf  # what doesn't change tells nothing apart
+        if not np.array_equal(sizes, self._sizes):
+            self._sizes = sizes
+            members, self._members, self._visits = list(self._members.values()), {}, {}
+            self._place(np.array(members, dtype=np.intp))
+        self._place(nodes)
+
+    def _place(self, nodes: NDArray[np.intp]) -> None:
+        grid = np.floor((self.states[nodes] - self.start) / self._sizes).astype(np.int16)
+        scores = self.scores(nodes)
+        for node, cell, score in zip(nodes.tolist(), grid, scores.tolist(), strict=True):
+            key = cell.tobytes()
+            old = self._members.get(key)
+            if old is None or score > float(self.scores(np.array([old]))[0]):
+                self._members[key] = node
+                self._visits.setdefault(key, 0)
+
+    def best(self, objective: Objective) -> int:
+        """The branch that is worth most: one that ends the episode, or the best of all cells."""
+        nodes = np.array(list(self._members.values()), dtype=np.intp)
+        worth = self.scores(nodes)
+        if objective.value is not None:
+            worth += objective.discount ** self.depths[nodes] * objective.value(self.states[nodes])
+        worth[nodes == 0] = -np.inf  # a plan has a first action
+        k = int(worth.argmax())
+        if self.ended >= 0 and self.ended_worth >= worth[k]:
+            return self.ended
+        return int(nodes[k])
+
+    def branch(self, node: int, coder: ActionCoder) -> Plan:
+        """The way from the root to a node, as a plan; of the root alone an action at the latents' middle."""
+        path = []
+        while node > 0:
+            path.append(node)
+            node = int(self.parents[node])
+        path.reverse()
+        if not path or self.latents is None:
+            latents = np.zeros((1, coder.size))
+            return Plan(
+                coder.actions(latents), self.start[None].copy(), np.zeros(0), -np.inf, False, False, latents
+            )
+        latents = self.latents[path].copy()
+        states = np.concatenate([self.start[None], self.states[path]])
+        last = path[-1]
+        return Plan(
+            coder.actions(latents),
+            states,
+            self.rewards[path].copy(),
+            float(self.worths[last]),
+            last == self.ended,
+            True,
+            latents,
+        )
+
+    def _make_room(self, needed: int, size: int) -> None:
+        room = len(self.states)
+        if self.latents is None:
+            self.latents = np.zeros((room, size))
+        if needed <= room:
+            return
+        grown = max(needed, 2 * room)
+
+        def longer(array: NDArray[Any]) -> NDArray[Any]:
+            whole = np.zeros((grown, *array.shape[1:]), dtype=array.dtype)
+            whole[:room] = array
+            return whole
+
+        self.states, self.rewards, self.worths = (
+            longer(self.states),
+            longer(self.rewards),
+            longer(self.worths),
+        )
+        self.depths, self.parents, self.latents = (
+            longer(self.depths),
+            longer(self.parents),
+            longer(self.latents),
+        )
