@@ -172,6 +172,8 @@ class Background:
 
     def _check(self) -> None:
         """Raise what the process failed of, or that it has ended; unasked it says nothing else."""
+        if not self._process.is_alive():
+            self._reader.join(1.0)  # its last words come before its end
         while self._trouble is None and not self._inbox.empty():
             said = self._inbox.get()
             if said is None:
