@@ -1,7 +1,21 @@
 """Gymnasium envs whose observations are scenes of rigid objects; imported as ``relgym.envs``."""
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` loads it
+    from relgym.envs.agents import AgentsEnv, AgentsSpace
+    from relgym.envs.ball_box_ramp import BallBoxRampEnv
+    from relgym.envs.ball_goal import BallGoalEnv
+    from relgym.envs.base import EnvState, SceneEnv
+    from relgym.envs.flat import FlatSpec, Flattener
+    from relgym.envs.learned_model import LearnedModelEnv
+    from relgym.envs.learned_model_rewards import in_batches
+    from relgym.envs.learned_model_starts import drawn_from
+    from relgym.envs.learned_model_vector import LearnedModelVectorEnv
+    from relgym.envs.rendering import render_scene
+    from relgym.envs.tasks import Task
+    from relgym.envs.truck_push import TruckPushEnv
 
 if __name__ != "relgym.envs":
     raise ImportError(
@@ -47,10 +61,12 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {sorted(_HOMES)}")
-    return getattr(importlib.import_module(_HOMES[name]), name)
+if not TYPE_CHECKING:  # checkers would take any name
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {sorted(_HOMES)}")
+        return getattr(importlib.import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -38,6 +38,8 @@ _COLOURS: dict[str, Colour] = {
     "wall": (188, 190, 193),
     "ceiling": (203, 204, 207),
 }
+_GLASS: Colour = (214, 232, 240)
+_WHEELED = frozenset({"truck"})
 _PALETTE: tuple[Colour, ...] = (
     (142, 110, 176),
     (205, 164, 67),
@@ -64,7 +66,7 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class _Drawn:
-    """What one body looks like: corners of its outline, or a disc, in world units."""
+    """What one body looks like: corners of its outline, or a disc, in world units; with wheels or without."""
 
     body: SceneObject
     colour: Colour
@@ -72,6 +74,7 @@ class _Drawn:
     depth: float
     corners: Float2D | None
     radius: float
+    wheeled: bool = False
 
 
 def render_scene(
@@ -278,6 +281,24 @@ class _Pen:
         corners = [self._pixel(corner) for corner in drawn.corners]
         self._pygame.draw.polygon(self._canvas, drawn.colour, corners)
         self._pygame.draw.polygon(self._canvas, _INK, corners, self._line)
+        if drawn.wheeled:
+            self._truck(drawn.corners.min(axis=0), drawn.corners.max(axis=0))
+
+    def _truck(self, low: Float1D, high: Float1D) -> None:
+        """A windscreen and two wheels inside a body's box: its outline stays what touches other bodies."""
+        width, height = high - low
+        across, up = np.array([width, 0.0]), np.array([0.0, height])
+        screen = [
+            low + a * across + b * up for a, b in ((0.62, 0.55), (0.93, 0.55), (0.86, 0.88), (0.62, 0.88))
+        ]
+        pane = [self._pixel(corner) for corner in screen]
+        self._pygame.draw.polygon(self._canvas, _GLASS, pane)
+        self._pygame.draw.polygon(self._canvas, _INK, pane, self._line)
+        radius = 0.19 * min(height, 0.6 * width)
+        for a in (0.2, 0.8):
+            hub = self._pixel(low + a * across + np.array([0.0, radius]))
+            self._pygame.draw.circle(self._canvas, _INK, hub, self._scale * radius)
+            self._pygame.draw.circle(self._canvas, _GRID, hub, 0.45 * self._scale * radius)
 
     def arrow(self, start: Float1D, step: Float1D, longest: float) -> None:
         """Draw the way of some steps from `start`."""
@@ -320,10 +341,18 @@ def _drawn(scene: Scene, body: SceneObject, pose: Float1D) -> _Drawn:
     first, up, depth = axes.canonical
     z = 0.0 if axes.planar else float(pose[depth])
     centre = np.array([pose[first], pose[up] - _OBLIQUE * z])
-    colour = _colour(scene.schema.ancestry(body.type.name)[-1])
+    kind = scene.schema.ancestry(body.type.name)[-1]
+    colour = _colour(kind)
     if isinstance(body.type.shape, Sphere):
         return _Drawn(body, colour, centre, z, None, float(pose[POSE.index("sx")]) / 2)
-    return _Drawn(body, colour, centre, z, centre + _outline(axes, body, pose), 0.0)
+    corners = centre + _outline(axes, body, pose)
+    return _Drawn(body, colour, centre, z, corners, 0.0, wheeled=kind in _WHEELED and _upright(corners))
+
+
+def _upright(corners: Float2D) -> bool:
+    """Whether an outline is a rectangle along the picture's edges."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return len(corners) == 4 and bool((np.isclose(corners, low) | np.isclose(corners, high)).all())
 
 
 def _outline(axes: Axes, body: SceneObject, pose: Float1D) -> Float2D:

@@ -51,7 +51,9 @@ class SwingUp:
 
     def reward(self, before: Any, action: Any, after: Any) -> float:
         """Of one step."""
-        return float(self.rewards(before.layout, before.vector[None], np.asarray(action)[None], after.vector[None])[0])
+        return float(
+            self.rewards(before.layout, before.vector[None], np.asarray(action)[None], after.vector[None])[0]
+        )
 
     def terminated(self, before: Any, action: Any, after: Any) -> bool:
         """Never."""

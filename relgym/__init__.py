@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import importlib
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 
-__all__ = ["Dataset", "WorldModel", "data", "envs", "fit", "progressive", "score", "wrappers"]
+if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` loads it
+    from relgym import data, envs, wrappers
+    from relgym.data.dataset import Dataset
+    from relgym.data.learner import fit, progressive, score
+    from relgym.model.world_model import WorldModel
 
-# Python started in a checkout takes ./relgym before an installed wheel; envs/ and wrappers/ lie beside it.
-_ROOT = Path(__file__).resolve().parent.parent
-if (_ROOT / "pyproject.toml").is_file() and (_ROOT / "envs" / "__init__.py").is_file():
-    __path__.append(str(_ROOT))
+    __version__: str
+
+__all__ = ["Dataset", "WorldModel", "__version__", "data", "envs", "fit", "progressive", "score", "wrappers"]
 
 # Entry points are strings: importing relgym loads neither pymunk nor the learner.
 gymnasium.register("relgym/BallBoxRamp-v0", "relgym.envs.ball_box_ramp:BallBoxRampEnv", max_episode_steps=200)
@@ -35,11 +37,29 @@ _LAZY_NAMES = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    if name in _LAZY_MODULES:
-        return importlib.import_module(f"relgym.{name}")
-    if name in _LAZY_NAMES:
-        return getattr(importlib.import_module(_LAZY_NAMES[name]), name)
-    raise AttributeError(
-        f"module 'relgym' has no attribute {name!r}; it has {sorted([*_LAZY_MODULES, *_LAZY_NAMES])}"
-    )
+if not TYPE_CHECKING:  # checkers would take any name
+
+    def __getattr__(name: str) -> Any:
+        if name in _LAZY_MODULES:
+            return importlib.import_module(f"relgym.{name}")
+        if name in _LAZY_NAMES:
+            return getattr(importlib.import_module(_LAZY_NAMES[name]), name)
+        if name == "__version__":  # reading what is installed takes milliseconds: not at every import
+            return _version()
+        raise AttributeError(
+            f"module 'relgym' has no attribute {name!r}; it has {sorted([*_LAZY_MODULES, *_LAZY_NAMES])}"
+        )
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _version() -> str:
+    """Version of the installed distribution; that of a checkout that nobody installed is unknown."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("relgym")
+    except PackageNotFoundError:
+        return "0+unknown"

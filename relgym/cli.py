@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from relgym.console.learning import Lesson, Round
-    from relgym.experiments.demo import Demonstration, DemoOutcome
-    from relgym.experiments.plots import Trajectory
 
 __all__ = ["app"]
 
@@ -89,27 +87,36 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for models and pictures.")] = Path("out/demo"),
     seed: Seed = 0,
     quick: Annotated[bool, typer.Option(help="Learn from a few episodes only.")] = False,
+    jobs: Annotated[int, typer.Option(help="How many processes.", min=1)] = 2,
     as_json: Json = False,
 ) -> None:
     """Learn the laws of two small worlds from scratch, online; print, measure and draw them."""
-    from relgym.experiments.demo import demonstrations, draw
+    from relgym.experiments.demo import demonstrate_all, demonstrations, draw
 
     out.mkdir(parents=True, exist_ok=True)
-    outcomes, paths = {}, []
-    for shown in demonstrations(quick=quick):
-        outcomes[shown.name], own = _demonstrate(shown, out, seed)
-        paths += own
-        if not as_json:
-            typer.echo(outcomes[shown.name])
+    shown = demonstrations(quick=quick)
+    outcomes, dreams = [], []
+    with _progress() as bar:
+        tasks = {each.name: bar.add_task(each.name, total=each.episodes) for each in shown}
+        results = demonstrate_all(
+            shown, out, seed=seed, jobs=jobs, told=lambda name, done: bar.update(tasks[name], completed=done)
+        )
+        for each, (outcome, own) in zip(shown, results, strict=True):
+            bar.update(tasks[each.name], completed=each.episodes)
+            outcomes.append(outcome)
+            dreams.append(own)
+            if not as_json:
+                typer.echo(outcome)
     pictures: dict[str, str] = {}
     try:
-        pictures = draw(out, outcomes.values(), paths[::-1])
+        pictures = draw(out, shown, outcomes, dreams)
     except ConfigError as missing:
         typer.secho(f"no pictures: {missing}", fg="yellow", err=True)
+    worlds = {each.name: outcome for each, outcome in zip(shown, outcomes, strict=True)}
     if as_json:
-        _echo_json({"worlds": outcomes, "pictures": pictures})
+        _echo_json({"worlds": worlds, "pictures": pictures})
     else:
-        models = {f"{name} model": outcome.file for name, outcome in outcomes.items()}
+        models = {f"{name} model": outcome.file for name, outcome in worlds.items()}
         typer.echo(f"Written:\n{_columns(models | pictures)}")
 
 
@@ -169,13 +176,30 @@ def learn(
 def rules(
     model: ModelFile,
     digits: Annotated[int, typer.Option(help="Significant digits of coefficients.", min=1, max=17)] = 7,
+    details: Annotated[bool, typer.Option(help="Tables of modes, clauses of each pair, and roles.")] = False,
+    check: Annotated[bool, typer.Option(help="Measure on fresh steps how well the text agrees.")] = False,
+    steps: Annotated[int, typer.Option(help="So many steps for --check.", min=1)] = 2000,
+    env_id: OtherEnv = None,
+    arg: Arguments = None,
+    view: ViewOption = None,
+    seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
-    """Print a model: modes, functions, clauses, roles."""
-    from relgym.console.models import loaded
+    """Print a model as rules: if, elif, else."""
+    from relgym.console.models import loaded, opened
+    from relgym.wrappers.follower import scenes_of
 
-    known = loaded(model)
-    _echo_json(_report(known, digits)) if as_json else typer.echo(known.describe(digits=digits))
+    if as_json:
+        _echo_json(_report(loaded(model), digits))
+        return
+    if not check:
+        typer.echo(loaded(model).describe(details=details, digits=digits))
+        return
+    with _working("checking"):
+        found = opened(model, env_id, pairs("--arg", arg), view)
+        fresh = scenes_of(found.env, found.view, steps, seed=seed)
+        text = found.model.describe(details=details, digits=digits, check=fresh)
+    typer.echo(text)
 
 
 @app.command()
@@ -328,24 +352,6 @@ def doctor(as_json: Json = False) -> None:
 
 
 # ------------------------------------------------------------------ helpers
-def _demonstrate(shown: Demonstration, out: Path, seed: int) -> tuple[DemoOutcome, list[Trajectory]]:
-    """Learn one world under a progress bar, save the model and measure it."""
-    from relgym.experiments.demo import DemoOutcome, learn_online, measure, trajectories
-
-    env, curve = shown.make(), []
-    with _progress() as bar:
-        task = bar.add_task(shown.name, total=shown.episodes)
-        for episode in learn_online(env, shown, seed=seed):
-            curve.append(episode)
-            bar.advance(task)
-        seconds = round(bar.tasks[task].elapsed or 0.0, 2)
-    file, steps = out / f"{shown.name}.json", sum(episode.steps for episode in curve)
-    env.save(file)
-    figures = measure(env.model, shown, seed=seed + _FRESH)
-    outcome = DemoOutcome(shown.title, steps, seconds, _report(env.model), figures, tuple(curve), str(file))
-    return outcome, trajectories(env.model, shown, seed=figures.seed)
-
-
 def _show_lessons(learned: Callable[..., Iterator[Round]], lesson: Lesson, as_json: bool) -> None:
     """Learn under a progress bar; say what came of each round, and what to do next."""
     from relgym.console.next_steps import next_steps

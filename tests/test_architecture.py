@@ -3,34 +3,37 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import os
 import shutil
 import subprocess
 import sys
-import sysconfig
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TypeGuard
 
 import pytest
 from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 
-FOUNDATION = frozenset({"errors", "arguments", "config"})
+FOUNDATION = frozenset({"errors", "arguments", "config", "html"})
 ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ENGINES | {"clustering", "classification", "laws"}
-CORE = LEARNERS | {"model"}
+CORE = LEARNERS | {"reporting", "model"}
 
 MAY_IMPORT = {
     "errors": frozenset(),
     "arguments": frozenset({"errors"}),
     "config": frozenset({"errors", "arguments"}),
+    "html": frozenset(),
     "scene": FOUNDATION,
     "numeric": FOUNDATION,
     "logic": FOUNDATION,
     "clustering": ENGINES,
     "classification": ENGINES,
     "laws": ENGINES | {"clustering"},
-    "model": LEARNERS,
+    "reporting": ENGINES | {"clustering", "laws"},
+    "model": LEARNERS | {"reporting"},
     "baselines": CORE,
     "envs": CORE,
     "wrappers": CORE | {"envs"},
@@ -75,7 +78,7 @@ def test_packages_import_only_what_lies_below(package: str) -> None:
 
 def test_no_relative_imports() -> None:
     wrong = [_sentence(m, i) for m in modules() for i in m.imports if i.target.startswith(".")]
-    assert not wrong, "write the whole name: envs/ and wrappers/ move on installation\n" + "\n".join(wrong)
+    assert not wrong, "write the whole name: envs/ and wrappers/ are packages of relgym\n" + "\n".join(wrong)
 
 
 def test_nobody_imports_from_the_root() -> None:
@@ -145,20 +148,22 @@ def test_second_copies_refuse_to_be_imported(name: str) -> None:
 
 def test_a_checkout_that_shadows_the_wheel_is_whole() -> None:
     # -S: no editable install, so that ./relgym is all there is, as when a wheel is installed elsewhere.
-    libraries = os.pathsep.join(dict.fromkeys(sysconfig.get_path(key) for key in ("purelib", "platlib")))
+    libraries = os.pathsep.join(path for path in sys.path if Path(path).name == "site-packages")
     code = "import relgym.envs, relgym.wrappers; print(relgym.envs.__file__, relgym.wrappers.__file__)"
     run = _python(code, "-S", cwd=ROOT, PYTHONPATH=libraries)
-    assert run.stdout.split() == [str(FOLDERS[p] / "__init__.py") for p in ("relgym.envs", "relgym.wrappers")]
+    found = [Path(file).resolve() for file in run.stdout.split()]
+    assert found == [FOLDERS[p] / "__init__.py" for p in ("relgym.envs", "relgym.wrappers")]
 
 
 @pytest.mark.parametrize("package", ["envs", "wrappers"])
 def test_mypy_sees_what_is_wrong(package: str, tmp_path: Path) -> None:
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    shutil.copytree(ROOT / "tests" / "typings", tmp_path / "tests" / "typings", symlinks=True)
     for folder in ("relgym", "envs", "wrappers"):
         (tmp_path / folder).mkdir()
         planted = 'number: int = "text"\n' if folder == package else ""
         (tmp_path / folder / "__init__.py").write_text(planted)
+    for link in ("envs", "wrappers"):
+        (tmp_path / "relgym" / link).symlink_to((ROOT / "relgym" / link).readlink())
     run = subprocess.run(
         [sys.executable, "-m", "mypy"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
@@ -166,6 +171,33 @@ def test_mypy_sees_what_is_wrong(package: str, tmp_path: Path) -> None:
         run.stdout + run.stderr
     )
     assert "Found 1 error in 1 file (checked 3 source files)" in run.stdout
+
+
+def test_installing_the_checkout_puts_one_package_on_the_path() -> None:
+    assert _pyproject()["tool"]["setuptools"]["package-dir"] == {"": "src"}
+    assert [path.name for path in (ROOT / "src").iterdir() if path.suffix != ".egg-info"] == ["relgym"]
+    for name, folder in FOLDERS.items():
+        assert (ROOT / "src").joinpath(*name.split(".")).resolve() == folder
+
+
+@pytest.mark.parametrize("package", ["relgym", "relgym.envs", "relgym.wrappers", "relgym.wrappers.sb3"])
+def test_type_checkers_see_every_name_that_is_loaded_on_first_use(package: str) -> None:
+    (facade,) = [module for module in modules() if module.name == package]
+    (seen,) = [node for node in facade.tree.body if _for_checkers(node)]
+    loaded = {
+        alias.name: line.module
+        for line in seen.body
+        if isinstance(line, ast.ImportFrom)
+        for alias in line.names
+    }
+    told = vars(importlib.import_module(package))
+    homes = told.get("_HOMES") or told["_LAZY_NAMES"] | dict.fromkeys(told["_LAZY_MODULES"], "relgym")
+    assert loaded == homes
+    assert loaded.keys() == set(told["__all__"]) - {"__version__"}
+
+
+def _for_checkers(node: ast.stmt) -> TypeGuard[ast.If]:
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
 
 
 def _upward(package: str, found: Import) -> bool:

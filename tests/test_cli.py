@@ -26,16 +26,23 @@ def run(*arguments: Any, code: int = 0) -> str:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder that holds what `relgym demo --quick --json` wrote, and its output."""
     out = tmp_path_factory.mktemp("demo")
-    (out / "output.json").write_text(run("demo", "--quick", "--json", "--out", out), encoding="utf-8")
+    (out / "output.json").write_text(
+        run("demo", "--quick", "--json", "--jobs", 1, "--out", out), encoding="utf-8"
+    )
     return out
 
 
 def test_demo_tells_what_it_learned_measured_and_wrote(folder: Path) -> None:
     told = json.loads((folder / "output.json").read_text(encoding="utf-8"))
-    assert set(told["worlds"]) == {"truck", "ball"}
-    truck, ball = told["worlds"]["truck"], told["worlds"]["ball"]
-    assert (truck["transitions"], ball["transitions"]) == (320, 1600)
-    functions = {m["function"] for m in ball["report"]["targets"][0]["modes"]}
+    assert list(told["worlds"]) == ["ball", "modes", "truck"]
+    ball, modes, truck = told["worlds"].values()
+    assert [each["transitions"] for each in (ball, modes, truck)] == [1600, 1600, 320]
+    assert ball["figures"]["verdict"]["right"] == ball["figures"]["verdict"]["steps"] == 2400
+    assert ball["figures"]["verdict"]["exact"] == 12
+    assert modes["figures"]["verdict"]["right"] < 2400
+    statements = [law["statement"] for law in ball["report"]["laws"]]
+    assert "v'_n = max(u_n, -0.9 v_n)" in statements and not ball["report"]["targets"]
+    functions = {m["function"] for m in modes["report"]["targets"][0]["modes"]}
     assert {"vx' = vx", "vx' = -0.9 vx"} <= functions
     assert len(ball["curve"]) == 8 and ball["figures"]["evaluation"]["targets"]
     for file in (*told["pictures"].values(), truck["file"], ball["file"]):
@@ -43,11 +50,12 @@ def test_demo_tells_what_it_learned_measured_and_wrote(folder: Path) -> None:
 
 
 def test_demo_in_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    truck, folder = demo.demonstrations(quick=True)[0], tmp_path
+    truck, folder = demo.demonstrations(quick=True)[2], tmp_path
     monkeypatch.setattr(demo, "demonstrations", lambda *, quick: (truck,))
-    text = run("demo", "--quick", "--out", folder)
+    text = run("demo", "--quick", "--jobs", 1, "--out", folder)
     assert "vx' = vx + 0.025 action.force - 7.5 box.friction" in text
-    assert "On fresh scenes" in text
+    verdict = text.index("of 320 fresh steps")
+    assert verdict < text.index("vx' = vx")
     for file in ("truck.json", "trajectories.png", "learning.png"):
         assert str(folder / file) in text
     assert max(map(len, text.split("\n"))) <= max(100, len(str(folder)) + 40)
@@ -67,7 +75,7 @@ def test_dyna_shows_both_agents_and_the_laws(tmp_path: Path) -> None:
 def test_rules_print_a_model(folder: Path) -> None:
     model = WorldModel.load(folder / "ball.json")
     assert run("rules", folder / "ball.json").rstrip("\n") == model.describe()
-    told = json.loads(run("rules", folder / "ball.json", "--json"))
+    told = json.loads(run("rules", folder / "modes.json", "--json"))
     assert [t["target"] for t in told["targets"]] == ["ball.vx", "ball.vy"]
 
 

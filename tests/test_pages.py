@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
 
+import gymnasium as gym
 import pages
 import pytest
+from PIL import Image
+
+import relgym  # noqa: F401  (registers the envs)
 
 NEEDS = {"docs/guides/dyna.md": pytest.mark.sb3}
 """Pages whose code needs an extra."""
@@ -13,10 +20,12 @@ NEEDS = {"docs/guides/dyna.md": pytest.mark.sb3}
 SMALLER = {
     "docs/guides/dyna.md": {
         "agent.learn(1_000, callback=Dyna(model, DynaConfig(updates=40, catch_up=10_000))": (
-            "agent.learn(120, callback=Dyna(model, DynaConfig(updates=2, catch_up=100))"
+            "agent.learn(40, callback=Dyna(model, DynaConfig(updates=2, catch_up=20))"
         ),
         "agent.learn(1_000": "agent.learn(30",
-        "agent.learn(200_000": "agent.learn(6_000",
+        "steps=1_000, seed=0": "steps=450, seed=0",
+        "num_envs=64": "num_envs=4",
+        "agent.learn(200_000": "agent.learn(256",
     }
 }
 """What is made smaller in tests, of pages that show no output."""
@@ -64,7 +73,7 @@ def test_a_renewed_text_leaves_out_what_the_old_one_did() -> None:
     assert pages.renewed("…\nend\n", printed) == "…\nend\n"
 
 
-def test_blocks_that_are_run(tmp_path: Path) -> None:
+def test_what_is_run(tmp_path: Path) -> None:
     page = "```python\nprint(1)\n```\nso\n```text\n1\n```\n<!-- not run: hours -->\n```sh\nrelgym dyna\n```\n"
     page += "```toml\n```\n"
     (only,) = pages.snippets(page)
@@ -73,7 +82,64 @@ def test_blocks_that_are_run(tmp_path: Path) -> None:
     assert pages.run(only, {}, tmp_path) == "1\n"
 
 
+def test_commands_with_their_output(tmp_path: Path) -> None:
+    page = "```console\n$ relgym envs\n…\n$ relgym learn CartPol-v1 --out a\nrelgym: there is no\n```\n"
+    first, second = pages.snippets(page)
+    assert (first.code, first.shown) == ("relgym envs", "…\n")
+    assert page[slice(*second.span)] == second.shown == "relgym: there is no\n"
+    assert "CartPole-v1" in pages.run(second, {}, tmp_path)
+
+
 @pytest.mark.parametrize("line", ["make tea", "pip install 'relgym[tea]'", "brew tea"])
 def test_commands_that_nobody_can_run(line: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="tea"):
-        pages.run(pages.Snippet("commands", f"{line}\n", None, (0, 0), 1), {}, tmp_path)
+        pages.run(pages.Snippet("sh", f"{line}\n", None, (0, 0), 1), {}, tmp_path)
+
+
+def test_every_env_has_a_picture_that_moves() -> None:
+    folder = pages.ROOT / "docs" / "envs"
+    shown = {path.stem for path in folder.glob("*.md")} - {"index"}
+    assert shown == {path.stem for path in folder.glob("*.webp")} == set(tool("animations").ANIMATIONS)
+    assert len(shown) == sum(name.startswith("relgym/") for name in gym.registry)
+    for name in shown:
+        path = folder / f"{name}.webp"
+        assert f"({path.name})" in (folder / f"{name}.md").read_text(encoding="utf-8")
+        assert path.stat().st_size < 300_000
+        with Image.open(path) as picture:
+            assert getattr(picture, "n_frames", 1) > 20
+
+
+def test_pictures_are_drawn_by_the_script(tmp_path: Path) -> None:
+    """One of them: what it writes moves as the committed one does."""
+    with (
+        Image.open(tool("animations").write("truck-push", tmp_path)) as drawn,
+        Image.open(pages.ROOT / "docs" / "envs" / "truck-push.webp") as kept,
+    ):
+        assert (drawn.size, drawn.n_frames) == (kept.size, kept.n_frames)  # type: ignore[attr-defined]
+
+
+def test_what_is_wrong_with_a_site(tmp_path: Path) -> None:
+    good = '<h1 id="relgym.A">A</h1> <a href="b.html#x">b</a> <a href="https://gymnasium.farama.org">g</a>'
+    (tmp_path / "a.html").write_text(good, encoding="utf-8")
+    (tmp_path / "b.html").write_text('<p id="x"><a href="a.html">a</a></p>', encoding="utf-8")
+    check = tool("check_site").faults
+    assert check(tmp_path, {"relgym.A"}) == []
+    assert check(tmp_path, {"relgym.B"}) == ["the reference lacks relgym.B"]
+    for page, fault in {
+        '<a href="c.html">c</a>': "c.html leads nowhere",
+        '<a href="a.html#y">a</a>': "a.html#y: the page has no such place",
+        '<script src="https://example.org/a.js"></script>': "loads https://example.org/a.js from elsewhere",
+        "<p>==== ====</p>": "reStructuredText was left as it is",
+    }.items():
+        (tmp_path / "b.html").write_text(f'<p id="x">{page}</p>', encoding="utf-8")
+        assert check(tmp_path, {"relgym.A"}) == [f"b.html: {fault}"]
+
+
+def tool(name: str) -> ModuleType:
+    """A script of docs/tools."""
+    spec = spec_from_file_location(name, pages.ROOT / "docs" / "tools" / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look there
+    spec.loader.exec_module(module)
+    return module

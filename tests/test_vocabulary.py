@@ -57,7 +57,10 @@ ALLOWED = {
         r"|\bbar\.(add_task|advance|tasks|update|reset|start|stop|console|finished|set_label)"
         r"|\bbar: Progress|^    bar$|\b(panel|axes|ax)\.bar(h)?\(|colour ?bar|color ?bar|bars? of progress"
     ),
-    "block": r"with`` block|code block|np\.block|[Bb]locks? the way|SIG_BLOCK|\bblock = packer|\bblock \* |\(\"block\",\)",
+    "block": (
+        r"with`` block|code block|np\.block|[Bb]locks? the way|SIG_BLOCK"
+        r'|\bblock = packer|\bblock \* |\("block",\)'
+    ),
     "issue": r"/issues",
     "rival": r'^_KEY = "rivals"|\brivals: list\[|\blaw\.rivals\b',  # a key of model files
 }
@@ -73,7 +76,6 @@ ALLOWED_IN = {
         "tests/laws/",
         "tests/wrappers/sb3/test_stock.py",
         "tests/scene/geometry/",
-        "tests/test_pages.py",  # fenced code blocks
     ),
 }
 """Files in which a word has its ordinary sense."""

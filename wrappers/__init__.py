@@ -1,7 +1,28 @@
 """Gymnasium wrappers that learn a model of the env they wrap; imported as ``relgym.wrappers``."""
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` loads it
+    from relgym.envs.views import (
+        AgentsView,
+        Angle,
+        FunctionView,
+        NumbersView,
+        Part,
+        Rows,
+        SceneView,
+        Static,
+        TableView,
+        View,
+    )
+    from relgym.model.prequential import Prequential, StepReport
+    from relgym.wrappers.action_repeat import ActionRepeat
+    from relgym.wrappers.flat import FlatView, VectorFlatView
+    from relgym.wrappers.model_learner import ModelLearner
+    from relgym.wrappers.truncated_episodes import TruncatedEpisodes
+    from relgym.wrappers.vector_model_learner import VectorModelLearner
+    from relgym.wrappers.views import view_of
 
 if __name__ != "relgym.wrappers":
     raise ImportError(
@@ -55,10 +76,12 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {sorted(_HOMES)}")
-    return getattr(importlib.import_module(_HOMES[name]), name)
+if not TYPE_CHECKING:  # checkers would take any name
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {sorted(_HOMES)}")
+        return getattr(importlib.import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from relgym.clustering.features import functions_of, register_function
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError, RelgymError
-from relgym.model.prequential import Prequential, compared
+from relgym.model.prequential import Outcomes, Prequential, compared
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.scene.schema import SceneSchema
@@ -325,7 +325,7 @@ def _take_up(
     if prequential is not None:
         prediction = model.predict_one(transition.before)
         residuals, wrong = compared(prediction, transition.after, precision)
-        prequential.count(residuals, wrong)
+        prequential.count(residuals, wrong, Outcomes.of(prediction, transition.before, residuals))
         model.look_back(prediction, residuals, precision)
     model.learn_one(transition)
 

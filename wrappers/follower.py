@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
+import gymnasium as gym
 from gymnasium.error import ResetNeeded
 
 from relgym.envs.views import View
@@ -14,7 +15,7 @@ from relgym.model.prediction import ScenePrediction
 from relgym.scene.objects import Scene, Transition
 from relgym.scene.sizes import check_sizes
 
-__all__ = ["BadObservations", "Follower", "Look", "extrapolated"]
+__all__ = ["BadObservations", "Follower", "Look", "extrapolated", "scenes_of"]
 
 BadObservations: TypeAlias = Literal["raise", "skip"]
 """What to do with an observation that shows no scene: raise `ObservationError`, or skip and count it."""
@@ -239,3 +240,31 @@ def extrapolated(earlier: Scene, now: Scene) -> Scene:
         if name in earlier:
             vector[now.layout.slice(index)] += now[name].values - earlier[name].values
     return Scene(now.schema, now.layout, vector)
+
+
+def scenes_of(env: gym.Env[Any, Any], view: View, steps: int, *, seed: int) -> Iterator[Scene]:
+    """Scenes of an env under random actions, each with the action that is taken there.
+
+    Parameters
+    ----------
+    env, view
+        The env, and how it is looked at.
+    steps
+        How many.
+    seed
+        Of the first episode and of the actions.
+    """
+    follower = Follower(view)
+    env.action_space.seed(seed)
+    observation, info = env.reset(seed=seed)
+    follower.begin(observation, info)
+    for _ in range(steps):
+        action = env.action_space.sample()
+        scene = follower.act(action)
+        assert scene is not None, "bad observations and actions raise"
+        yield scene
+        observation, reward, terminated, truncated, info = env.step(action)
+        follower.follow(scene, None, observation, info, reward=reward, terminated=terminated)
+        if terminated or truncated:
+            observation, info = env.reset()
+            follower.begin(observation, info)

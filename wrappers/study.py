@@ -11,7 +11,7 @@ from typing import Any
 from relgym.errors import ConfigError
 from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import ScenePrediction
-from relgym.model.prequential import Prequential, StepReport
+from relgym.model.prequential import Outcomes, Prequential, StepReport
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers.background import Background
@@ -110,7 +110,8 @@ class Study:
             self.model, transition, prediction, precision=self._precision, learn=self._learn
         )
         if prediction is not None:
-            self.prequential.count(report.residuals, report.wrong)
+            outcomes = Outcomes.of(prediction, transition.before, report.residuals)
+            self.prequential.count(report.residuals, report.wrong, outcomes)
         return report
 
     def catch_up(self) -> WorldModel:

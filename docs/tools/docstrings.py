@@ -4,27 +4,14 @@ from __future__ import annotations
 
 import ast
 import re
-from functools import cache
+import sys
 from pathlib import Path
 from typing import Any
 
 import griffe
 
-ROOT = Path(__file__).resolve().parents[2]
-FACADES = {
-    "relgym.config": "relgym/config/__init__.py",
-    "relgym.data": "relgym/data/__init__.py",
-    "relgym.envs": "envs/__init__.py",
-    "relgym.envs.views": "envs/views/__init__.py",
-    "relgym.errors": "relgym/errors.py",
-    "relgym.logic": "relgym/logic/__init__.py",
-    "relgym.scene": "relgym/scene/__init__.py",
-    "relgym.wrappers": "wrappers/__init__.py",
-    "relgym.wrappers.sb3": "wrappers/sb3/__init__.py",
-    "relgym": "relgym/__init__.py",
-}
-"""The modules that users import from; their ``__all__`` is the public interface. A name that two offer is described
-with the first."""
+sys.path.insert(0, str(Path(__file__).parent))
+from facades import FACADES, public_names
 
 _RULE = re.compile(r"^ *=+(?: +=+)+ *$")
 _HEADING = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
@@ -58,24 +45,6 @@ class PlainDocstrings(griffe.Extension):
         if obj.docstring:
             text = with_markdown_tables(with_markdown_headings(obj.docstring.value))
             obj.docstring.value = linked(text, obj.name)
-
-
-@cache
-def public_names() -> dict[str, str]:
-    """Name → where it is described."""
-    found: dict[str, str] = {}
-    for facade in FACADES:
-        for name in names_of(facade):
-            found.setdefault(name, f"{facade}.{name}")
-    return found
-
-
-def names_of(facade: str) -> list[str]:
-    """What a façade's ``__all__`` lists, without importing it."""
-    for node in ast.parse((ROOT / FACADES[facade]).read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
-            return list(ast.literal_eval(node.value))
-    raise ValueError(f"{FACADES[facade]} has no __all__")
 
 
 def linked(text: str, own: str) -> str:

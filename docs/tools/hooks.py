@@ -10,19 +10,19 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYOUT = ROOT / "build" / "docs" / "relgym"
-"""relgym as it is once installed, with envs/ and wrappers/ in it; links, read by mkdocstrings."""
+"""relgym as it is once installed, with envs/ and wrappers/ in it; mkdocstrings reads it."""
 
 FROM_ROOT = {"changelog.md": "CHANGELOG.md", "contributing.md": "CONTRIBUTING.md", "index.md": "README.md"}
 """Pages of the site that are files of the repository's root."""
 
 
-def on_config(config: Any) -> Any:
-    """Lay the package out for mkdocstrings, which reads sources and knows nothing of `package-dir`."""
-    shutil.rmtree(LAYOUT.parent, ignore_errors=True)
-    LAYOUT.mkdir(parents=True)
-    for source in (*(ROOT / "relgym").iterdir(), ROOT / "envs", ROOT / "wrappers"):
-        (LAYOUT / source.name).symlink_to(source)
-    return config
+def on_startup(**_: Any) -> None:
+    """Lay the package out, before mkdocstrings looks for it: that reads sources and knows nothing of `package-dir`."""
+    leave = shutil.ignore_patterns("__pycache__")
+    shutil.rmtree(LAYOUT, ignore_errors=True)
+    shutil.copytree(ROOT / "relgym", LAYOUT, ignore=leave)
+    for name in ("envs", "wrappers"):
+        shutil.copytree(ROOT / name, LAYOUT / name, ignore=leave)
 
 
 def on_files(files: Files, config: Any) -> Files:

@@ -70,28 +70,37 @@ print(model.describe())
 
 # %%
 real = gym.make("relgym/BallBoxRamp-v0", incline=30, **world).unwrapped
-paths = []
+episodes = []
 for seed in range(1_000, 1_020):
-    real.reset(seed=seed)
+    place = ("above-left", "between", "above-right", "leftmost")[seed % 4]
+    real.reset(seed=seed, options={"ball": place})
     first, scenes = real.scene, []
     for _ in range(200):
         real.step(0)
         scenes.append(real.scene)
-    imagined = [step.scene for step in model.rollout(first, 200)]
-    paths.append([[(s["ball"]["px"], s["ball"]["py"]) for s in track] for track in (scenes, imagined)])
+    dreamt = [step.scene for step in model.rollout(first, 200)]
+    seen, imagined = ([(s["ball"]["px"], s["ball"]["py"]) for s in track] for track in (scenes, dreamt))
+    episodes.append((first, seen, imagined))
 
-apart = [np.abs(np.subtract(*path)).max() for path in paths if len(path[0]) == len(path[1])]
-print(f"{len(apart)} of {len(paths)} to the end; never more than {max(apart):.1e} apart")
+apart = [np.abs(np.subtract(seen, thought)).max() for _, seen, thought in episodes]
+print(f"{len(apart)} episodes: real and imagined balls are never more than {max(apart):.1e} apart")
 
 # %%
-fig, axes = plt.subplots(1, 3, figsize=(9, 2.8))
-for ax, (seen, thought) in zip(axes, paths, strict=False):
-    ax.plot(*np.transpose(seen), color="0.7", linewidth=5, label="real")
-    ax.plot(*np.transpose(thought), color="tab:orange", linewidth=1.5, label="imagined")
+fig, axes = plt.subplots(1, 3, figsize=(9, 1.9))
+for ax, (first, seen, imagined) in zip(axes, episodes, strict=False):
+    for name, colour in (("box", "steelblue"), ("ramp", "seagreen"), ("floor", "0.8")):
+        x, y, w, h = (first[name][prop] for prop in ("px", "py", "sx", "sy"))
+        corners = [(x - w / 2, y - h / 2), (x + w / 2, y - h / 2), (x - w / 2, y + h / 2)]
+        if name != "ramp":
+            corners.insert(2, (x + w / 2, y + h / 2))
+        ax.fill(*np.transpose(corners), color=colour, alpha=0.5)
+    ax.plot(*np.transpose(seen), color="0.6", linewidth=5, label="real")
+    ax.plot(*np.transpose(imagined), color="tab:orange", linewidth=1.5, label="imagined")
     ax.plot(*seen[0], "o", color="black", markersize=6)
     ax.set_aspect("equal", "datalim")
     ax.axis("off")
-_ = axes[0].legend(loc="lower center")
+_ = axes[0].legend(loc="upper left", fontsize=8)
+
 # %% [markdown]
 # ## Another room
 #

@@ -17,6 +17,7 @@ from relgym.classification.binary import BinaryClassifier
 from relgym.classification.examples import Bools, Example, ExampleBatch, Vocabulary
 from relgym.classification.plans import Key
 from relgym.classification.views import Context, View
+from relgym.logic.situations import mixed, situation
 
 __all__ = ["Familiarity", "Used", "situations", "used_by"]
 
@@ -25,9 +26,7 @@ Used: TypeAlias = tuple[tuple[Context, tuple[int, ...], tuple[int, ...]], ...]
 
 _Hashes: TypeAlias = NDArray[np.uint64]
 
-_GOLDEN: Final = np.uint64(0x9E3779B97F4A7C15)
 _MOST_ANSWERS: Final = 8192
-_NOTHING: Final = np.uint64(0)
 
 
 class Familiarity:
@@ -92,7 +91,8 @@ def situations(view: View, used: Used) -> _Hashes:
     """
     result = np.zeros(len(view), dtype=np.uint64)
     for context, relations, unary in used:
-        result = _mix(result + _situation(view, view.shown(context), list(relations), list(unary)))
+        told = view.table[:, list(relations)], view.unary[:, list(unary)]
+        result = mixed(result + situation(*told, view.target, view.shown(context)))
     return result
 
 
@@ -108,40 +108,5 @@ def _alike(view: View, used: Used) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return first, which.reshape(-1)
 
 
-def _situation(view: View, exists: Bools, relations: list[int], unary: list[int]) -> _Hashes:
-    n, k = exists.shape
-    rows = np.arange(n)
-    table = np.moveaxis(view.table[:, relations], 1, -1)  # (n, K, K, r)
-    towards, back = table[rows, :, view.target], table[rows, view.target]
-    self_ = np.arange(k) == view.target[:, None]
-    own = np.moveaxis(view.unary[:, unary], 1, -1)
-    described = _hash_bits(np.concatenate([own, towards, back, self_[:, :, None]], axis=-1))
-    among = _hash_bits(table)  # (n, K, K): how each object stands to each other one
-    pairs = _mix(among + described[:, None, :])
-    neighbours = _set_hash(np.where(exists[:, None, :], pairs, _NOTHING))
-    return _set_hash(np.where(exists, _mix(described + neighbours), _NOTHING))
-
-
 def _columns(known: tuple[str, ...], names: set[str]) -> tuple[int, ...]:
     return tuple(column for column, name in enumerate(known) if name in names)
-
-
-def _hash_bits(bits: Bools) -> _Hashes:
-    """One number per row of the last axis."""
-    weights = _mix(np.arange(1, bits.shape[-1] + 1, dtype=np.uint64) * _GOLDEN)
-    return _mix((bits * weights).sum(axis=-1, dtype=np.uint64) + _GOLDEN)
-
-
-def _set_hash(members: _Hashes) -> _Hashes:
-    """Hash of the set of non-zero numbers along the last axis."""
-    ordered = np.sort(members, axis=-1)
-    ordered[..., 1:][ordered[..., 1:] == ordered[..., :-1]] = _NOTHING
-    total: _Hashes = ordered.sum(axis=-1, dtype=np.uint64)
-    return total
-
-
-def _mix(x: _Hashes) -> _Hashes:
-    """Scramble 64 bits (splitmix64); sums and products wrap around."""
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))

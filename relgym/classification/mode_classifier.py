@@ -18,7 +18,7 @@ from relgym.classification.learning import Lesson
 from relgym.classification.owners import Owners
 from relgym.classification.pairs import PairState, covered_by, pair_labels
 from relgym.classification.ranking import Ranking, RankingBatch, Verdict
-from relgym.classification.views import Scope, View
+from relgym.classification.views import Context, Scope, View
 from relgym.classification.voting import Voting
 from relgym.config import ClassificationConfig
 
@@ -99,6 +99,25 @@ class ModeClassifier:
     def rank_batch(self, batch: ExampleBatch, values: Floats) -> RankingBatch:
         """Rank the modes for n examples; equal to `rank` of each. `values` has shape ``(n, len(modes))``."""
         return self._voting.rank_batch(batch, values, self.counts, self._familiarity())
+
+    def remembered(self) -> tuple[View, Floats, RankingBatch]:
+        """The examples that are remembered, how many each stands for, and how they are ranked now.
+
+        There is at least one mode and one example.
+        """
+        view, weights = self._current_view()
+        return view, weights, self._voting.rank_view(view, self.counts, self._familiarity())
+
+    def experience(
+        self,
+    ) -> tuple[tuple[tuple[Context, tuple[str, ...], tuple[str, ...]], ...], frozenset[int]]:
+        """Binary and unary relations that clauses look at, by context, and the situations that were seen of them."""
+        known, v = self._familiarity(), self.vocabulary
+        names = tuple(
+            (context, tuple(v.relations[k] for k in relations), tuple(v.unary[k] for k in unary))
+            for context, relations, unary in known.used
+        )
+        return names, frozenset(known.seen)
 
     def explain(self, example: Example, values: Sequence[float]) -> list[Verdict]:
         """How the winner fared against every other mode, in the order of the ranking."""

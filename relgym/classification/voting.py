@@ -114,11 +114,16 @@ class Voting:
         self, batch: ExampleBatch, values: Floats, counts: Mapping[int, float], known: Familiarity
     ) -> RankingBatch:
         """Rank the modes for n examples; equal to `rank` of each."""
-        n, m = len(batch), len(self.modes)
-        if not m:
+        n = len(batch)
+        if not self.modes:
             none, no = np.empty((n, 0)), np.zeros(n, dtype=np.bool_)
             return RankingBatch(none.astype(np.int64), none, np.zeros(n), no, no)
         view = View.of_batch(batch, self.modes, np.asarray(values, dtype=np.float64))
+        return self.rank_view(view, counts, known)
+
+    def rank_view(self, view: View, counts: Mapping[int, float], known: Familiarity) -> RankingBatch:
+        """Rank the modes, of which there is one at least, for all examples of a view."""
+        n, m = len(view), len(self.modes)
         cast, spoken = self._cast(view)
         scores = cast.sum(axis=2)
         by_tie = self._by_tie(counts)

@@ -130,7 +130,7 @@ def _sailed(
         kept.append(transition)
         return learn(transition)
 
-    learner.model.learn_one = learn_one
+    learner.model.learn_one = learn_one  # type: ignore[method-assign]
     act = _policy(study, learner, seed)
     view = learner.view
     assert isinstance(view, NumbersView), "chosen above"

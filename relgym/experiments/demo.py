@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import gymnasium as gym
 import numpy as np
@@ -16,11 +20,12 @@ import relgym  # noqa: F401 - registers the envs
 from relgym.experiments.analytic import AnalyticModes
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
-from relgym.experiments.evaluate import Evaluation, evaluate, explicable
-from relgym.experiments.plots import Trajectory, draw_curves, draw_trajectories
-from relgym.experiments.rollouts import RolloutErrors, imagined, rollouts
+from relgym.experiments.evaluate import Evaluation, evaluate
+from relgym.experiments.plots import Curve, Imagined, Trajectory, draw_curves, draw_trajectories
+from relgym.experiments.rollouts import imagined
 from relgym.experiments.truck_check import TruckCheck, check_truck
-from relgym.model.report import ModelReport
+from relgym.experiments.verdict import Verdict, verdict
+from relgym.model.report import ModelReport, report
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION
 from relgym.wrappers import ModelLearner, StepReport
@@ -30,12 +35,18 @@ __all__ = [
     "Demonstration",
     "EpisodeErrors",
     "Figures",
+    "demonstrate",
+    "demonstrate_all",
     "demonstrations",
     "draw",
     "learn_online",
     "measure",
-    "trajectories",
 ]
+
+_FRESH = 1000
+"""What is added to a seed for scenes to test on."""
+
+_RULE = "━" * 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +69,10 @@ class Demonstration:
         From a seed to those episodes.
     mover
         Name of the object whose path is drawn.
+    by
+        What imagines, for people.
+    beside
+        Name of the demonstration of the same world in whose picture its roll-outs are drawn; none: one of its own.
     drawn
         How many episodes are drawn.
     laws
@@ -74,6 +89,8 @@ class Demonstration:
     training: Callable[[int], Iterable[Episode]]
     testing: Callable[[int], Iterable[Episode]]
     mover: str
+    by: str
+    beside: str | None
     drawn: int
     laws: AnalyticModes | None = None
 
@@ -100,17 +117,24 @@ class EpisodeErrors:
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What was measured of a model on episodes it hasn't learned from."""
+    """What was measured of a model on episodes it hasn't learned from.
+
+    Attributes
+    ----------
+    seed
+        Of the test scenes.
+    verdict
+        How many steps and roll-outs are right; all count.
+    evaluation
+        Errors by what really happened, of steps that a linear law along the world's axes can explain.
+    truck
+        The truck's modes against Table 3.1.
+    """
 
     seed: int
+    verdict: Verdict
     evaluation: Evaluation
-    rollouts: RolloutErrors
     truck: TruckCheck | None
-
-    def __str__(self) -> str:
-        return "\n\n".join(
-            str(part) for part in (self.truck, self.evaluation, self.rollouts) if part is not None
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +146,9 @@ class DemoOutcome:
     title
         The world.
     transitions, seconds
-        How many were learned from, one at a time, and how long that took.
+        How many were learned from, one at a time, and how much processor time that took.
+    text
+        The model in words.
     report
         The model.
     figures
@@ -136,45 +162,49 @@ class DemoOutcome:
     title: str
     transitions: int
     seconds: float
+    text: str
     report: ModelReport
     figures: Figures
     curve: tuple[EpisodeErrors, ...]
     file: str
 
     def __str__(self) -> str:
-        rule = "━" * 80
-        head = (
-            f"{rule}\n{self.title}\n{self.transitions:,} transitions, learned online in {self.seconds:.1f} s"
-        )
-        return f"{head}\n{rule}\n\n{self.report}\n\n{rule}\nOn fresh scenes\n{rule}\n\n{self.figures}\n"
+        head = [
+            _RULE,
+            self.title,
+            str(self.figures.verdict),
+            f"{self.transitions:,} transitions, learned online from nothing; {self.seconds:.0f} s of processor time.",
+            _RULE,
+        ]
+        parts = ["\n".join(head), self.text, *([str(self.figures.truck)] if self.figures.truck else [])]
+        return "\n\n".join(parts) + "\n"
+
+
+class Told(Protocol):
+    """Takes the name of a demonstration, and how many of its episodes are over."""
+
+    def __call__(self, name: str, done: int, /) -> None:
+        """Take note."""
 
 
 def demonstrations(*, quick: bool = False) -> tuple[Demonstration, ...]:
-    """Truck-push with frictions resampled at every step (§3.1), and ball-box-ramp, experiment 1 (§4.3).
+    """What is shown, in this order: ball-box-ramp, experiment 1 (§4.3), by laws and by modes; truck-push (§3.1).
 
     Parameters
     ----------
     quick
         A tenth of the episodes: for a first look, and for tests.
     """
-    return _truck(quick), _ball(quick)
-
-
-def _truck(quick: bool) -> Demonstration:
-    episodes = 8 if quick else 48
-    return Demonstration(
-        name="truck",
-        title="truck-push: a truck pushes stacks of boxes",
-        env_id="relgym/TruckPush-v0",
-        arguments={"resample": "step", "task": None},
-        config={},
-        episodes=episodes,
-        test_episodes=episodes,
-        training=lambda seed: islice(truck_episodes(seed=seed), episodes),
-        testing=lambda seed: islice(truck_episodes(seed=seed, test=True), episodes),
-        mover="truck",
-        drawn=1,
+    ball = _ball(quick)
+    modes = replace(
+        ball,
+        name="modes",
+        title="The same stream in the thesis' modes, along the world's axes (frames=\"world\")",
+        config={"frames": "world"},
+        by="world-axis modes",
+        beside=ball.name,
     )
+    return ball, modes, _truck(quick)
 
 
 def _ball(quick: bool) -> Demonstration:
@@ -186,15 +216,128 @@ def _ball(quick: bool) -> Demonstration:
         title="ball-box-ramp: a ball flies, bounces and slides",
         env_id="relgym/BallBoxRamp-v0",
         arguments={"incline": setting.incline, "elasticity": setting.elasticity, "friction": friction},
-        config={"frames": "world"},  # the thesis' tables; without it, three contact laws
+        config={},
         episodes=episodes,
         test_episodes=test_episodes,
-        training=lambda seed: islice(ball_episodes(1, seed=seed), episodes),
-        testing=lambda seed: islice(ball_episodes(1, seed=seed, test=True), test_episodes),
+        training=partial(_ball_episodes, episodes),
+        testing=partial(_ball_episodes, test_episodes, test=True),
         mover="ball",
+        by="default model",
+        beside=None,
         drawn=3,
         laws=setting.modes(),
     )
+
+
+def _truck(quick: bool) -> Demonstration:
+    episodes = 8 if quick else 48
+    return Demonstration(
+        name="truck",
+        title="truck-push: a truck pushes stacks of boxes, whose frictions are drawn anew at every step",
+        env_id="relgym/TruckPush-v0",
+        arguments={"resample": "step", "task": None},
+        config={},
+        episodes=episodes,
+        test_episodes=episodes,
+        training=partial(_truck_episodes, episodes),
+        testing=partial(_truck_episodes, episodes, test=True),
+        mover="truck",
+        by="default model",
+        beside=None,
+        drawn=1,
+    )
+
+
+# Functions of a module, since other processes take demonstrations.
+def _ball_episodes(count: int, seed: int, *, test: bool = False) -> Iterable[Episode]:
+    return islice(ball_episodes(1, seed=seed, test=test), count)
+
+
+def _truck_episodes(count: int, seed: int, *, test: bool = False) -> Iterable[Episode]:
+    return islice(truck_episodes(seed=seed, test=test), count)
+
+
+def demonstrate_all(
+    shown: Sequence[Demonstration], out: Path, *, seed: int, jobs: int, told: Told
+) -> Iterator[tuple[DemoOutcome, tuple[Imagined, ...]]]:
+    """Carry out demonstrations, some at the same time; the results are the same.
+
+    Parameters
+    ----------
+    shown
+        Which.
+    out
+        Folder for the models.
+    seed
+        Of everything random.
+    jobs
+        How many processes, >= 1; 1: this one.
+    told
+        Is called with how far each is.
+
+    Yields
+    ------
+    What came of each, in their order, as soon as it is known.
+    """
+    if jobs == 1:
+        for each in shown:
+            yield demonstrate(each, out, seed=seed, told=told)
+        return
+    start = multiprocessing.get_context("spawn")
+    with start.Manager() as manager, ProcessPoolExecutor(jobs, start) as pool:
+        news = manager.dict()
+        running = [pool.submit(demonstrate, each, out, seed=seed, told=_Board(news)) for each in shown]
+        for future in running:
+            while not _over(future):
+                for name, done in news.items():
+                    told(name, done)
+            yield future.result()
+
+
+class _Board:
+    """Where processes note how far they are."""
+
+    def __init__(self, news: Any) -> None:
+        self._news = news
+
+    def __call__(self, name: str, done: int, /) -> None:
+        self._news[name] = done
+
+
+def _over(future: Future[Any]) -> bool:
+    return bool(wait([future], timeout=0.2).done)
+
+
+def demonstrate(
+    shown: Demonstration, out: Path, *, seed: int, told: Told
+) -> tuple[DemoOutcome, tuple[Imagined, ...]]:
+    """Learn a world, save the model, measure it, and let it imagine the episodes that are drawn.
+
+    Parameters
+    ----------
+    shown
+        The world.
+    out
+        Folder for the model.
+    seed
+        Of everything random.
+    told
+        Is called at the end of each episode.
+    """
+    env, curve, started = shown.make(), list[EpisodeErrors](), time.process_time()
+    for episode in learn_online(env, shown, seed=seed):
+        curve.append(episode)
+        told(shown.name, len(curve))
+    seconds = round(time.process_time() - started, 2)
+    file = out / f"{shown.name}.json"
+    env.save(file)
+    model, steps = env.model, sum(each.steps for each in curve)
+    figures = measure(model, shown, seed=seed + _FRESH)
+    outcome = DemoOutcome(
+        shown.title, steps, seconds, model.describe(), report(model), figures, tuple(curve), str(file)
+    )
+    drawn = islice(shown.testing(figures.seed), shown.drawn)
+    return outcome, tuple(Imagined(shown.by, *imagined(model, e.vectors, e.layout)) for e in drawn)
 
 
 def learn_online(env: ModelLearner, shown: Demonstration, *, seed: int) -> Iterator[EpisodeErrors]:
@@ -216,13 +359,11 @@ def learn_online(env: ModelLearner, shown: Demonstration, *, seed: int) -> Itera
     for episode in shown.training(seed):
         # The episode says where to begin and what to do; what then happens is the env's own.
         env.reset(seed=seed, options=dict(episode.configuration))
-        counted = explicable(episode, shown.laws)
         wrong: dict[str, list[bool]] = {}
-        for k, action in enumerate(_actions(episode)):
+        for action in _actions(episode):
             *_, info = env.step(action)
             for target, is_wrong in _verdicts(info["relgym"], episode):
-                if target not in counted or counted[target][k]:
-                    wrong.setdefault(target, []).append(is_wrong)
+                wrong.setdefault(target, []).append(is_wrong)
         yield EpisodeErrors(len(episode), {target: float(np.mean(found)) for target, found in wrong.items()})
 
 
@@ -240,35 +381,61 @@ def measure(model: WorldModel, shown: Demonstration, *, seed: int) -> Figures:
     """
     episodes = list(shown.testing(seed))
     truck = check_truck(model, episodes, every=4) if shown.name == "truck" else None
-    return Figures(seed, evaluate(model, episodes, shown.laws), rollouts(model, episodes[:80]), truck)
+    return Figures(seed, verdict(model, episodes), evaluate(model, episodes, shown.laws), truck)
 
 
-def trajectories(model: WorldModel, shown: Demonstration, *, seed: int) -> list[Trajectory]:
-    """The first episodes of a test set, real and imagined; not a selection."""
-    found = []
-    for episode in islice(shown.testing(seed), shown.drawn):
-        dream, steps = imagined(model, episode.vectors, episode.layout)
-        title = f"{shown.name}, which hits a corner" if episode.truth.corner.any() else shown.name
-        found.append(Trajectory(title, episode.scene(0), shown.mover, episode.vectors, dream, steps))
-    return found
-
-
-def draw(folder: Path, outcomes: Iterable[DemoOutcome], paths: Sequence[Trajectory]) -> dict[str, str]:
+def draw(
+    folder: Path,
+    shown: Sequence[Demonstration],
+    outcomes: Sequence[DemoOutcome],
+    dreams: Sequence[Sequence[Imagined]],
+) -> dict[str, str]:
     """Write the pictures of some demonstrations into a folder; their files by what they show.
+
+    Parameters
+    ----------
+    folder
+        Where to.
+    shown, outcomes, dreams
+        The demonstrations and what came of them.
 
     Raises
     ------
     ConfigError
         matplotlib or pygame isn't installed.
     """
+    paths: list[Trajectory] = []
+    for k, each in enumerate(shown):
+        if each.beside is None:
+            others = [own for other, own in zip(shown, dreams, strict=True) if other.beside == each.name]
+            paths += _trajectories(each, [dreams[k], *others], seed=outcomes[k].figures.seed)
+    paths.sort(key=lambda shown: not shown.events)  # most is to be seen where something is marked
     curves = {
-        outcome.title: {t: [b.wrong.get(t, 0.0) for b in outcome.curve] for t in outcome.curve[-1].wrong}
-        for outcome in outcomes
+        f"{each.beside or each.name}: {each.by}": _curves(outcome)
+        for each, outcome in zip(shown, outcomes, strict=True)
     }
     return {
-        "trajectories": str(draw_trajectories(folder / "trajectories.png", paths)),
+        "real and imagined episodes": str(draw_trajectories(folder / "trajectories.png", paths)),
         "learning curves": str(draw_curves(folder / "learning.png", curves)),
     }
+
+
+def _trajectories(
+    shown: Demonstration, dreams: Sequence[Sequence[Imagined]], *, seed: int
+) -> Iterator[Trajectory]:
+    """The first episodes of a test set, real and imagined; not a selection."""
+    for k, episode in enumerate(islice(shown.testing(seed), shown.drawn)):
+        corner = np.flatnonzero(episode.truth.corner)
+        events = ((int(corner[0]), "corner"),) if len(corner) else ()
+        title = f"{shown.name}: fresh episode {k + 1}"
+        mine = tuple(own[k] for own in dreams)
+        yield Trajectory(title, episode.scene(0), shown.mover, episode.vectors, mine, events=events)
+
+
+def _curves(outcome: DemoOutcome) -> list[Curve]:
+    seen = np.cumsum([each.steps for each in outcome.curve]).tolist()
+    targets = list(dict.fromkeys(target for each in outcome.curve for target in each.wrong))
+    return [Curve(t, seen, [each.wrong.get(t, 0.0) for each in outcome.curve]) for t in targets]
 
 
 def _actions(episode: Episode) -> Iterator[Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import gymnasium as gym
 from gymnasium.vector import AutoresetMode
@@ -117,7 +117,7 @@ def trained_among(
     from relgym.wrappers.sb3.vec_env import VectorAsVecEnv
 
     env = make_env(course, bystanders=1)
-    model = _watched(env, DynaConfig(seed=seed), real=real, seed=seed).model
+    model = cast(relgym.WorldModel, _watched(env, DynaConfig(seed=seed), real=real, seed=seed).model)
     kind = env.get_wrapper_attr("schema").type_of("box1").name
     spec = replace(env.get_wrapper_attr("flat_spec"), slots={kind: 3 + max(bystanders)})
     dreams = []

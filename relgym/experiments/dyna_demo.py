@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from relgym.envs.tasks import Task
 from relgym.errors import ConfigError
 from relgym.experiments.dyna import ENOUGH, Examination, Run, run
 from relgym.experiments.dyna_arms import ARMS, COURSES, Course, make_env
 from relgym.experiments.dyna_report import draw_runs
-from relgym.experiments.plots import Trajectory, draw_trajectories
+from relgym.experiments.plots import Imagined, Trajectory, draw_trajectories
 from relgym.experiments.rollouts import imagined
 from relgym.model.world_model import WorldModel, with_action
 from relgym.scene.objects import ACTION
@@ -134,8 +135,11 @@ def episodes(agent: Any, model: WorldModel, course: Course, *, count: int = _SHO
         end = end.replace({(o.name, prop): o[prop] for o in last.after for prop in o.type.properties})
         real = np.stack([*(step.transition.before.vector for step in steps), end.vector])
         dream, known = imagined(model, real, last.before.layout)
-        title = "on the goal" if info["is_success"] else "not on the goal"
-        found.append(Trajectory(title, steps[0].transition.before, course.mover, real, dream, known))
+        title = f"episode {k + 1}: {'on the goal' if info['is_success'] else 'not on the goal'}"
+        first = steps[0].transition.before
+        marks = task.regions(first) if isinstance(task := env.get_wrapper_attr("task"), Task) else ()
+        own = Imagined("the model", dream, known)
+        found.append(Trajectory(title, first, course.mover, real, (own,), marks))
     return found
 
 

@@ -21,7 +21,16 @@ from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.text import Cell, table
 from relgym.model.world_model import WorldModel
 
-__all__ = ["TOLERANCE", "Evaluation", "ModeErrors", "TargetErrors", "evaluate", "explicable", "mode_labels"]
+__all__ = [
+    "TOLERANCE",
+    "Evaluation",
+    "ModeErrors",
+    "TargetErrors",
+    "chunks",
+    "evaluate",
+    "explicable",
+    "mode_labels",
+]
 
 TOLERANCE = 1e-9
 """Largest residual of a right prediction, in units of the property."""
@@ -137,7 +146,7 @@ def evaluate(
     """
     names: dict[str, tuple[str, ...]] = {}
     found: _Parts = {}
-    for part in _chunks(episodes):
+    for part in chunks(episodes):
         names |= part[0].truth.mode_names if modes is None else mode_labels(modes)
         for target, results in _results(model, part, modes).items():
             found.setdefault(target, []).extend(results)
@@ -185,7 +194,7 @@ def _row(errors: ModeErrors) -> list[Cell]:
     ]
 
 
-def _chunks(episodes: Iterable[Episode]) -> Iterator[list[Episode]]:
+def chunks(episodes: Iterable[Episode]) -> Iterator[list[Episode]]:
     """Consecutive episodes with the same objects, some thousand transitions at a time."""
     for _, group in groupby(episodes, key=lambda episode: episode.layout.names):
         part: list[Episode] = []

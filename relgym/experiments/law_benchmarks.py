@@ -50,7 +50,9 @@ def _one_step(seeds: Sequence[int]) -> Section:
         ):
             measures.append(measured(f"experiment {experiment}: {name} of 24,000", 0, values))
         measures.append(measured(f"experiment {experiment}: sentences", 3, sorted(sentences)))
-        notes.append(model.describe(frame="world", incline=BALL_EXPERIMENTS[experiment].incline))
+        notes.append(
+            model.describe(details=True, frame="world", incline=BALL_EXPERIMENTS[experiment].incline)
+        )
     return "one step", measures, notes
 
 

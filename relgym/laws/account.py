@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,17 @@ from numpy.typing import NDArray
 from relgym.laws.book import LawBook
 from relgym.laws.composition import Engaged, compose
 from relgym.laws.frames import axes_of, axis_names
-from relgym.laws.records import AxisLaw
+from relgym.laws.records import AxisLaw, Piece
 from relgym.laws.touching import Contacts, Group
 from relgym.scene.geometry.vectors import FloatArray, dot
 
-__all__ = ["AxisAccount", "ContactAccount", "accounts"]
+__all__ = ["AxisAccount", "ContactAccount", "accounts", "happens"]
+
+SLACK: Final = 100.0
+"""Velocities of so many tolerances of the laws count as 0."""
+
+NORMALS: Final = "nc"
+"""Axes from one body to the other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +43,8 @@ class AxisAccount:
         Relative velocity after the contact along the axis.
     impulse
         By how much the contact changed it.
+    happens
+        What that is, in a word or two: what touches at no speed and stays so rests, and doesn't bounce.
     """
 
     axis: str
@@ -44,6 +53,7 @@ class AxisAccount:
     piece: str
     value: float
     impulse: float
+    happens: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +69,7 @@ class ContactAccount:
         for axis in self.axes:
             where = ", ".join(f"{c:.4g}" for c in axis.direction)
             lines.append(
-                f"  v'_{axis.axis} = {axis.law}: {axis.piece} holds, {axis.value:.7g}"
+                f"  {axis.happens}: v'_{axis.axis} = {axis.law} = {axis.value:.7g}, where {axis.piece} holds"
                 f" (impulse {axis.impulse:.4g}, {axis.axis} = ({where}))"
             )
         return "\n".join(lines)
@@ -107,7 +117,7 @@ def _of_group(
         joint = joints.at(np.zeros(1, dtype=np.intp), k, a, b, there.normal)
         others = joint.relative(velocity) - impulse[:, :, k]
         axes = axes_of(engaged.law.frame, there, others)
-        told = _axes(engaged, pair, axes, joint.relative(now), others, digits)
+        told = _axes(engaged, pair, axes, joint.relative(now), others, digits, SLACK * book.tolerance)
         names = [cast.layout.names[cast.layout.bodies[body]] for body in (int(a[0]), int(b[0]))]
         yield ContactAccount((names[0], names[1]), engaged.law.frame, tuple(told))
 
@@ -119,6 +129,7 @@ def _axes(
     before: FloatArray,
     others: FloatArray,
     digits: int,
+    slack: float,
 ) -> Iterator[AxisAccount]:
     letters = axis_names(engaged.law.frame, len(before))
     features: dict[str, FloatArray] = {}
@@ -137,4 +148,33 @@ def _axes(
             law.pieces[holds].formula(digits),
             values[holds],
             float(features[f"J_{letter}"][0]),
+            happens(law.pieces[holds], letter, float(features[f"v_{letter}"][0]), slack),
         )
+
+
+def happens(piece: Piece, letter: str, before: float, slack: float) -> str:
+    """What a contact does along an axis where a piece of its law holds.
+
+    Parameters
+    ----------
+    piece
+        The piece.
+    letter
+        The axis.
+    before
+        Relative velocity along it before the contact.
+    slack
+        Velocities up to this count as 0.
+    """
+    weights = dict(piece.terms)
+    if piece.releases(f"u_{letter}"):
+        if len(weights) > 1:
+            return "is slowed by friction"
+        return "lets go" if letter in NORMALS else "slides freely"
+    if not weights:
+        return "is held" if letter in NORMALS else "sticks"
+    if set(weights) == {f"v_{letter}"}:
+        if abs(before) <= slack:
+            return "rests"
+        return "bounces" if weights[f"v_{letter}"] < 0.0 else "goes on"
+    return "is pushed"

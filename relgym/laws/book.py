@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.html import html_table
 from relgym.laws.columns import Sources
 from relgym.laws.composition import Engaged, compose, within
 from relgym.laws.frames import POINT
@@ -85,6 +86,15 @@ class LawBook:
         self._casts: dict[SceneLayout, Cast] = {}
         self._rounded: dict[SceneLayout, NDArray[np.intp]] = {}
         self._engaged: dict[SceneLayout, list[Engaged]] = {}
+
+    def _repr_html_(self) -> str:
+        from relgym.laws.text import law_rows  # which reads books: this class comes first
+
+        rows = [
+            (row.subject, row.statement, f"{row.examples:,}", f"{row.unexplained:,}")
+            for row in law_rows(self, self.free)
+        ]
+        return html_table("Laws of motion", ("about", "law", "examples", "unexplained"), rows)
 
     def cast(self, layout: SceneLayout) -> Cast:
         """What a layout means for the laws; cached."""

@@ -14,14 +14,14 @@ from relgym.laws.frames import NORMAL_FRAMES, POINT, axis_names
 from relgym.laws.records import ALIKE, ONE, Kind, PairLaw, Piece
 from relgym.scene.axes import Axes
 
-__all__ = ["LEGEND", "LawRow", "WorldRow", "law_rows", "world_rows"]
+__all__ = ["DIRECTIONS", "LEGEND", "LawRow", "WorldRow", "law_rows", "world_rows"]
 
 LEGEND = (
     "v: velocity now; u: what the next one would be without this contact; v': what it is with it; all of them\n"
     "relative to the other body. J_n = v'_n - u_n is the impulse. Several contacts act until nothing changes."
 )
 
-_DIRECTIONS = {
+DIRECTIONS = {
     "n": "along the normal n",
     "t": "along the slip direction t",
     "s": "across the normal, along s",
@@ -83,7 +83,7 @@ def law_rows(book: LawBook, types: Iterable[str], digits: int = 7) -> tuple[LawR
     for letter, laws in zip(letters, book.pair.axes, strict=True):
         for law in laws:
             whom = "touching" if len(laws) == 1 else f"touching {_names(law.kinds)}"
-            where = _DIRECTIONS.get(letter, f"along {letter}")
+            where = DIRECTIONS.get(letter, f"along {letter}")
             where += " (of the points that touch)" if book.pair.frame == POINT else ""
             statement = f"v'_{letter} = {law.formula(digits)}"
             rows.append(LawRow(f"{whom}, {where}", statement, book.pair.frame, law.examples, law.unexplained))

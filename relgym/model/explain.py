@@ -1,57 +1,74 @@
-"""Why a model predicts what it predicts: mode, roles, deciding clause and runner-up, as records and as text."""
+"""Why a model predicts what it predicts: the branch of its rules that decided, and why, as records and as text.
+
+What is printed is true of the scene: every condition was tested there, apart from the model, by the rules' own
+evaluation. Where the model's votes differ from its rules, the votes are told.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from relgym.classification.examples import Example, ExampleBatch
-from relgym.classification.ranking import Verdict
-from relgym.classification.views import View
-from relgym.clustering.mode import Mode
 from relgym.logic.csp import solutions, world_of
 from relgym.model.prediction import Prediction
-from relgym.model.text import amount, as_relations
+from relgym.model.rules import functions_of, tested
+from relgym.model.text import amount
+from relgym.reporting.conditions import Test
+from relgym.reporting.evaluation import Evaluated, SceneBatch, bounds_reached, evaluate, holds
+from relgym.reporting.naming import word_for
+from relgym.reporting.rules import Bound, Branch, PropertyRules, RuleList, bound_text
 from relgym.scene.objects import Scene
 
 if TYPE_CHECKING:
     from relgym.model.property_model import PropertyModel
     from relgym.model.world_model import WorldModel
 
-__all__ = ["Explanation", "Reason", "explain", "explanations"]
+__all__ = ["Because", "Explanation", "RunnerUp", "explain", "explanations"]
+
+CLOSE = 1e-6
+"""Values that differ by no more than this part of them are the same."""
 
 
 @dataclass(frozen=True, slots=True)
-class Reason:
-    """Why one mode was preferred to another one.
+class Because:
+    """A condition that holds in the scene.
 
     Attributes
     ----------
-    runner_up
-        Id of the mode that was not chosen.
-    runner_up_value
-        What it would have predicted; NaN if its roles are open.
-    clause
-        The clause that decided; empty if none held and that decided.
+    test
+        The condition.
     objects
-        (variable, object name) of an assignment that makes the clause true, the target first.
-    tests
-        Numeric tests that had the last word (§3.4.4); empty if there were none.
-    winner
-        Id of the mode that this pair preferred.
-    correct, incorrect
-        Training examples that went the same way, of the winner and of its runner-up.
+        (variable, object name) of objects of which it is true, A left aside.
     """
 
-    runner_up: int
-    runner_up_value: float
-    clause: str
-    objects: tuple[tuple[str, str], ...]
-    tests: str
-    winner: int
+    test: Test
+    objects: tuple[tuple[str, str], ...] = ()
+
+    def __str__(self) -> str:
+        where = ", ".join(f"{variable} = {name}" for variable, name in self.objects)
+        return f"{self.test}, with {where}" if where else str(self.test)
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerUp:
+    """What would have been predicted otherwise.
+
+    Attributes
+    ----------
+    function
+        As text.
+    value
+        What it would have said; NaN if the objects in its roles would have to be found first.
+    correct, incorrect
+        Training examples that went the same way, rightly and wrongly.
+    """
+
+    function: str
+    value: float
     correct: float
     incorrect: float
 
@@ -66,72 +83,76 @@ class Explanation:
         The prediction.
     now
         The property's present value.
-    mode
-        The mode that predicted it; none if no mode did.
     digits
         Significant digits in the text.
-    reasons
-        The mode against every other one, in the order of the ranking; the first is its strongest runner-up.
+    branch
+        The branch of the rules that decided; None if none did, or if the votes differ from the rules.
+    word
+        What happens, in a word: the branch's name, or one made from its function.
+    function
+        The function that gave the value, as text; empty without a prediction.
+    because
+        Why: conditions that hold in the scene.
+    objects
+        (name in the function, object) of objects in its roles.
+    bounds
+        What had the last word on the value.
+    runner_up
+        What would have been predicted otherwise.
     laws
-        What laws of motion predicted it, a line each, where they and no mode did: the free law, then every
-        contact.
-    limit
-        When the mode holds if it takes no part in the vote, a limit or a stop, where others would lead too far.
-    beyond
-        Tests of the place, if it is one where modes don't speak (`relgym.model.scope`).
+        What laws of motion predicted it, a line each, where they and no branch did.
     """
 
     prediction: Prediction
     now: float
-    mode: Mode | None
     digits: int
-    reasons: tuple[Reason, ...]
+    branch: Branch | None = None
+    word: str = ""
+    function: str = ""
+    because: tuple[Because, ...] = ()
+    objects: tuple[tuple[str, str], ...] = ()
+    bounds: tuple[Bound, ...] = ()
+    runner_up: RunnerUp | None = None
     laws: tuple[str, ...] = ()
-    limit: str = ""
-    beyond: str = ""
 
     def __str__(self) -> str:
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
         p, d = self.prediction, self.digits
         name = f"{p.object}.{p.property}"
         if self.laws:
-            first, *rest = self.laws
-            head = f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"
-            return "\n".join([head, f"  laws      {first}", *(f"            {line}" for line in rest)])
-        if self.mode is None:
-            said = f"-> {p.value:.{d}g}, a guess" if p.informed else "keeps its value: no prediction"
-            lines = [f"{name}: {self.now:.{d}g} {said}", f"  outcome   {p.outcome.value}"]
-            return "\n".join(
-                [*lines, f"  because   no mode speaks where {self.beyond}"] if self.beyond else lines
-            )
-        lines = [f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"]
-        examples = amount(self.mode.examples, "training example")
-        lines.append(f"  mode      {self.mode.id}: {self.mode.formula(d)}  ({examples})")
-        lines.append(f"  roles     {self._roles(self.mode)}")
+            yield f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"
+            yield from _labelled("laws", self.laws)
+            return
         if not p.ok:
-            lines.append(f"  outcome   {p.outcome.value}")
-        if self.limit:
-            return "\n".join([*lines, f"  because   {self.limit}"])
-        lines += self._because() if self.reasons else ["  because   no other mode is known"]
-        return "\n".join(lines)
+            said = f"-> {p.value:.{d}g}, a guess" if p.informed else "keeps its value: no prediction"
+            yield f"{name}: {self.now:.{d}g} {said}"
+            yield f"  outcome   {p.outcome.value}"
+        else:
+            yield f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"
+        if self.function:
+            word = f"{self.word}: " if self.word else ""
+            steps = f"  ({amount(self.branch.steps, 'training step')})" if self.branch is not None else ""
+            yield f"  {'rule' if self.branch is not None else 'vote'}      {word}{self.function}{steps}"
+        if self.objects:
+            yield f"  objects   {', '.join(f'{label} = {each}' for label, each in self.objects)}"
+        if self.because:
+            yield from _labelled("because", tuple(map(str, self.because)))
+        elif self.function and self.branch is not None and p.ok:
+            yield "  because   no other rule is known"
+        yield from _labelled("then", tuple(bound_text(b, p.property, d) for b in self.bounds))
+        if self.runner_up is not None:
+            says = "whose objects would have to be found first"
+            if not math.isnan(self.runner_up.value):
+                says = f"which says {self.runner_up.value:.{d}g}"
+            margin = f"; margin {p.margin:.3g}" if p.margin else ""
+            yield f"  runner-up {self.runner_up.function}, {says}{margin}"
 
-    def _roles(self, mode: Mode) -> str:
-        own, *others = self.prediction.roles
-        labels = mode.role_labels()[1:]
-        return ", ".join([own, *(f"{label} = {name}" for label, name in zip(labels, others, strict=True))])
 
-    def _because(self) -> list[str]:
-        reason = self.reasons[0]
-        lines = [f"  because   {_clause_text(reason)}"]
-        if reason.tests:
-            lines.append(f"            and {reason.tests}")
-        lines.append(
-            f"            in training right {reason.correct:,.0f} times, wrong {reason.incorrect:,.0f} times"
-        )
-        says = f"which says {reason.runner_up_value:.{self.digits}g}"
-        if math.isnan(reason.runner_up_value):
-            says = "whose roles would have to be filled first"
-        lines.append(f"  runner-up mode {reason.runner_up}, {says}; margin {self.prediction.margin:.3g}")
-        return lines
+def _labelled(label: str, lines: tuple[str, ...]) -> Iterator[str]:
+    for number, line in enumerate(lines):
+        yield f"  {(label if not number else '').ljust(10)}{line}"
 
 
 def explain(model: WorldModel, scene: Scene, *, digits: int = 7) -> str:
@@ -149,75 +170,135 @@ def explain(model: WorldModel, scene: Scene, *, digits: int = 7) -> str:
 
 
 def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[Explanation, ...]:
-    """One explanation per target of every object, in causal order; as `explain`, for programs."""
+    """One explanation per target of every object, in causal order; as `explain`, for programs.
+
+    Cost: some milliseconds, once the model's rules are known (`WorldModel.rules`).
+    """
     prediction = model.predict_one(scene)
+    rules = model.rules()
+    vectors = scene.vector[None]
+    said = evaluate(rules, scene.schema, scene.layout, vectors)
+    scenes = SceneBatch(scene.schema, scene.layout, vectors, said.following)
     parts = iter(prediction.parts)
     found = []
     for target in model.targets:
-        part = model.property_model(target.type, target.property)
         for index in scene.layout.of_type(target.type):
             one = next(parts)
             now = float(scene.vector[scene.layout.column(index, target.property)])
             if model.governs(target):
                 lines = model.law_lines(scene, index, digits) if one.ok else ()
-                found.append(Explanation(one, now, None, digits, (), lines))
-                continue
-            mode = next(m for m in part.modes if m.id == one.mode) if one.mode else None
-            if part.bounds(one.mode):
-                found.append(Explanation(one, now, mode, digits, (), limit=_limit(part, one.mode)))
-                continue
-            if mode is None:
-                tests = part.beyond(model.percept(scene), index, prediction.scene.vector)
-                beyond = as_relations(tests, part.flags)
-                found.append(Explanation(one, now, None, digits, (), beyond=beyond))
-                continue
-            reasons = _reasons(model, part, scene, index, prediction.scene, mode.id)
-            found.append(Explanation(one, now, mode, digits, reasons))
+                found.append(Explanation(one, now, digits, laws=lines))
+            else:
+                part = model.property_model(target.type, target.property)
+                seen = _Seen(model, rules, part, scenes, said, prediction.scene, index, digits)
+                found.append(seen.explained(one, now))
     return tuple(found)
 
 
-def _limit(part: PropertyModel, mode: int) -> str:
-    if mode in part.stops:
-        return f"it holds {part.stops.text(mode, part.target.property)}"
-    return "another mode would lead beyond it, and it is a limit"
+@dataclass(frozen=True)
+class _Seen:
+    """One object of a scene, and what is known of one of its properties."""
+
+    model: WorldModel
+    rules: RuleList
+    part: PropertyModel
+    scenes: SceneBatch
+    said: Evaluated
+    following: Scene
+    index: int
+    digits: int
+
+    def explained(self, one: Prediction, now: float) -> Explanation:
+        told = self.rules[str(self.part.target)]
+        key = (one.object, one.property)
+        number = int(self.said.branches[key][0])
+        value = float(self.said.values[key][0])
+        branch = told.branches[number] if number >= 0 else None
+        if not one.ok:
+            unsaid = branch is not None and branch.function is None
+            return Explanation(one, now, self.digits, because=self._why(told, number) if unsaid else ())
+        slack = self.part.clusterer.scale.tolerance + CLOSE * max(abs(one.value), abs(now))
+        if branch is None or branch.function is None or not abs(value - one.value) <= slack:
+            mode = next(m for m in self.part.modes if m.id == one.mode)
+            return Explanation(
+                one,
+                now,
+                self.digits,
+                function=mode.formula(self.digits),
+                because=self._voted(one.mode),
+                runner_up=self._runner_up(one),
+            )
+        return Explanation(
+            one,
+            now,
+            self.digits,
+            branch,
+            _word(told, branch),
+            f"{one.property}' = {branch.function.text(self.digits)}",
+            self._why(told, number),
+            tuple(self._players(key)),
+            bounds_reached(told, self.scenes, self.index, branch.function),
+            self._runner_up(one),
+        )
+
+    def _why(self, told: PropertyRules, number: int) -> tuple[Because, ...]:
+        """Tests of the branch that hold, and for each earlier one a test that doesn't, turned round."""
+        branch = told.branches[number]
+        case = next((c for c in branch.cases if holds(self.scenes, self.index, c)[0]), ())
+        found = list(case)
+        for earlier in told.branches[:number]:
+            for other in earlier.cases:
+                missed = [test.opposite for test in other if not self.scenes.holds(self.index, test)[0]]
+                if missed and not set(missed) & set(found):
+                    found.append(missed[0])
+        return tuple(Because(test, self._with(test)) for test in found)
+
+    def _with(self, test: Test) -> tuple[tuple[str, str], ...]:
+        """Objects of which a test is true."""
+        clause, layout = test.clause, self.scenes.layout
+        if test.negated or clause.variables == clause.arity or self.index not in layout.bodies:
+            return ()
+        world = world_of(self.scenes.facts(self.index, clause, test.context, {}), 0)
+        bound = next(solutions(clause, world, (layout.bodies.index(self.index),)), ())
+        names = [layout.names[layout.bodies[body]] for body in bound]
+        return tuple((chr(ord("A") + k), name) for k, name in enumerate(names) if k >= clause.arity)
+
+    def _voted(self, winner: int) -> tuple[Because, ...]:
+        """What the classifiers tested that tell the vote's winner from the others, as it is in the scene."""
+        functions, _ = functions_of(self.part)
+        found: dict[Test, None] = {}
+        for classifier in self.part.classifier.classifiers:
+            if winner in (classifier.i, classifier.j):
+                for _, test in tested(self.part, classifier, functions):
+                    true = bool(self.scenes.holds(self.index, test)[0])
+                    found[test if true else test.opposite] = None
+        return tuple(Because(test, self._with(test)) for test in found)
+
+    def _players(self, key: tuple[str, str]) -> Iterator[tuple[str, str]]:
+        layout = self.scenes.layout
+        for label, bodies in self.said.players.get(key, {}).items():
+            if bodies[0] >= 0:
+                yield label, layout.names[layout.bodies[int(bodies[0])]]
+
+    def _runner_up(self, one: Prediction) -> RunnerUp | None:
+        if self.part.bounds(one.mode) or len(self.part.classifier.modes) < 2:
+            return None
+        percept = self.model.percept(Scene(self.scenes.schema, self.scenes.layout, self.scenes.vectors[0]))
+        example = self.part.example(percept, self.index, self.following.vector)
+        values = self.part.mode_values(percept, self.index, self.following.vector)
+        by_mode = dict(zip(self.part.classifier.modes, values, strict=True))
+        for verdict in self.part.classifier.explain(example, values):
+            other = verdict.runner_up if verdict.winner == one.mode else verdict.winner
+            if other != one.mode and not np.isclose(by_mode[other], one.value, rtol=CLOSE, atol=0.0):
+                mode = self.part.mode(other)
+                function = mode.formula(self.digits)
+                return RunnerUp(function, by_mode[other], verdict.correct, verdict.incorrect)
+        return None
 
 
-def _reasons(
-    model: WorldModel, part: PropertyModel, scene: Scene, index: int, following: Scene, chosen: int
-) -> tuple[Reason, ...]:
-    percept = model.percept(scene)
-    example = part.example(percept, index, following.vector)
-    values = part.mode_values(percept, index, following.vector)
-    names = [scene.layout.names[i] for i in scene.layout.bodies if index in scene.layout.bodies]
-    by_mode = dict(zip(part.classifier.modes, values, strict=True))
-    reasons = []
-    for verdict in part.classifier.explain(example, values):
-        # Where a mode ranked higher can't fill its roles, its own pair with the chosen mode says why it led.
-        runner_up = verdict.runner_up if verdict.winner == chosen else verdict.winner
-        objects = _objects(part, example, values, verdict, names or [scene.layout.names[index]])
-        clause = "" if verdict.clause is None else as_relations(str(verdict.clause), part.flags)
-        tree = as_relations(verdict.tree, part.flags)
-        counts = (verdict.correct, verdict.incorrect)
-        reasons.append(Reason(runner_up, by_mode[runner_up], clause, objects, tree, verdict.winner, *counts))
-    return tuple(reasons)
-
-
-def _objects(
-    part: PropertyModel, example: Example, values: list[float], verdict: Verdict, names: list[str]
-) -> tuple[tuple[str, str], ...]:
-    """Objects for which the deciding clause holds; `names` are those of the example's objects."""
-    if verdict.clause is None:
-        return ()
-    pair = {verdict.winner, verdict.runner_up}
-    classifier = next(c for c in part.classifier.classifiers if {c.i, c.j} == pair)
-    view = View.of_batch(ExampleBatch.of(example), part.classifier.modes, np.array([values]))
-    world = world_of(view.facts(classifier.context, classifier.scope), 0)
-    bound = next(solutions(verdict.clause, world, (example.target,)), ())
-    return tuple((chr(ord("A") + k), names[each]) for k, each in enumerate(bound))
-
-
-def _clause_text(reason: Reason) -> str:
-    if not reason.clause:
-        return "none of the clauses that tell the two modes apart holds"
-    where = ", ".join(f"{variable} = {name}" for variable, name in reason.objects)
-    return f"{reason.clause}, with {where}" if where else reason.clause
+def _word(told: PropertyRules, branch: Branch) -> str:
+    """What happens where a branch holds; empty where its function has no word that isn't another one's name."""
+    if branch.name or branch.function is None:
+        return branch.name
+    word = word_for(branch.function, told.property)
+    return "" if word in told.names else word

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
 from relgym.clustering.turn import Turn
+from relgym.html import html_table
 from relgym.model.chaining import CHECK_AT, due, revise
 from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
@@ -42,6 +43,18 @@ class LearnReport:
     def changed(self) -> bool:
         """Whether any target's set of modes changed."""
         return any(part.changed for part in self.parts.values())
+
+    def _repr_html_(self) -> str:
+        head = ("target", "mode (0: noise)", "explained by", "new modes", "gone")
+        rows = [
+            (f"{name}.{prop}", part.mode, _ids(part.fits), _ids(part.created), _ids(part.removed))
+            for (name, prop), part in self.parts.items()
+        ]
+        return html_table(f"Learned; re-learning took {self.work:,} units of work", head, rows)
+
+
+def _ids(modes: tuple[int, ...]) -> str:
+    return ", ".join(map(str, modes))
 
 
 def learn(

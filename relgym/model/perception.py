@@ -18,6 +18,7 @@ from relgym.scene.context import canonical_order, signature, slots
 from relgym.scene.objects import ACTION, ObjectType, SceneLayout, poses
 from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
+from relgym.scene.surroundings import surroundings
 
 __all__ = ["Percept", "Perception", "Situation"]
 
@@ -131,8 +132,6 @@ class Perception:
         self.libraries = {t.name: library_of(features, t.name, t.angles) for t in schema.types}
         self.extractor = Extractor(schema, geometry=geometry)
         self._contact_names = self.extractor.features
-        self.approach = self._contact_names.index("approach")
-        self.gaps = _gaps(self._contact_names) if schema.offsets else []
         self._pair_names = tuple(sorted({p for t in schema.types if t.has_body for p in _free(t)}))
         self._unary_names = self.extractor.unary_names
         self._forget()
@@ -274,28 +273,20 @@ class Percept:
         return np.concatenate([self.vectors, np.full((len(self), 1), np.nan)], axis=1)
 
     def _embodied(self, body: int, target: int) -> ExampleBatch:
-        perception, relations, n = self.perception, self.relations, len(self)
+        perception, n = self.perception, len(self)
         padded = self._padded()
         own = padded[:, perception.own_columns(self.layout, target)]
         numbers = padded[:, perception.feature_columns(self.layout)]
-        contacts = relations.contacts(body)
-        gaps = contacts[..., perception.gaps].copy()
-        at = perception.approach
-        # Contact facts are facts of touching pairs: a normal towards something far says nothing.
-        contacts[~relations.touched(body)] = np.nan
-        parting = contacts[..., at] > relations.parting(body)
-        # Where bodies part, the contact does nothing any more, whichever way it faces: only that they part is said.
-        contacts[parting, :at] = contacts[parting, at + 1] = np.nan
         table = perception.unary_table(self.layout)
         every = np.broadcast_to(table, (n, *table.shape))
         nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
-        close, struck = relations.context(body), None
-        if perception.parting:
-            close, struck = (
-                _without(close, parting),
-                _approached(contacts[..., at], body, relations.parting(body)),
-            )
-        contacts[..., perception.gaps] = gaps
+        close, struck, contacts = surroundings(
+            self.relations,
+            body,
+            perception._contact_names,
+            offsets=perception.schema.offsets,
+            parting=perception.parting,
+        )
         pair = np.concatenate([contacts, numbers], axis=2)
         pair[:, body] = np.nan
         return ExampleBatch(nothing, every, close, pair, own, body, struck)
@@ -324,37 +315,3 @@ def _free(t: ObjectType) -> tuple[str, ...]:
     """Properties that are no pose component: those that may be compared with thresholds (R2)."""
     pose = {k for k in t.pose_columns() if k >= 0} if t.has_body else set()
     return tuple(p for k, p in enumerate(t.properties) if k not in pose)
-
-
-def _gaps(names: tuple[str, ...]) -> list[int]:
-    """Columns of the contact features that are told of all pairs where offsets are asked for, touching or not."""
-    return [
-        k for k, name in enumerate(names) if name in ("distance", "approach") or name.startswith("offset-")
-    ]
-
-
-def _approached(
-    approach: NDArray[np.float64], body: int, parting: float | NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """The target, and of the bodies that it touches and doesn't leave the one that it approaches fastest.
-
-    Parameters
-    ----------
-    approach
-        The target's and each touched body's relative normal velocity, NaN for the others, shape ``(n, K)``.
-    body
-        The target's number.
-    parting
-        Speed up to which bodies don't part.
-    """
-    closing = np.where(approach <= parting, approach, np.inf)
-    found: NDArray[np.bool_] = closing <= closing.min(axis=1, keepdims=True) + parting
-    found &= closing < np.inf
-    found[:, body] = True
-    return found
-
-
-def _without(close: NDArray[np.bool_], parting: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Close sets without the bodies that the target is leaving, where others are left beside itself."""
-    kept = close & ~parting
-    return np.where(kept.sum(axis=1, keepdims=True) > 1, kept, close)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.html import html_table
 from relgym.scene.objects import Scene, SceneLayout
 
 __all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
@@ -108,6 +109,17 @@ class ScenePrediction:
     def ok(self) -> bool:
         """Whether every part was predicted by a mode."""
         return all(p.ok for p in self.parts)
+
+    def _repr_html_(self) -> str:
+        head = ("target", "value", "how it came about", "mode", "roles", "margin", "spread")
+        rows = [
+            (
+                *(f"{p.object}.{p.property}", f"{p.value:.7g}", p.outcome.value, p.mode or "–"),
+                *(", ".join(p.roles), f"{p.margin:.3g}", f"{p.spread:.2g}"),
+            )
+            for p in self.parts
+        ]
+        return html_table("The next scene", head, rows)
 
     def __getitem__(self, key: tuple[str, str]) -> Prediction:
         """Return the part of an (object, property)."""

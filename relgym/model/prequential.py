@@ -8,16 +8,20 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from relgym.arguments import refusing
 from relgym.config.checks import checked_count
 from relgym.errors import ConfigError, ObservationError
+from relgym.html import html_table
 from relgym.model.hindsight import WRONG
 from relgym.model.learning import LearnReport
 from relgym.model.prediction import ScenePrediction
 from relgym.model.text import Cell, table
 from relgym.scene.objects import Scene, Transition
 
-__all__ = ["WRONG", "Key", "Prequential", "StepReport", "compared"]
+__all__ = ["WRONG", "Key", "Outcomes", "Prequential", "StepReport", "compared"]
 
 Key: TypeAlias = tuple[str, str]
 """An object and one of its properties."""
@@ -50,9 +54,66 @@ class StepReport:
     learned: LearnReport | None = field(compare=False)
     transition: Transition | None = field(default=None, compare=False)
 
+    def _repr_html_(self) -> str:
+        told = () if self.prediction is None else self.prediction.parts
+        said = {(part.object, part.property): part for part in told}
+        rows = [
+            (
+                f"{key[0]}.{key[1]}",
+                f"{said[key].value:.7g}",
+                f"{off:.2g}",
+                "wrong" if key in self.wrong else "right",
+            )
+            for key, off in self.residuals.items()
+        ]
+        return html_table(
+            "Predicted, then observed", ("target", "predicted", "observed − predicted", ""), rows
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Outcomes:
+    """How the predictions of one step came out, part by part.
+
+    Attributes
+    ----------
+    parts
+        The (object, property) of each.
+    residuals
+        Observed minus predicted value, in units of the property, shape ``(parts,)``.
+    changes
+        Observed value minus the one before, which is what *nothing changes* would be off by, shape ``(parts,)``.
+    claimed
+        Whether the model predicted it, rather than giving a fallback value, shape ``(parts,)``.
+    spreads
+        Standard deviation that the model stated, in units of the property; NaN: none; shape ``(parts,)``.
+    """
+
+    parts: tuple[Key, ...]
+    residuals: NDArray[np.float64]
+    changes: NDArray[np.float64]
+    claimed: NDArray[np.bool_]
+    spreads: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, prediction: ScenePrediction, before: Scene, residuals: Mapping[Key, float]) -> Outcomes:
+        """What became of a prediction; `residuals` are those of `compared`."""
+        told = [p for p in prediction.parts if (p.object, p.property) in residuals]
+        parts = tuple((p.object, p.property) for p in told)
+        off = np.array([residuals[key] for key in parts])
+        # Observed minus predicted plus predicted minus before; a turn is measured the short way, as its residual is.
+        moved = [
+            math.remainder(p.value - before[p.object][p.property], 2.0 * math.pi)
+            if p.property in before[p.object].type.angles
+            else p.value - before[p.object][p.property]
+            for p in told
+        ]
+        claimed = np.array([p.ok for p in told], dtype=np.bool_)
+        return cls(parts, off, off + np.array(moved), claimed, np.array([p.spread for p in told]))
+
 
 class Prequential:
-    """How often the model was wrong on steps that it hadn't seen, in total and lately.
+    """How often the model was wrong on steps that it hadn't seen, and by how much, in total and lately.
 
     Parameters
     ----------
@@ -81,11 +142,14 @@ class Prequential:
         self.predictions: dict[Key, int] = {}
         self.wrong: dict[Key, int] = {}
         self._window: deque[tuple[Key, ...]] = deque(maxlen=checked_count("window", window, 1, 10**9))
+        self._outcomes: deque[Outcomes] = deque(maxlen=self._window.maxlen)
 
     @refusing(ObservationError)
-    def count(self, predicted: Iterable[Key], wrong: Iterable[Key]) -> None:
-        """Take in one step: what was predicted, and which of that was wrong."""
+    def count(self, predicted: Iterable[Key], wrong: Iterable[Key], outcomes: Outcomes | None = None) -> None:
+        """Take in one step: what was predicted, which of that was wrong, and by how much."""
         self.steps += 1
+        if outcomes is not None:
+            self._outcomes.append(outcomes)
         for key in predicted:
             self.predictions[key] = self.predictions.get(key, 0) + 1
             self.wrong.setdefault(key, 0)
@@ -97,6 +161,43 @@ class Prequential:
     def recent(self) -> float:
         """Share of the latest steps with a wrong prediction; NaN before the first."""
         return sum(map(bool, self._window)) / len(self._window) if self._window else float("nan")
+
+    @property
+    def nrmse(self) -> float:
+        """Normalised error size of the latest steps: 0 is exact, 1 as good as that nothing changes; NaN before any.
+
+        The root mean square of what predictions were off by, fallback values included, divided by that of how far the
+        property moved; of several targets the root mean square of their ratios. One that never moved counts as 0 while
+        it is predicted exactly, else as 1.
+        """
+        squares: dict[Key, list[float]] = {}
+        for told in self._outcomes:
+            for key, off, change in zip(told.parts, told.residuals, told.changes, strict=True):
+                sums = squares.setdefault(key, [0.0, 0.0])
+                sums[0] += float(off) ** 2
+                sums[1] += float(change) ** 2
+        ratios = [off / moved if moved else float(off > 0.0) for off, moved in squares.values()]
+        return math.sqrt(math.fsum(ratios) / len(ratios)) if ratios else math.nan
+
+    @property
+    def coverage(self) -> float:
+        """Share of the latest predictions that the model claims, rather than abstains from; NaN before any."""
+        claimed = [told.claimed for told in self._outcomes if len(told.parts)]
+        return float(np.concatenate(claimed).mean()) if claimed else math.nan
+
+    @property
+    def calibration(self) -> float:
+        """Share of the latest claimed predictions that came within two of the standard deviations stated.
+
+        Of normal errors whose spread is stated rightly some 95 % do; more: the model is too modest, fewer: too sure.
+        What is off by no more than 1e-9 counts as within; NaN where no prediction with a spread was claimed.
+        """
+        within = [
+            np.abs(told.residuals[stated]) <= np.maximum(2.0 * told.spreads[stated], WRONG)
+            for told in self._outcomes
+            if (stated := told.claimed & np.isfinite(told.spreads)).any()
+        ]
+        return float(np.concatenate(within).mean()) if within else math.nan
 
     @property
     def recent_wrong(self) -> dict[Key, int]:

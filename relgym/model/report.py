@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from relgym.classification.binary import BinaryClassifier
@@ -12,10 +13,13 @@ from relgym.errors import ConfigError
 from relgym.laws.text import LawRow, WorldRow, law_rows, world_rows
 from relgym.model.advice import Advice
 from relgym.model.report_tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
+from relgym.model.rules import agreement
 from relgym.model.spread import ROUNDING
 from relgym.model.spread_text import spread_text
 from relgym.model.text import Cell, as_relations, table
-from relgym.scene.objects import ACTION
+from relgym.reporting.naming import named_text
+from relgym.reporting.parser import parse_rules
+from relgym.scene.objects import ACTION, Scene
 
 if TYPE_CHECKING:
     from relgym.model.property_model import PropertyModel
@@ -32,7 +36,7 @@ __all__ = [
     "report",
 ]
 
-_OTHERWISE = "else"
+_ELSE = "else"
 
 
 def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
@@ -62,18 +66,27 @@ def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
 def describe(
     model: WorldModel,
     *,
+    details: bool = False,
     digits: int = 7,
+    names: Mapping[str, str] | None = None,
+    check: Iterable[Scene] | None = None,
     frame: str | None = None,
     incline: float | Sequence[float] = (0.0, 90.0),
 ) -> str:
-    """Laws, modes, functions, clauses and roles of every target as text, for people.
+    """A model as text, for people: its rules, or the tables behind them.
 
     Parameters
     ----------
     model
         The model; unchanged.
+    details
+        Tables of modes, functions, clauses and roles instead of rules.
     digits
         Significant digits of coefficients.
+    names
+        Other names for conditions.
+    check
+        Scenes on which what the printed text says is compared with what the model says.
     frame
         ``"world"``: behind the laws, also the functions along the world's axes that follow from them.
     incline
@@ -82,11 +95,14 @@ def describe(
     Raises
     ------
     ConfigError
-        Another frame; or ``"world"`` where the laws in force aren't stated along the normals of a planar world.
+        Another frame; or ``"world"`` where the laws in force aren't stated along the normals of a planar world; a name
+        that can't be one; or `names` or `check` with `details`.
     """
     if frame not in (None, "world"):
         raise ConfigError(f"frame={frame!r}: expected None (as learned) or 'world'")
-    text = str(report(model, digits=digits))
+    if details and (names or check is not None):
+        raise ConfigError("details=True prints tables, which have no names and no agreement: leave them out")
+    text = str(report(model, digits=digits)) if details else _rules_text(model, digits, names, check)
     if frame is None or model.laws is None or not model.governed:
         return text
     angles = (incline,) if isinstance(incline, (int, float)) else tuple(incline)
@@ -96,6 +112,18 @@ def describe(
         for angle in angles
     ]
     return "\n\n".join([text, *tables])
+
+
+def _rules_text(
+    model: WorldModel, digits: int, names: Mapping[str, str] | None, check: Iterable[Scene] | None
+) -> str:
+    rules = model.rules()
+    if names:
+        rules = rules.renamed({named_text(rules, old): new for old, new in names.items()})
+    if check is not None:
+        measured, _ = agreement(model, parse_rules(rules.text(digits)), check)
+        rules = replace(rules, agreement=measured.agreement)
+    return rules.text(digits)
 
 
 def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
@@ -145,7 +173,7 @@ def _pair_table(classifier: BinaryClassifier, flags: frozenset[str]) -> PairTabl
     for (name, right, wrong, _), tree in zip(classifier.describe(), trees, strict=True):
         tests = [as_relations(rule, flags) for rule in (() if tree is None else tree.rules())]
         rows.append(ClauseRow(as_relations(name, flags), right, wrong, tuple(tests)))
-    rows[-1] = ClauseRow(_OTHERWISE, rows[-1].correct, rows[-1].incorrect, rows[-1].tests)
+    rows[-1] = ClauseRow(_ELSE, rows[-1].correct, rows[-1].incorrect, rows[-1].tests)
     # §3.4.5: a negated definition's clauses describe mode j.
     other = classifier.i if classifier.positive == classifier.j else classifier.j
     return PairTable(classifier.positive, other, tuple(rows))

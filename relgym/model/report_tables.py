@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from relgym.html import html_text
 from relgym.laws.text import LEGEND, LawRow
 from relgym.model.advice import Advice
 from relgym.model.text import Cell, amount, indented, table, wrapped
@@ -187,6 +188,9 @@ class ModelReport:
         parts += [f"{'─' * 80}\n{target}" for target in self.targets]
         legend = _legend(self.targets)
         return "\n\n".join([*parts, f"{'─' * 80}\n{legend}"] if legend else parts)
+
+    def _repr_html_(self) -> str:
+        return html_text(f"Learned from {amount(self.transitions, 'transition')}", str(self))
 
 
 def _mode_table(target: TargetReport) -> str:

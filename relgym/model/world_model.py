@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import asdict, replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import refusing, whole
+from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, SchemaError
+from relgym.html import html_text
 from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
@@ -36,10 +39,14 @@ from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
+from relgym.model.rules import doubted, rule_list
 from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
 from relgym.model.storage import read_model, write_model
-from relgym.scene.objects import ACTION, Scene, SceneLayout, Target, Transition
+from relgym.reporting.naming import named_text
+from relgym.reporting.parser import parse_rules
+from relgym.reporting.rules import RuleList
+from relgym.scene.objects import ACTION, ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LearnReport", "WorldModel", "with_action"]
@@ -91,7 +98,11 @@ class WorldModel:
         self.seen = 0
         self.frozen = False
         self.extra: dict[str, Any] = {}
+        self.condition_names: dict[str, str] = {}
         self._percept: tuple[Scene, Percept] | None = None
+        self._rules: tuple[Any, RuleList] | None = None
+        self._stored: tuple[RuleList, tuple[Advice, ...]] | None = None
+
         self._neighbourhoods: tuple[Scene, Neighbourhoods] | None = None
         self._journal = Journal()
         self._damaged = False
@@ -99,7 +110,12 @@ class WorldModel:
     def __getstate__(self) -> dict[str, Any]:
         if self._damaged:
             self._roll_back()
-        return self.__dict__ | {"_percept": None, "_neighbourhoods": None, "_journal": Journal()}
+        return self.__dict__ | {
+            "_percept": None,
+            "_neighbourhoods": None,
+            "_rules": None,
+            "_journal": Journal(),
+        }
 
     @property
     def _parts(self) -> Parts:
@@ -127,12 +143,20 @@ class WorldModel:
         whole: WorldModel = self._journal.replayed(lambda model, name, given: getattr(model, name)(*given))
         # All at once, as far as interrupts go.
         self.__dict__.update(
-            _state=whole._state, seen=whole.seen, _percept=None, _neighbourhoods=None, _damaged=False
+            _state=whole._state,
+            seen=whole.seen,
+            _percept=None,
+            _neighbourhoods=None,
+            _rules=None,
+            _damaged=False,
         )
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{t}: {len(self._parts.models[t].modes)} modes" for t in self.targets)
         return f"WorldModel({parts or 'no targets yet'}; {self.seen} transitions)"
+
+    def _repr_html_(self) -> str:
+        return html_text(repr(self), self.describe())
 
     @property
     def schema(self) -> SceneSchema:
@@ -165,7 +189,7 @@ class WorldModel:
         return self._parts.property_model(type_name, prop)
 
     @refusing(QueryError)
-    def modes(self, type_name: str, prop: str) -> tuple[Any, ...]:
+    def modes(self, type_name: str, prop: str) -> tuple[Mode, ...]:
         """Modes of one target, by id; `QueryError` when it is none."""
         return self.property_model(type_name, prop).modes
 
@@ -419,6 +443,7 @@ class WorldModel:
 
         A model without its history has nothing to learn from and stays as it is.
         """
+        self._rules = None
         if self.frozen:
             return 0
         with self._step("_finish"):
@@ -534,17 +559,91 @@ class WorldModel:
 
     @refusing(ConfigError)
     def describe(
-        self, *, digits: int = 7, frame: str | None = None, incline: float | Sequence[float] = (0.0, 90.0)
+        self,
+        *,
+        details: bool = False,
+        digits: int = 7,
+        names: Mapping[str, str] | None = None,
+        check: Iterable[Scene] | None = None,
+        frame: str | None = None,
+        incline: float | Sequence[float] = (0.0, 90.0),
     ) -> str:
-        """Laws, modes, functions, clauses and roles as text (tables 3.1-3.2, 4.2-4.5).
+        """The model as text: a list of ``if / elif / else`` branches for each property, or laws of motion.
 
-        With ``frame="world"`` also what the laws in force give along the world's axes on surfaces with some
-        inclines, in degrees (`relgym.model.report.describe`).
+        The text says all that the model says: `relgym.reporting.parser.parse_rules` reads it back.
+
+        Parameters
+        ----------
+        details
+            The tables behind it instead: modes by number, the clauses that tell each pair of them apart, roles (the
+            thesis' tables 3.1-3.2, 4.2-4.5).
+        digits
+            Significant digits of coefficients.
+        names
+            Other names for conditions, for this text only; `name_condition` keeps them.
+        check
+            Scenes to compare the printed text's predictions with `predict_one`'s on; how often both say the same is
+            printed with the rules.
+        frame, incline
+            With ``"world"`` also what the laws in force give along the world's axes on surfaces with some inclines, in
+            degrees (`relgym.model.report.describe`).
+
+        Raises
+        ------
+        ConfigError
+            Another frame, or a name that can't be one.
         """
         from relgym.model.report import describe
 
         digits = whole("digits", digits, 1, 18, ConfigError)
-        return describe(self, digits=digits, frame=frame, incline=incline)
+        return describe(
+            self, details=details, digits=digits, names=names, check=check, frame=frame, incline=incline
+        )
+
+    def rules(self) -> RuleList:
+        """The model as a rule list: what `describe` prints, for programs.
+
+        Cost: some 10 ms for each property with several modes, up to seconds where there are ten; kept until the model
+        learns on.
+        """
+        if self.frozen:
+            if self._stored is None:
+                raise ModelFileError(
+                    "this model was loaded without its history, from a file that holds no rules; "
+                    "save it again where it was learned"
+                )
+            return doubted(self._stored[0], self._parts.models.values()).renamed(self.condition_names)
+        state = tuple((m.undecided, m.unexplained) for m in self._parts.models.values())
+        if self._rules is None or self._rules[0] != (self.seen, state):
+            self._rules = (self.seen, state), rule_list(self)
+        return self._rules[1].renamed(self.condition_names)
+
+    def name_condition(self, condition: str, name: str) -> None:
+        """Call a condition by a name of your own, in rules and explanations; the model's file keeps it.
+
+        Parameters
+        ----------
+        condition
+            Its present name (``"drifting"``, or ``"ball.vy: drifting"`` where several properties have one of that
+            name), or its text as printed.
+        name
+            Words of letters, digits and hyphens.
+
+        Raises
+        ------
+        ConfigError
+            No condition is called so, or several; or the name can't be one.
+        """
+        rules = self.rules()
+        text = named_text(rules, condition)
+        rules.renamed({text: name})  # refuses what can't be a name
+        self.condition_names = self.condition_names | {text: name}
+
+    def layouts_seen(self) -> Iterator[tuple[ObjectType, ...]]:
+        """Types of the objects of each kind of scene that it remembers having learned from."""
+        for table in self._parts.tables.values():
+            for signature in table.signatures:
+                yield signature.types
 
     @refusing(QueryError)
     def law_lines(self, scene: Scene, index: int, digits: int = 7) -> tuple[str, ...]:
@@ -560,9 +659,20 @@ class WorldModel:
     def advice(self) -> tuple[Advice, ...]:
         """What isn't explained, target by target, and which features would explain it (`ModelConfig.features`).
 
-        Of a model that was loaded without its history only which modes nobody can choose between.
+        A model that was loaded without its history knows what was known when it was saved.
         """
-        return advices(self._parts)
+        found = advices(self._parts)
+        if self._stored is None:
+            return found
+        # Hindsight goes on without the history; what features would do is known from when there was one.
+        known, now = {a.target: a for a in self._stored[1]}, {a.target: a for a in found}
+        for target, advice in list(known.items()):
+            if target in now:
+                known[target] = replace(advice, wrong=now[target].wrong, spoken=now[target].spoken)
+            elif advice.spoken:
+                del known[target]
+        known = now | known
+        return tuple(known[str(t)] for t in self.targets if str(t) in known)
 
     @refusing(ObservationError)
     def explain(self, scene: Scene) -> str:
@@ -603,7 +713,8 @@ class WorldModel:
         if not history:
             finished = copy.deepcopy(self)  # saving must not change what is learned from here on
             finished.finish()
-            write_model(path, finished._body(history=False, extra=extra), None)
+            body = finished._body(history=False, extra=extra)
+            write_model(path, body | {"report": finished._report()}, None)
             return
         if self.frozen:
             raise ModelFileError(
@@ -616,7 +727,19 @@ class WorldModel:
         """All that a file says. What is known in hindsight stands apart: it is not learned from transitions."""
         body = self.to_json(history=history) | {"extra": self.extra if extra is None else extra}
         known = hindsight_to_json(self._parts)
+        body |= {"names": self.condition_names} if self.condition_names else {}
         return body | {"hindsight": known} if known else body
+
+    def _report(self) -> dict[str, Any]:
+        """What can't be told without the history: rules, as text, and advice."""
+        if self.frozen and self._stored is None:
+            return {}
+        return {"rules": self.rules().text(17), "advice": [asdict(advice) for advice in self.advice()]}
+
+    def _restore_report(self, data: Mapping[str, Any]) -> None:
+        if data:
+            advice = tuple(Advice(**each | {"features": tuple(each["features"])}) for each in data["advice"])
+            self._stored = parse_rules(str(data["rules"])), advice
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
@@ -644,6 +767,8 @@ class WorldModel:
             model._state, model.seen, model.frozen = parts, int(body["seen"]), arrays is None
             model.extra = dict(body["extra"])
             restore_hindsight(parts, body.get("hindsight", {}))
+            model.condition_names = {str(text): str(name) for text, name in body.get("names", {}).items()}
+            model._restore_report(body.get("report", {}))
             return model, model.extra
         except (KeyError, TypeError, IndexError, ConfigError, SchemaError) as error:
             raise ModelFileError(

@@ -167,7 +167,7 @@ def test_rendering_needs_a_mode() -> None:
 
 
 def test_a_copy_of_the_package_is_refused() -> None:
-    root = Path(relgym.__file__).parent.parent
+    root = Path(relgym.__file__).resolve().parent.parent
     done = subprocess.run([sys.executable, "-c", "import envs"], cwd=root, capture_output=True, text=True)
     assert done.returncode != 0
     assert "relgym.envs" in done.stderr

@@ -40,7 +40,7 @@ def model() -> WorldModel:
 
 
 def test_three_sentences_tell_everything(model: WorldModel) -> None:
-    told = model.describe()
+    told = model.describe(details=True)
     for law in ("vx' = vx, vy' = vy - 0.00098", "v'_n = max(u_n, -0.9 v_n)", "v'_t = u_t"):
         assert law in told
 
@@ -54,7 +54,7 @@ def test_the_laws_hold_on_another_incline(model: WorldModel) -> None:
 
 
 def test_the_thesis_functions_follow(model: WorldModel) -> None:
-    told = model.describe(frame="world", incline=30)
+    told = model.describe(details=True, frame="world", incline=30)
     assert "vx' = 0.525 vx - 0.8227241 vy + 0.0004243524" in told  # Table 4.2
     assert "vy' = -0.8227241 vx - 0.425 vy - 0.000245" in told
 
@@ -70,7 +70,7 @@ def test_single_and_batched_predictions_agree_bit_for_bit(model: WorldModel) -> 
 def test_files_keep_the_laws(model: WorldModel, tmp_path: Path, history: bool) -> None:
     model.save(tmp_path / "model", history=history)
     again = WorldModel.load(tmp_path / "model")
-    assert again.describe() == model.describe()
+    assert again.describe(details=True) == model.describe()
     assert wrong(again, 1, 3) == 0
 
 
@@ -79,6 +79,6 @@ def test_the_thesis_learner_stays_selectable() -> None:
     model = WorldModel(episode.schema, ModelConfig(frames="world"))
     for transition in episode.transitions():
         model.learn_one(transition)
-    assert "mode" in model.describe() and "v'_n" not in model.describe()
+    assert "mode" in model.describe(details=True) and "v'_n" not in model.describe()
     with pytest.raises(ConfigError, match="frames must be one of"):
         ModelConfig(frames="moon")  # type: ignore[arg-type]

@@ -79,7 +79,7 @@ def test_the_advice_names_the_smallest_library_that_explains_it(plain: WorldMode
     assert (advice.target, advice.features) == ("self.v", ("trig",))
     assert advice.law == "v' = v + 0.1 action.a + 0.3 sin(2 x)"
     assert advice.remains < 1e-6
-    assert "ModelConfig(features=('trig',)) explains it" in plain.describe()
+    assert "ModelConfig(features=('trig',)) explains it" in plain.describe(details=True)
 
 
 def test_taken_it_gives_the_law() -> None:
@@ -94,7 +94,7 @@ def test_among_several_types_it_is_for_the_one_that_lacks_it() -> None:
     model = learned(schema, steps, features=("cart:products",))
     (advice,) = model.advice()
     assert advice.features == ("cart:products", "hill:trig")
-    assert "ModelConfig(features=('cart:products', 'hill:trig')) explains it" in model.describe()
+    assert "ModelConfig(features=('cart:products', 'hill:trig')) explains it" in model.describe(details=True)
     model = learned(schema, steps, features=advice.features)
     assert [m.formula(4) for m in model.modes("hill", "v")] == ["v' = v + 0.3 sin(2 x)"]
     assert model.advice() == ()
@@ -181,7 +181,7 @@ def test_a_small_curve_drawn_at_random_counts_as_noise_and_is_told() -> None:
     model = learned(SCHEMA, drift(400))
     clusterer = model.property_model("self", "v").clusterer
     assert clusterer.scale.sigma == pytest.approx(0.002 / 2**0.5, rel=0.3)
-    assert "± 0.0014" in model.describe()
+    assert "± 0.0014" in model.describe(details=True)
     (advice,) = model.advice()
     assert advice.features == ("trig",)
     assert "0.002 sin(3 v)" in advice.law

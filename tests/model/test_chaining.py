@@ -48,7 +48,7 @@ def test_the_mountain_is_found_as_printed_in_the_source(driver: WorldModel) -> N
 
 
 def test_a_wall_is_a_condition_on_where_the_car_would_get_to(driver: WorldModel) -> None:
-    told = driver.describe(digits=5)
+    told = driver.describe(details=True, digits=5)
     assert "v' = 0 where x + v' would be <= -1.2" in told
     assert "x' = -1.2 where v' = 0" in told
 
@@ -75,8 +75,8 @@ def test_batches_and_single_scenes_agree_bit_for_bit(driver: WorldModel) -> None
 def test_an_explanation_names_the_condition(driver: WorldModel) -> None:
     hit = next(t.before for t in drive(400, 2) if t.after["self"]["x"] == WALL)
     told = driver.explain(hit)
-    assert "because   it holds where x + v' would be <= -1.2" in told
-    assert "because   it holds where v' = 0" in told
+    assert "then      0, as the rule alone would lead to x + v' <= -1.2" in told
+    assert "then      -1.2, as the rule alone would lead to v' = 0 within " in told
 
 
 def test_the_old_velocity_needs_no_order() -> None:

@@ -144,7 +144,7 @@ def test_the_report_says_so_in_a_sentence(lottery: WorldModel) -> None:
     (advice,) = lottery.advice()
     assert str(advice) == f"{doubt}; no library of features that was tried explains it"
     assert (advice.wrong, advice.spoken) == (known.wrong, known.spoken)
-    assert f"advice: {doubt}" in lottery.describe()
+    assert f"advice: {doubt}" in lottery.describe(details=True)
     assert f"outcome   {Outcome.UNEXPLAINED.value}" in lottery.explain(draws(1)[0].before)
 
 
@@ -258,7 +258,7 @@ def test_a_file_knows_it(lottery: WorldModel, tmp_path: Path, history: bool) -> 
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
     assert hindsight(again).to_json() == hindsight(lottery).to_json()
     assert again.property_model("self", "x").unexplained
-    assert "its modes cover the examples" in again.describe()
+    assert "its modes cover the examples" in again.describe(details=True)
     assert again.predict_one(draws(1)[0].before)["self", "x"].outcome is Outcome.UNEXPLAINED
 
 

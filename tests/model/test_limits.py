@@ -75,8 +75,9 @@ def test_a_stop_is_a_limit_and_every_prediction_exact(rng: np.random.Generator) 
 
 def test_people_are_told(rng: np.random.Generator) -> None:
     model = learned(stopped, 300, rng)
-    assert "v' = 0 at least: a limit to what the others predict" in describe(model)
-    assert "another mode would lead beyond it" in explain(model, scene(1.0, 0.5, 3.0))
+    assert "v' = 0 at least: a limit to what the others predict" in describe(model, details=True)
+    assert "then at least 0  (" in describe(model)
+    assert "then      at least 0" in explain(model, scene(1.0, 0.5, 3.0))
 
 
 def test_a_limit_outlives_the_file(rng: np.random.Generator, tmp_path: object) -> None:

@@ -158,11 +158,11 @@ def test_description(model: WorldModel) -> None:
         "touching, along the slip direction t: v'_t = max(0, u_t - 0.2 J_n)",
     ]
     assert report(model).targets == ()
-    text = model.describe(frame="world", incline=45.0)
+    text = model.describe(details=True, frame="world", incline=45.0)
     assert "max(u_n, -0.95 v_n)" in text
     assert "vx' = -0.17 vx - 1.17 vy + 0.000588" in text
     with pytest.raises(ConfigError, match="frame='own'"):
-        model.describe(frame="own")
+        model.describe(details=True, frame="own")
 
 
 def test_explanations(model: WorldModel, unseen: list[Episode]) -> None:
@@ -186,9 +186,9 @@ def test_a_spinning_ball_is_predicted_told_and_kept(tmp_path: Path) -> None:
     parts = model.predict_one(scene).parts
     assert {p.property: p.frame for p in parts} == {"vx": "point", "vy": "point", "spin": "point"}
     assert "v'_t = max(0, u_t - 0.6 J_n)" in model.explain(scene)
-    assert "velocities take 0.3333333 of the change along t, spins the rest" in model.describe()
+    assert "velocities take 0.3333333 of the change along t, spins the rest" in model.describe(details=True)
     with pytest.raises(ConfigError, match="contact normals"):
-        model.describe(frame="world", incline=30.0)
+        model.describe(details=True, frame="world", incline=30.0)
     model.save(tmp_path / "spin")
     again = WorldModel.load(tmp_path / "spin").predict_batch(room.layout, room.vectors[:-1])
     assert again.vectors.tobytes() == batch.vectors.tobytes()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +9,6 @@ import pytest
 
 from relgym.config import ModelConfig
 from relgym.experiments.data import truck_episodes
-from relgym.model.explain import explanations
 from relgym.model.report import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport, report
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, ObjectType, Scene, Target, Transition
@@ -53,7 +50,7 @@ def test_a_model_without_targets_says_so() -> None:
 
 
 def test_a_target_without_modes_says_so() -> None:
-    assert "ball.v: no mode learned yet, 0 examples" in WorldModel(SCHEMA).describe()
+    assert "ball.v: no mode learned yet, 0 examples" in WorldModel(SCHEMA).describe(details=True)
 
 
 def test_an_empty_model_explains_that_it_kept_the_value() -> None:
@@ -65,7 +62,7 @@ def test_an_empty_model_explains_that_it_kept_the_value() -> None:
 
 
 def test_one_mode_word_for_word() -> None:
-    assert halving().describe() == (
+    assert halving().describe(details=True) == (
         "Learned from 12 transitions.\n\n" + "─" * 80 + "\n"
         "ball.v: 1 mode, 12 examples\n\n"
         "  mode  examples  function\n"
@@ -77,9 +74,8 @@ def test_one_mode_word_for_word() -> None:
 def test_the_only_mode_has_no_runner_up() -> None:
     assert halving().explain(SCHEMA.scene({"b": [3.0]})) == (
         "b.v: 3 -> 1.5\n"
-        "  mode      1: v' = 0.5 v  (12 training examples)\n"
-        "  roles     b\n"
-        "  because   no other mode is known"
+        "  rule      changing: v' = 0.5 v  (12 training steps)\n"
+        "  because   no other rule is known"
     )
 
 
@@ -167,39 +163,6 @@ def test_truck_roles_as_in_figure_3_8(truck: tuple[WorldModel, Scene]) -> None:
     assert all(row.type == "box" for row in velocity.roles), "the action is the only one of its type"
 
 
-def test_explanation_names_the_objects_that_play_the_roles(truck: tuple[WorldModel, Scene]) -> None:
-    model, scene = truck
-    first = explanations(model, scene)[0]
-    assert first.mode is not None and first.mode.examples == 960
-    stacked = next(o.name for o in scene if o.type.name == "box" and o["py"] > scene["truck"]["py"] + 2.0)
-    assert stacked not in first.prediction.roles
-    text = str(first)
-    assert f"{first.now:.7g} -> {first.prediction.value:.7g}" in text
-    assert f"box_a = {first.prediction.roles[2]}" in text
-    assert [reason.winner for reason in first.reasons] == [first.mode.id] * 2
-
-
-def test_clauses_of_an_explanation_hold_for_the_objects_it_names(truck: tuple[WorldModel, Scene]) -> None:
-    model, _ = truck
-    scenes = [episode.scene(7) for episode in islice(truck_episodes(seed=1), 12)]
-    reasons = [(s, r) for s in scenes for e in explanations(model, s) for r in e.reasons if r.clause]
-    assert reasons, "in some layout at least one pair must be decided by a clause"
-    for scene, reason in reasons:
-        letters = {
-            letter for letter in "BCDE" if f"{letter})" in reason.clause or f"{letter}," in reason.clause
-        }
-        assert reason.objects[0] == ("A", "truck")
-        assert letters <= {variable for variable, _ in reason.objects}
-        assert all(name in scene for _, name in reason.objects)
-
-
-def test_open_roles_have_no_value_until_they_are_filled(truck: tuple[WorldModel, Scene]) -> None:
-    model, scene = truck
-    runners_up = [r for r in explanations(model, scene)[0].reasons if math.isnan(r.runner_up_value)]
-    assert runners_up
-    assert "roles would have to be filled" in model.explain(scene)
-
-
 @pytest.mark.parametrize("config", [None, ModelConfig.thesis()], ids=["clauses", "trees"])
 def test_choices_are_told_as_relations(config: ModelConfig | None, tmp_path: Path) -> None:
     # Left and right move it, and nothing else does: functions may use the choices, clauses and trees may test them.
@@ -216,20 +179,22 @@ def test_choices_are_told_as_relations(config: ModelConfig | None, tmp_path: Pat
         before, after = ({"cart": [0.0, w], ACTION: act} for w in (v, following))
         model.learn_one(Transition(schema.scene(before), schema.scene(after)))
     model.finish()
-    text = model.describe()
+    text = model.describe(details=True)
     assert "action.stay" in text or "action.left" in text or "action.right" in text
     told = [text]
     told += [model.explain(schema.scene({"cart": [0.0, 1.0], ACTION: act})) for act in np.eye(3).tolist()]
     assert any("action." in each for each in told[1:])
+    told.append(model.describe())
     assert not any("> 0.5" in each or "<= 0.5" in each for each in told)
     model.save(tmp_path / "cart.relgym")
-    assert WorldModel.load(tmp_path / "cart.relgym").describe() == text
+    assert WorldModel.load(tmp_path / "cart.relgym").describe(details=True) == text
 
 
 def test_saving_changes_no_word(truck: tuple[WorldModel, Scene], tmp_path: Path) -> None:
     model, scene = truck
     model.save(tmp_path / "truck.json")
     loaded = WorldModel.load(tmp_path / "truck.json")
+    assert loaded.describe(details=True, digits=12) == model.describe(details=True, digits=12)
     assert loaded.describe(digits=12) == model.describe(digits=12)
     assert loaded.explain(scene) == model.explain(scene)
 
@@ -237,6 +202,7 @@ def test_saving_changes_no_word(truck: tuple[WorldModel, Scene], tmp_path: Path)
 def test_describing_and_explaining_change_nothing(truck: tuple[WorldModel, Scene]) -> None:
     model, scene = truck
     before = model.to_json()
+    model.describe(details=True)
     model.describe()
     model.explain(scene)
     assert model.to_json() == before

@@ -45,7 +45,7 @@ def test_an_action_never_seen_has_the_spread_of_the_mode(engine: WorldModel) -> 
 
 
 def test_the_report_tells_them_apart(engine: WorldModel) -> None:
-    text = engine.describe()
+    text = engine.describe(details=True)
     assert "after 0" in text
     assert "after 1" in text
 
@@ -86,7 +86,7 @@ def test_nine_choices_are_told_apart() -> None:
     assert sorted(known) == [(float(k),) for k in range(9)]
     assert known[1.0,] == pytest.approx(0.05, rel=0.3)
     assert max(s for a, s in known.items() if a != (1.0,)) < 0.003
-    text = model.describe()
+    text = model.describe(details=True)
     assert "after 1; ± 0.00" in text
     assert "after any other" in text
 

@@ -94,7 +94,7 @@ def test_the_report_tells_the_sides_apart(rough: WorldModel) -> None:
     (mode,) = rough.modes("self", "w")
     split = rough.property_model("self", "w").spreads.by_mode[mode.id].split
     assert split is not None
-    assert str(split) in rough.describe()
+    assert str(split) in rough.describe(details=True)
     assert str(Split("x", 0.25, 0.002, 0.05)) == "± 0.002 where x <= 0.25, ± 0.05 else"
 
 

@@ -1,8 +1,8 @@
 """Runs the code on the pages (README.md and docs/) from top to bottom, and compares what it prints with what they show.
 
-A page's fenced ``python`` code shares one namespace, its commands one folder, which is empty at first. The
-``text`` after one of them is what it prints; a line ``…`` in it stands for what is left out. ``<!-- not run: why -->``
-above a fence leaves it out.
+A page's fenced ``python`` code shares one namespace, its commands one folder, which is empty at first. The ``text``
+after one of them is what it prints; a line ``…`` in it stands for what is left out. In ``console`` fences the output
+follows each command, ``$ relgym …``. ``<!-- not run: why -->`` above a fence leaves it out.
 
 Run as a script (`make pages`) it writes what is printed now into the pages.
 """
@@ -24,14 +24,13 @@ from difflib import SequenceMatcher
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-LEFT_OUT = ("docs/results.md", "docs/results/", "docs/guides/console.md")
-"""Pages that programs write, from measurements of hours; and the guide to the console, whose commands print in between
-(`tests/test_console_guide.py`)."""
+GENERATED = ("docs/results.md", "docs/results/")
+"""Pages that programs write, from measurements of hours."""
 
 _FENCED = re.compile(
     r"^(?P<why><!-- not run: .+ -->\n)?```(?P<kind>\w*)\n(?P<body>.*?)^```$", re.DOTALL | re.MULTILINE
 )
-_SHELL = ("bash", "console", "sh")
+_TYPED = re.compile(r"^\$ (?P<command>.*)\n(?P<shown>(?:(?!\$ ).*\n)*)", re.MULTILINE)
 _ELLIPSIS = re.compile(r"^…\n", re.MULTILINE)
 
 
@@ -50,23 +49,25 @@ class Snippet:
 def pages() -> list[Path]:
     """All pages that people wrote."""
     found = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-    return [path for path in found if not path.relative_to(ROOT).as_posix().startswith(LEFT_OUT)]
+    return [path for path in found if not path.relative_to(ROOT).as_posix().startswith(GENERATED)]
 
 
 def snippets(page: str) -> Iterator[Snippet]:
     """What is to be run of a page's text, in order."""
     found = list(_FENCED.finditer(page))
     for fence, after in zip(found, [*found[1:], None], strict=False):
-        if fence["kind"] not in ("python", *_SHELL) or fence["why"]:
+        line, start = page.count("\n", 0, fence.start("body")) + 1, fence.start("body")
+        if fence["why"]:
             continue
-        prints = after is not None and after["kind"] == "text"
-        yield Snippet(
-            "python" if fence["kind"] == "python" else "commands",
-            fence["body"],
-            after["body"] if after is not None and prints else None,
-            after.span("body") if after is not None and prints else (0, 0),
-            page.count("\n", 0, fence.start("body")) + 1,
-        )
+        if fence["kind"] == "console":
+            for typed in _TYPED.finditer(fence["body"]):
+                span = (start + typed.start("shown"), start + typed.end("shown"))
+                yield Snippet("console", typed["command"], typed["shown"] or None, span, line)
+        elif fence["kind"] in ("python", "sh", "bash"):
+            shown, span = None, (0, 0)
+            if after is not None and after["kind"] == "text":
+                shown, span = after["body"], after.span("body")
+            yield Snippet("python" if fence["kind"] == "python" else "sh", fence["body"], shown, span, line)
 
 
 def run(snippet: Snippet, names: dict[str, object], folder: Path) -> str:
@@ -77,9 +78,12 @@ def run(snippet: Snippet, names: dict[str, object], folder: Path) -> str:
     AssertionError
         A command failed, or isn't one that a page may show.
     """
-    if snippet.kind == "commands":
-        return "".join(_command(line.removeprefix("$ "), folder) for line in _lines(snippet.code))
-    os.environ["MINARI_DATASETS_PATH"] = str(folder / "minari")  # not among the reader's own data sets
+    if snippet.kind == "console":
+        # Pages show mistakes, too: relgym ends with 2 there.
+        return _command(snippet.code, folder, ends=(0, 2), stderr=subprocess.STDOUT)
+    if snippet.kind == "sh":
+        return "".join(_command(line, folder) for line in _lines(snippet.code))
+    os.environ["MINARI_DATASETS_PATH"] = str(folder / "minari")  # not among the reader\'s own data sets
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         # Lines of the page, for tracebacks.
@@ -92,14 +96,14 @@ def _lines(commands: str) -> list[str]:
     return [line for line in plain if line and not line.startswith("#")]
 
 
-def _command(line: str, folder: Path) -> str:
+def _command(line: str, folder: Path, ends: tuple[int, ...] = (0,), stderr: int = subprocess.PIPE) -> str:
     """Run relgym and scripts; of what would install or take hours, see that it exists."""
     program, *arguments = shlex.split(line)
     if program == "make":
         targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
         assert set(arguments) <= set(targets), f"the Makefile has no target for: {line}"
         return ""
-    if program in ("pip", "export", "git", "cd"):
+    if program == "pip":
         project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
         extras = {name for part in re.findall(r"\[(.+?)\]", line) for name in part.split(",")}
         assert extras <= set(project["optional-dependencies"]), f"pyproject.toml has no such extra: {line}"
@@ -111,12 +115,13 @@ def _command(line: str, folder: Path) -> str:
     done = subprocess.run(
         [sys.executable, *start, *arguments],
         cwd=folder,
-        env=os.environ | {"COLUMNS": "120", "PYTHONIOENCODING": "utf-8"},
-        capture_output=True,
-        text=True,
+        env=os.environ | {"COLUMNS": "100", "PYTHONIOENCODING": "utf-8"},
+        stdout=subprocess.PIPE,
+        stderr=stderr,
         encoding="utf-8",
+        check=False,
     )
-    assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+    assert done.returncode in ends, f"{line}\nended with {done.returncode}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 
 

@@ -115,8 +115,8 @@ def test_modes_that_nobody_can_choose_between_are_called_unexplained(name: str) 
     assert part.modes
     assert not part.clusterer.noise_examples > 0.1 * part.clusterer.seen  # they cover the examples
     assert part.unexplained
-    assert (
-        "advice: unexplained; its modes cover the examples, but nothing tells which" in env.model.describe()
+    assert "advice: unexplained; its modes cover the examples, but nothing tells which" in env.model.describe(
+        details=True
     )
     said, wrong = _predicted(env, 100)
     assert wrong > 15
@@ -155,7 +155,7 @@ def test_what_is_not_explained_is_called_so(name: str) -> None:
     live(env, 500)
     model = env.model
     assert model.seen == 500
-    told = model.describe()
+    told = model.describe(details=True)
     prediction = model.predict_one(env.view.with_action(env.scene, env.action_space.sample()))
     for target in model.targets:
         assert str(target) in told

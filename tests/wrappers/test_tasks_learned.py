@@ -74,7 +74,7 @@ def test_flight_contacts_and_the_goal_are_learned_exactly(seed: int) -> None:
         if terminated or truncated:
             env.reset()
     assert max(learner.prequential.recent_wrong.values()) <= 20
-    text = learner.model.describe()
+    text = learner.model.describe(details=True)
     assert "0.0001 action.ax" in text and "0.0001 action.ay - 0.00098" in text
     assert "v'_n = max(u_n, -0.9 v_n)" in text
     assert "held' = held + 1" in text

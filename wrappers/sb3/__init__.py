@@ -4,7 +4,27 @@ Nothing here loads torch until a name that needs it is asked for.
 """
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` loads it
+    from relgym.wrappers.sb3.acceptance import ModelAcceptance
+    from relgym.wrappers.sb3.callback import ModelCallback
+    from relgym.wrappers.sb3.config import DynaConfig
+    from relgym.wrappers.sb3.dreaming import DreamCheckup, DreamVecEnv, explore
+    from relgym.wrappers.sb3.dyna import Dyna
+    from relgym.wrappers.sb3.imagination import Imagination
+    from relgym.wrappers.sb3.permuting import PermutedReplay
+    from relgym.wrappers.sb3.recorder import TransitionRecorder
+    from relgym.wrappers.sb3.replay import (
+        MixedDictReplayBuffer,
+        MixedNStepReplayBuffer,
+        MixedReplayBuffer,
+        replay_options,
+    )
+    from relgym.wrappers.sb3.reward_models import LearnedRewardModel
+    from relgym.wrappers.sb3.stock import SceneStock
+    from relgym.wrappers.sb3.trainer import ModelTrainer
+    from relgym.wrappers.sb3.vec_env import VectorAsVecEnv
 
 _HOMES = {
     "ModelTrainer": "relgym.wrappers.sb3.trainer",
@@ -50,10 +70,12 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {sorted(_HOMES)}")
-    return getattr(importlib.import_module(_HOMES[name]), name)
+if not TYPE_CHECKING:  # checkers would take any name
+
+    def __getattr__(name: str) -> Any:
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {sorted(_HOMES)}")
+        return getattr(importlib.import_module(_HOMES[name]), name)
 
 
 def __dir__() -> list[str]:

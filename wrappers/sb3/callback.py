@@ -19,6 +19,7 @@ from relgym.model.prequential import Prequential
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.observer import First, Observer, Step
+from relgym.wrappers.sb3.quality import log_quality
 from relgym.wrappers.settings import PlainTarget
 from relgym.wrappers.views import ViewLike, chosen_view, readable
 
@@ -54,8 +55,11 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
     Notes
     -----
     Logged: ``relgym/transitions``, ``relgym/modes``, ``relgym/wrong`` (share of the latest steps with a wrong
-    prediction), ``relgym/skipped`` and, with a background process, ``relgym/dropped``; `transitions`, `modes` and
-    `wrong` are then those of the last `catch_up`.
+    prediction), ``relgym/nrmse`` (size of the errors: 0 is exact, 1 as good as that nothing changes),
+    ``relgym/calibration`` (share of errors within two of the stated standard deviations: 0.95 is right),
+    ``relgym/coverage`` (share of predictions that the model claims; of all three see `Prequential`),
+    ``relgym/skipped`` and, with a background process, ``relgym/dropped``; `transitions`, `modes` and what is said of
+    errors are then those of the last `catch_up`.
 
     Examples
     --------
@@ -233,6 +237,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
         self.logger.record("relgym/skipped", self.observer.skipped)
         if study.prequential.steps:
             self.logger.record("relgym/wrong", study.prequential.recent)
+            log_quality(self.logger, study.prequential)
         if self._arguments["background"] is not None:
             self.logger.record("relgym/dropped", study.dropped)
 

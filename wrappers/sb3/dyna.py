@@ -20,6 +20,7 @@ from relgym.errors import ConfigError
 from relgym.wrappers.sb3.config import DynaConfig, checked_config
 from relgym.wrappers.sb3.imagination import Imagination, Imagined
 from relgym.wrappers.sb3.lens import Lens, Observations
+from relgym.wrappers.sb3.quality import log_quality
 from relgym.wrappers.sb3.replay import MixedNStepReplayBuffer, Mixing
 from relgym.wrappers.sb3.reward_models import RewardModel
 from relgym.wrappers.sb3.stock import DreamModel
@@ -65,9 +66,9 @@ class Dyna(BaseCallback):  # type: ignore[misc]
 
     Notes
     -----
-    Logged: ``relgym/error``, ``relgym/known``, ``relgym/accepted``, ``relgym/imagined`` (how many so far),
-    ``relgym/dreams_known``, ``relgym/renewals`` (how often a replacement took the model's place: `ModelTrainer`),
-    ``relgym/learning_seconds`` and ``relgym/dreaming_seconds``.
+    Logged: ``relgym/error``; ``relgym/nrmse``, ``relgym/calibration`` and ``relgym/coverage`` (`Prequential`);
+    ``relgym/accepted``, ``relgym/imagined`` (how many so far), ``relgym/dreams_known``, ``relgym/renewals`` (how often
+    a replacement took the model's place: `ModelTrainer`), ``relgym/learning_seconds`` and ``relgym/dreaming_seconds``.
 
     A model that is replaced is left as it is: `world` is the one that is used now.
 
@@ -294,7 +295,7 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         acceptance = self.trainer.acceptance
         record = self.logger.record
         record("relgym/error", acceptance.error)
-        record("relgym/known", acceptance.known)
+        log_quality(self.logger, self.trainer.prequential)
         record("relgym/accepted", float(acceptance.accepted))
         record("relgym/imagined", self.imagined)
         record("relgym/dreams_known", self._known)

@@ -14,6 +14,7 @@ from relgym.envs.arguments import checked_action
 from relgym.envs.views import SceneView
 from relgym.scene.objects import Scene, Transition
 from relgym.scene.schema import SceneSchema
+from relgym.wrappers.sb3.keys import check_keys
 from relgym.wrappers.views import ViewLike, recordable, view_of
 
 __all__ = ["Experience", "TransitionRecorder"]
@@ -71,12 +72,14 @@ class TransitionRecorder(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs)
     Raises
     ------
     ConfigError
-        Observations that need a view of the user's (images, tables, nested spaces), or changed spaces.
+        Observations that need a view of the user's (images, tables, nested spaces), or changed spaces; a Dict with a
+        dot in a key.
     """
 
     def __init__(self, env: gym.Env[Any, Any], *, view: ViewLike = None) -> None:
         RecordConstructorArgs.__init__(self, view=recordable(view))
         gym.Wrapper.__init__(self, env)
+        check_keys(env.observation_space)
         self.view = view_of(env, view)
         self._scene: Scene | None = None
         self._first = True

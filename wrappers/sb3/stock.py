@@ -21,7 +21,7 @@ class DreamModel(Protocol):
 
     @property
     def schema(self) -> SceneSchema:
-        """The scenes' schema."""
+        """Of the scenes that it predicts."""
 
     @property
     def targets(self) -> tuple[Target, ...]:

@@ -11,6 +11,8 @@ import numpy as np
 from relgym.envs.learned_model_setting import check_knowledge
 from relgym.errors import ConfigError
 from relgym.model.motion import possible_targets
+from relgym.model.prediction import ScenePrediction
+from relgym.model.prequential import Outcomes, Prequential, compared
 from relgym.model.scenes import mismatch
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Scene
@@ -59,6 +61,8 @@ class ModelTrainer:
     ----------
     stock : SceneStock
         Real scenes in which roll-outs begin.
+    prequential : Prequential
+        Errors of the predictions of real steps, by whichever model was at work.
     seconds : float
         Time spent on predicting and learning.
     renewals : int
@@ -77,6 +81,7 @@ class ModelTrainer:
         self._replacements = 0
         self.reward_model = checked_reward_model(reward_model, model, model.schema)
         self.stock = SceneStock()
+        self.prequential = Prequential(self._config.window)
         self.seconds = 0.0
         self.renewals = 0
 
@@ -93,11 +98,15 @@ class ModelTrainer:
     def take_up(self, real: Experience) -> None:
         """Predict a real step, compare, and learn from it or from an earlier one."""
         started = perf_counter()
-        self.acceptance.count(self._evaluated(self.model, real))
+        predicted = self.model.predict_one(real.transition.before)
+        self.acceptance.count(self._evaluated(self.model, predicted, real))
+        residuals, wrong = compared(predicted, real.transition.after)
+        self.prequential.count(residuals, wrong, Outcomes.of(predicted, real.transition.before, residuals))
         self.stock.add(real.start, first=real.first)
         replacement = self._challenge()
         if replacement is not None:
-            replacement.acceptance.count(self._evaluated(replacement.model, real))
+            said = replacement.model.predict_one(real.transition.before)
+            replacement.acceptance.count(self._evaluated(replacement.model, said, real))
         if hasattr(self.reward_model, "learn_step"):
             # At once, not shuffled: rewards and ends are rare at first.
             self.reward_model.learn_step(real.transition, real.reward, terminated=real.terminated)
@@ -129,9 +138,8 @@ class ModelTrainer:
             self._replacement = _Trainee(untaught(), self._config, rng)
         return self._replacement
 
-    def _evaluated(self, model: DreamModel, real: Experience) -> Verdict:
+    def _evaluated(self, model: DreamModel, predicted: ScenePrediction, real: Experience) -> Verdict:
         before, after = real.start, real.transition.after
-        predicted = model.predict_one(real.transition.before)
         changes: dict[Key, float] = {(TASK, "reward"): real.reward, (TASK, "terminated"): 1.0}
         residuals: dict[Key, float] = {}
         moving = changing(model)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from relgym.errors import ConfigError
+from relgym.wrappers.sb3.keys import check_keys
 
 __all__ = ["VectorAsVecEnv"]
 
@@ -31,7 +32,7 @@ class VectorAsVecEnv(VecEnv):  # type: ignore[misc]
     Raises
     ------
     ConfigError
-        Not a vector env, or one with another autoreset mode.
+        Not a vector env, one with another autoreset mode, or a Dict with a dot in a key.
 
     Notes
     -----
@@ -56,6 +57,7 @@ class VectorAsVecEnv(VecEnv):  # type: ignore[misc]
                 "an env that is over begins anew in the same step: make it with "
                 "autoreset_mode=AutoresetMode.SAME_STEP"
             )
+        check_keys(envs.single_observation_space)
         self.envs = envs
         self._actions: NDArray[Any] | None = None
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)

@@ -172,8 +172,8 @@ def _modes(model: WorldModel) -> dict[str, list[dict[str, Any]]]:
 def _text(model: WorldModel, incline: float) -> str:
     """The model for people; laws of contacts also along the world's axes, on level ground, on ramps and on walls."""
     if not model.governed:
-        return model.describe()
-    return model.describe(frame="world", incline=(0.0, incline, 90.0))
+        return model.describe(details=True)
+    return model.describe(details=True, frame="world", incline=(0.0, incline, 90.0))
 
 
 def _trees(model: WorldModel) -> list[dict[str, Any]]:

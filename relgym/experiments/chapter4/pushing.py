@@ -43,7 +43,7 @@ def lesson(*, learner: str, seed: int, repeats: int = 2) -> dict[str, Any]:
         stated[str(mode.id)] = -1 if law is None else known[law]
     return {
         "report": plain(report(model)),
-        "text": model.describe(),
+        "text": model.describe(details=True),
         "stated": stated,
         "laws": [law.name for law in laws],
         "noise": part.clusterer.noise_examples,

@@ -103,12 +103,24 @@ def _idle(line: ast.stmt) -> bool:
 
 
 def _found(tree: ast.Module) -> Iterator[str]:
-    for node in ast.walk(tree):
+    for node in _run(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
             yield node.module
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _run(tree: ast.AST) -> Iterator[ast.AST]:
+    """All nodes but those that only type checkers see: a package that loads its names on first use lists them all."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            for line in node.orelse:
+                yield line
+                yield from _run(line)
+            continue
+        yield node
+        yield from _run(node)
 
 
 @cache

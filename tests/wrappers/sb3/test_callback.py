@@ -76,12 +76,31 @@ def test_it_logs_saves_and_goes_on(tmp_path: Any) -> None:
     assert agent.logger.name_to_value["relgym/modes"] == len(watch.world.modes("self", "v")) + len(
         watch.world.modes("self", "x")
     )
+    count = watch.prequential
+    assert agent.logger.name_to_value["relgym/nrmse"] == count.nrmse < 1.0
+    assert agent.logger.name_to_value["relgym/coverage"] == count.coverage <= 1.0
+    assert agent.logger.name_to_value["relgym/calibration"] == count.calibration
     agent.learn(32, callback=watch, reset_num_timesteps=False)
     assert watch.world.seen == 64
     watch.save(tmp_path / "slider.json", history=True)
     assert callback(model=tmp_path / "slider.json", view=view_of_slider)
     with pytest.raises(ConfigError, match="has followed 2 envs, now there are 3"):
         algorithm("PPO", vec_env(3)).learn(32, callback=watch)
+
+
+def test_errors_reach_tensorboard(tmp_path: Any) -> None:
+    from stable_baselines3.common.logger import configure
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    agent = algorithm("PPO", vec_env())
+    agent.set_logger(configure(str(tmp_path), ["tensorboard"]))
+    agent.learn(96, callback=callback(view=view_of_slider, log_every=1))
+    agent.logger.close()
+    told = EventAccumulator(str(tmp_path)).Reload()
+    assert {"relgym/nrmse", "relgym/calibration", "relgym/coverage", "relgym/wrong"} <= set(
+        told.Tags()["scalars"]
+    )
+    assert 0.0 <= told.Scalars("relgym/nrmse")[-1].value < 1.0
 
 
 def test_in_the_background() -> None:
@@ -91,6 +110,7 @@ def test_in_the_background() -> None:
     assert watch.world.seen == 0  # training never waits
     assert watch.catch_up().seen + watch.dropped == 64
     assert agent.logger.name_to_value["relgym/dropped"] == watch.dropped == 0
+    assert watch.prequential.nrmse < 1.0 and watch.prequential.coverage > 0.0
     watch.close()
 
 

@@ -344,7 +344,8 @@ def test_the_log_tells(tmp_path: Any) -> None:
     head, *rows = (tmp_path / "progress.csv").read_text().splitlines()
     for name in (
         "error",
-        "known",
+        "nrmse",
+        "coverage",
         "accepted",
         "imagined",
         "dreams_known",
@@ -352,7 +353,9 @@ def test_the_log_tells(tmp_path: Any) -> None:
         "dreaming_seconds",
     ):
         assert f"relgym/{name}" in head
-    assert rows[-1].split(",")[head.split(",").index("relgym/accepted")] == "1.0"
+    last = dict(zip(head.split(","), rows[-1].split(","), strict=True))
+    assert last["relgym/accepted"] == last["relgym/coverage"] == "1.0"
+    assert float(last["relgym/nrmse"]) < 1e-9  # `LineModel` is the law itself
 
 
 def test_several_envs_teach_one_model() -> None:

@@ -54,8 +54,8 @@ def test_the_push_task_is_learned_from_what_it_says(rng: np.random.Generator) ->
     reward_model = LearnedRewardModel(steps[0].start.schema, MOVING)
     for k in rng.permutation(len(steps)):
         reward_model.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
-    assert "reward' = 0.1 next.truck_vx - 0.02" in reward_model.model.describe()
-    assert "reward' = 1.98" in reward_model.model.describe()
+    assert "reward' = 0.1 next.truck_vx - 0.02" in reward_model.model.describe(details=True)
+    assert "reward' = 1.98" in reward_model.model.describe(details=True)
     fresh = pushes(300, 0.9, rng)
     said = verdicts(reward_model, fresh)
     known = np.isfinite(said.rewards)
@@ -152,8 +152,8 @@ def test_a_few_ends_show_what_an_end_is_paid_for() -> None:
     for episode in taught:
         for step in episode:
             reward_model.learn_step(step.transition, step.reward, terminated=step.terminated)
-    assert "2 terminated'" in reward_model.model.describe()
-    assert "terminated' = 1" in reward_model.model.describe()
+    assert "2 terminated'" in reward_model.model.describe(details=True)
+    assert "terminated' = 1" in reward_model.model.describe(details=True)
     said = [verdicts(reward_model, episode) for episode in fresh]
     right = [abs(v.rewards[-1] - e[-1].reward) < 1e-6 for v, e in zip(said, fresh, strict=True)]
     assert len(fresh) >= 5
@@ -179,7 +179,9 @@ def test_saved_and_loaded_it_goes_on_as_if_never_saved(rng: np.random.Generator,
     for number, each in enumerate((reward_model, again)):
         each.save(tmp_path / f"{number}.relgym")
     assert (tmp_path / "0.relgym").read_bytes() == (tmp_path / "1.relgym").read_bytes()
-    assert relgym.WorldModel.load(tmp_path / "0.relgym").describe() == reward_model.model.describe()
+    assert (
+        relgym.WorldModel.load(tmp_path / "0.relgym").describe(details=True) == reward_model.model.describe()
+    )
 
 
 def test_other_files_are_no_learned_task(tmp_path: Path) -> None:

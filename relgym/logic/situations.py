@@ -1,0 +1,70 @@
+"""Numbers that stand for situations: what some relations say of a target and the objects around it.
+
+An object is described by its own relations, those to the target, and which described objects it stands in which
+relation to. A situation is the *set* of these descriptions: ten more boxes beside the track make no new one.
+"""
+
+from __future__ import annotations
+
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["mixed", "situation"]
+
+_Hashes: TypeAlias = NDArray[np.uint64]
+_Bools: TypeAlias = NDArray[np.bool_]
+
+_GOLDEN: Final = np.uint64(0x9E3779B97F4A7C15)
+_NOTHING: Final = np.uint64(0)
+
+
+def situation(table: _Bools, unary: _Bools, target: NDArray[np.int64], exists: _Bools) -> _Hashes:
+    """A number per world, equal for equal situations; shape ``(n,)``.
+
+    Parameters
+    ----------
+    table, unary
+        Binary and unary relations in a fixed order, shapes ``(n, r, K, K)`` and ``(n, u, K)``.
+    target
+        The target object of each world, shape ``(n,)``.
+    exists
+        Which objects count, shape ``(n, K)``.
+
+    Notes
+    -----
+    Cost: O(n K^2 log K).
+    """
+    n, k = exists.shape
+    rows = np.arange(n)
+    table = np.moveaxis(table, 1, -1)  # (n, K, K, r)
+    towards, back = table[rows, :, target], table[rows, target]
+    self_ = np.arange(k) == target[:, None]
+    own = np.moveaxis(unary, 1, -1)
+    described = _hash_bits(np.concatenate([own, towards, back, self_[:, :, None]], axis=-1))
+    among = _hash_bits(table)  # (n, K, K): how each object stands to each other one
+    pairs = mixed(among + described[:, None, :])
+    neighbours = _set_hash(np.where(exists[:, None, :], pairs, _NOTHING))
+    return _set_hash(np.where(exists, mixed(described + neighbours), _NOTHING))
+
+
+def mixed(x: _Hashes) -> _Hashes:
+    """Scramble 64 bits (splitmix64); sums and products wrap around."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+def _hash_bits(bits: _Bools) -> _Hashes:
+    """One number per row of the last axis."""
+    weights = mixed(np.arange(1, bits.shape[-1] + 1, dtype=np.uint64) * _GOLDEN)
+    return mixed((bits * weights).sum(axis=-1, dtype=np.uint64) + _GOLDEN)
+
+
+def _set_hash(members: _Hashes) -> _Hashes:
+    """Hash of the set of non-zero numbers along the last axis."""
+    ordered = np.sort(members, axis=-1)
+    ordered[..., 1:][ordered[..., 1:] == ordered[..., :-1]] = _NOTHING
+    total: _Hashes = ordered.sum(axis=-1, dtype=np.uint64)
+    return total
