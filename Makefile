@@ -15,7 +15,7 @@ DYNA := $(VENV)/.installed-dyna
 DOCS := $(VENV)/.installed-docs
 
 .DEFAULT_GOAL := help
-.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow slow-sb3 fuzz bench coverage lint format types check
+.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow slow-sb3 fuzz bench soak outliers coverage lint format types check
 .PHONY: wheel docs docs-serve pages animations clean example-highway example-ocatari
 
 help:            ## show this list
@@ -61,6 +61,13 @@ fuzz: $(DEV)     ## change model files at random for MINUTES (default 10): what 
 
 bench: $(DEV)    ## the benchmarks
 	$(PYTEST) tests/bench -m bench --benchmark-enable --benchmark-only
+
+soak: $(DEV)     ## a million transitions of BallBoxRamp and CartPole: memory, cost and worst step (hours)
+	$(BIN)/python -m relgym.experiments.soak ball cart --steps 1000000
+	$(BIN)/python -m relgym.experiments.soak lander --steps 100000
+
+outliers: $(DEV) ## what wrong numbers in the stream cost: clean steps predicted with and without them
+	$(BIN)/python -m relgym.experiments.outliers
 
 coverage: $(DEV) ## which lines the tests never reach
 	$(BIN)/coverage run -m pytest

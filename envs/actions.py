@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from relgym.envs.arguments import checked_actions, physical_action
+from relgym.envs.arguments import action_numbers, checked_actions, physical_action
 from relgym.errors import ConfigError
 from relgym.scene.objects import ACTION, Float1D, Float2D, Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
@@ -48,7 +48,7 @@ def without_action(scene: Scene) -> Scene:
 def action_values(schema: SceneSchema, action: Any) -> Float1D:
     """Property vector of the action object: through the schema's affine maps, or as it is if there are none."""
     if not schema.action_scale:
-        return np.asarray(action, dtype=np.float64).ravel()
+        return action_numbers(action, len(schema.type_of(ACTION).properties))
     scaled = dict(zip(_scaled(schema), physical_action(schema, action).tolist(), strict=True))
     return np.array([scaled[prop] for prop in schema.type_of(ACTION).properties])
 

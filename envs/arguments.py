@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import reprlib
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, TypeAlias
@@ -21,6 +22,7 @@ from relgym.scene.schema import SceneSchema
 
 __all__ = [
     "Coefficient",
+    "action_numbers",
     "check_options",
     "checked_action",
     "checked_actions",
@@ -153,7 +155,7 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
         return action
     try:
         array = np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ActionError(f"expected numbers of shape {space.shape}, got {action!r}") from None
     slack = 1e-6 * np.maximum(1.0, np.abs(space.high))
     if array.shape != space.shape or not np.all((array >= space.low - slack) & (array <= space.high + slack)):
@@ -187,7 +189,7 @@ def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:
         return array
     try:
         array = np.asarray(actions, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ActionError(f"expected numbers of shape {(count, *space.shape)}, got {actions!r}") from None
     if array.shape != (count, *space.shape):
         raise ActionError(f"expected actions of shape {(count, *space.shape)}, got shape {array.shape}")
@@ -213,9 +215,21 @@ def checked_mask(mask: Any, count: int) -> NDArray[np.bool_]:
     return mask
 
 
+def action_numbers(action: Any, count: int | None = None) -> Float1D:
+    """An action's numbers, shape ``(count,)``; `ActionError` where they are none, not finite, or not as many."""
+    try:
+        array = np.asarray(action, dtype=np.float64).ravel()
+    except (TypeError, ValueError, OverflowError):
+        raise ActionError(f"expected the numbers of an action, got {reprlib.repr(action)}") from None
+    if (count is not None and len(array) != count) or not np.isfinite(array).all():
+        said = "" if count is None else f"{count} "
+        raise ActionError(f"expected an action of {said}finite numbers, got {reprlib.repr(action)}")
+    return array
+
+
 def physical_action(schema: SceneSchema, action: Any) -> Float1D:
     """Properties of the action object for an action in [-1, 1]: what the schema's affine maps make of it."""
-    array = np.asarray(action, dtype=np.float64).ravel()
+    array = action_numbers(action, len(schema.action_scale))
     return np.array(
         [
             low + (u + 1.0) / 2.0 * (high - low)

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from relgym.arguments import refusing
 from relgym.envs.arguments import Coefficient, check_options, checked_count, numbered
 from relgym.envs.ball_env import BallEnv, body_values
 from relgym.envs.ball_scenes import BALL_PLACES, draw_room, option_names
+from relgym.errors import ConfigError
 from relgym.scene.objects import Float1D
 
 __all__ = ["BallBoxRampEnv", "configurations"]
@@ -115,6 +117,7 @@ class BallBoxRampEnv(BallEnv):
     * v0: initial version.
     """
 
+    @refusing(ConfigError)
     def __init__(
         self,
         incline: Coefficient = 30.0,

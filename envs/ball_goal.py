@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from gymnasium import spaces
 
+from relgym.arguments import refusing
 from relgym.envs.arguments import Coefficient, check_options, physical_action
 from relgym.envs.ball_course import course_options, draw_course, rest_places
 from relgym.envs.ball_env import BallEnv, body_values
@@ -164,6 +165,7 @@ class BallGoalEnv(BallEnv):
         },
     )
 
+    @refusing(ConfigError)
     def __init__(
         self,
         incline: Coefficient = 30.0,

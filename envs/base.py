@@ -12,7 +12,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from relgym.envs.arguments import checked_action
+from relgym.envs.arguments import checked_action, checked_options
 from relgym.envs.flat import FlatSpec
 from relgym.envs.tasks import Task, TaskOutcome
 from relgym.errors import ConfigError, ObservationError
@@ -138,7 +138,7 @@ class SceneEnv(gym.Env[Observation, Any]):
             An unknown option, or an illegal value; the env is unchanged.
         """
         super().reset(seed=seed)
-        self._state = self._begin(options or {}, rng=self.np_random)
+        self._state = self._begin(checked_options(options), rng=self.np_random)
         self._steps = 0
         if self.render_mode == "human":
             self.render()

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import gymnasium as gym
 from gymnasium.error import ResetNeeded
 
+from relgym.arguments import refusing
 from relgym.envs.actions import without_action
 from relgym.envs.arguments import (
     check_options,
@@ -134,6 +135,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}  # noqa: RUF012
 
+    @refusing(ConfigError)
     def __init__(
         self,
         model: WorldModel | str | os.PathLike[str],

@@ -216,7 +216,7 @@ def _verdict(
     told = after[TASK][prop] if isinstance(function, str) else function(before, action, after)
     try:
         value = float(told)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         value = np.nan
     if not (np.isfinite(value) or (doubts and np.isnan(value))):
         what = _WORDS[prop]
@@ -288,7 +288,7 @@ class BatchStepEvaluator:
         told: Any = function(self.layout, before, actions, after)
         try:
             found = np.asarray(told, dtype=np.float64)
-        except (TypeError, ValueError):  # no numbers, or not as many in each row
+        except (TypeError, ValueError, OverflowError):  # no numbers, or not as many in each row
             found = np.empty((0, 0))
         if found.shape != (len(after),):
             came = f"one of shape {told.shape}" if isinstance(told, np.ndarray) else repr(told)

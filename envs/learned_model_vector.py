@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.envs.arguments import (
     check_options,
     checked_count,
@@ -116,6 +117,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     schema: SceneSchema
     """Of the scenes; only where observations are scenes."""
 
+    @refusing(ConfigError)
     def __init__(
         self,
         model: WorldModel | str | os.PathLike[str],

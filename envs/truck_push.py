@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from relgym.arguments import refusing
 from relgym.envs.arguments import (
     check_options,
     checked_count,
@@ -150,6 +151,7 @@ class TruckPushEnv(SceneEnv):
     * v0: initial version.
     """
 
+    @refusing(ConfigError)
     def __init__(
         self,
         n_boxes: int = 3,

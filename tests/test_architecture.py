@@ -16,14 +16,15 @@ from typing import TypeGuard
 import pytest
 from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 
-FOUNDATION = frozenset({"errors", "config", "files", "html"})
+FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html"})
 ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ENGINES | {"clustering", "classification", "laws"}
 CORE = LEARNERS | {"reporting", "model"}
 
 MAY_IMPORT = {
     "errors": frozenset(),
-    "config": frozenset({"errors"}),
+    "arguments": frozenset({"errors"}),
+    "config": frozenset({"errors", "arguments"}),
     "files": frozenset({"errors"}),
     "html": frozenset(),
     "scene": FOUNDATION,

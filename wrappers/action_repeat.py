@@ -7,7 +7,9 @@ from typing import Any, SupportsFloat
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
+from relgym.arguments import refusing
 from relgym.envs.arguments import checked_count, refuse_vector_env
+from relgym.errors import ConfigError
 
 __all__ = ["ActionRepeat"]
 
@@ -31,6 +33,7 @@ class ActionRepeat(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     ``info["steps"]`` says how many there were.
     """
 
+    @refusing(ConfigError)
     def __init__(self, env: gym.Env[Any, Any], repeat: int) -> None:
         refuse_vector_env(env)
         self.repeat = checked_count("repeat", repeat, 1, 10**6)

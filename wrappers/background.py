@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import pickle
 import queue as queues
+import signal
+import threading
+import weakref
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from itertools import groupby
+from multiprocessing.connection import Connection, wait
 from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
@@ -26,6 +32,12 @@ Names: TypeAlias = tuple[str, ...]
 Bundle: TypeAlias = tuple[Names, Names, NDArray[np.float64], NDArray[np.float64]]
 """Objects before and after, and one row of numbers before and after for each transition of a run of equal ones: an
 array by itself takes longer to send than all its numbers."""
+
+Answer: TypeAlias = tuple[int, WorldModel, Prequential | None] | Exception | None
+"""What was learned, with the number of the question; or what made it fail; ``None``: the process has ended."""
+
+WATCH = 1.0
+"""Seconds after which the process looks whether its parent is still there, if nothing tells it sooner."""
 
 PARCELS = 64
 """Transitions travel in parcels, of which the queue holds about so many: one by one, sending them costs the agent's
@@ -49,19 +61,23 @@ class Background:
 
     Attributes
     ----------
-    sent, dropped : int
-        Transitions that went in, and that found the queue full and were left out.
+    dropped : int
+        Transitions that found the queue full and were left out.
 
     Raises
     ------
     ConfigError
-        A queue of no length, or features (`ModelConfig.features`) that are functions which no process can be sent.
+        A queue of no length, features (`ModelConfig.features`) that are functions which no process can be sent, or a
+        process that may have no children (a daemonic worker of `multiprocessing`).
 
     Notes
     -----
     The process is spawned, not forked, so that it shares no threads with engines and networks; that takes a second
     or two, and a script must guard its main part by ``if __name__ == "__main__":``. Which transitions are dropped
     depends on the machine, so the model isn't reproducible when any are.
+
+    It ends with this object and with the process that made it, however that ends. An interrupt from the keyboard
+    reaches every process of a terminal; this one ignores it, and what it learned can be fetched afterwards.
     """
 
     def __init__(
@@ -69,23 +85,44 @@ class Background:
     ) -> None:
         length = checked_count("background", queue, 1, 10**7)
         functions = _sendable(model.config.features)
+        if multiprocessing.current_process().daemon:
+            raise ConfigError(
+                f"background={queue}: this is a daemonic worker process, which may have no children; learn in the "
+                "foreground here (background=None), or in the main process"
+            )
         context = multiprocessing.get_context("spawn")
         self._size = max(1, length // PARCELS)
-        self._parcel: list[Transition] = []
-        # Beside the parcels in the queue one is being packed.
+        # Beside the parcels in the queue one is being packed: the number of its first transition, and what is in it.
+        # One assignment changes both, so that an interrupt leaves them right.
+        self._parcel: tuple[int, list[Transition]] = (0, [])
         self._queue: Any = context.Queue((length + 1 - self._size) // self._size)
         self._queue.cancel_join_thread()  # who exits must not wait for a process that may be dead
-        self._answers, remote = context.Pipe(duplex=False)
+        answers, remote = context.Pipe(duplex=False)
         self._process = context.Process(
             target=_learn,
-            args=(model, prequential, precision, functions, self._queue, remote),
+            args=(model, prequential, precision, functions, self._queue, remote, os.getpid()),
             daemon=True,
             name="relgym-learner",
         )
-        self._process.start()
+        with _uninterrupted():
+            self._process.start()
         remote.close()  # so that the end of the process is the end of the pipe
+        self._inbox: queues.SimpleQueue[Answer] = queues.SimpleQueue()
+        # Interrupts are raised in the main thread only: no answer is ever read by half.
+        self._reader = threading.Thread(
+            target=_read, args=(answers, self._inbox), daemon=True, name="relgym-answers"
+        )
+        self._reader.start()
+        self._end = weakref.finalize(self, _end, self._process, self._queue, self._reader)
         self._trouble: Exception | None = None
-        self.sent = self.dropped = 0
+        self._asked = 0
+        self.dropped = 0
+
+    @property
+    def sent(self) -> int:
+        """Number of transitions that went in."""
+        first, parcel = self._parcel
+        return first + len(parcel)
 
     def put(self, transition: Transition) -> bool:
         """Queue one transition; false, and counted, when the queue is full.
@@ -95,20 +132,16 @@ class Background:
         RelgymError
             The process has ended, or what it learned made it fail; noticed when a parcel is sent.
         """
-        self._parcel.append(transition)
-        if len(self._parcel) >= self._size:
-            try:
-                self._check()
-            except Exception:
-                self._parcel.pop()
-                raise
+        first, parcel = self._parcel
+        if len(parcel) + 1 >= self._size:
+            self._check()
             if self._queue.full():
-                self._parcel.pop()
                 self.dropped += 1
                 return False
-            self._queue.put_nowait(_packed(self._parcel))  # nobody else puts anything in
-            self._parcel = []
-        self.sent += 1
+            self._queue.put_nowait((first, _packed([*parcel, transition])))  # nobody else puts anything in
+            self._parcel = (first + len(parcel) + 1, [])
+        else:
+            parcel.append(transition)
         return True
 
     def fetch(self) -> tuple[WorldModel, Prequential | None]:
@@ -120,53 +153,109 @@ class Background:
             The process has ended, or what it learned made it fail.
         """
         self._check()
-        try:
-            self._ask()
-            answer = self._answers.recv()
-        except EOFError:
-            self._complain()
-        if isinstance(answer, Exception):
-            self._trouble = answer
-            raise answer
-        model, prequential = answer
-        return model, prequential
+        question = self._ask()
+        while True:
+            try:
+                answer = self._inbox.get(timeout=1.0)
+            except queues.Empty:
+                if self._reader.is_alive():
+                    continue
+                answer = None
+            if answer is None:
+                self._complain()
+            if isinstance(answer, Exception):
+                self._trouble = answer
+                raise answer
+            number, model, prequential = answer
+            if number == question:  # else nobody waited for it, since asking was interrupted
+                return model, prequential
 
     def _check(self) -> None:
         """Raise what the process failed of, or that it has ended; unasked it says nothing else."""
-        try:
-            if self._trouble is None and self._answers.poll():
-                said = self._answers.recv()
-                # Else it is what nobody waited for, since asking was interrupted.
-                self._trouble = said if isinstance(said, Exception) else None
-        except (EOFError, OSError):  # its end, or ours
-            self._complain()
+        if not self._process.is_alive():
+            self._reader.join(1.0)  # its last words come before its end
+        while self._trouble is None and not self._inbox.empty():
+            said = self._inbox.get()
+            if said is None:
+                self._complain()
+            self._trouble = said if isinstance(said, Exception) else None
         if self._trouble is not None:
             raise self._trouble
 
     def _complain(self) -> NoReturn:
+        self._inbox.put(None)  # whoever asks next is told, too
         self._process.join(1.0)  # its pipe may end before it does
         raise RelgymError(
             f"the learning process has ended (exit code {self._process.exitcode}): what it hadn't handed over yet is "
             "lost; close() goes on without it, and learning in the foreground (background=None) shows why it ended"
         ) from None
 
-    def _ask(self) -> None:
+    def _ask(self) -> int:
+        """Send what is left and a question; its number."""
+        self._asked += 1
         while self._process.is_alive():
+            first, parcel = self._parcel
             try:
-                self._queue.put([*_packed(self._parcel), None], timeout=1.0)
+                self._queue.put((first, [*_packed(parcel), self._asked]), timeout=1.0)
             except queues.Full:
                 continue
-            self._parcel = []
-            return
-        raise EOFError
+            self._parcel = (first + len(parcel), [])
+            return self._asked
+        self._complain()
 
     def close(self) -> None:
         """End the process; what is still queued is lost."""
-        if self._process.is_alive():
-            self._process.terminate()
-        self._process.join()
-        self._queue.close()
-        self._answers.close()
+        self._end()
+
+
+def _end(process: Any, queue: Any, reader: threading.Thread) -> None:
+    """End the process and all that belongs to it."""
+    if process.is_alive():
+        process.terminate()
+    process.join(5.0)
+    if process.is_alive():  # stopped, say
+        process.kill()
+        process.join()
+    queue.close()
+    reader.join(5.0)  # the end of the process is the end of its pipe
+
+
+def _read(answers: Connection, inbox: queues.SimpleQueue[Answer]) -> None:
+    """Take in what the process says, until it ends."""
+    while True:
+        try:
+            inbox.put(answers.recv())
+        except (EOFError, OSError):
+            answers.close()
+            inbox.put(None)
+            return
+        except Exception as error:  # an answer that can't be read
+            inbox.put(RelgymError(f"the learning process said what can't be read: {error!r}"))
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Where a process is started in here, interrupts from the keyboard never reach it, not even while it imports."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with(parent: int) -> None:
+    """End this process as soon as its parent has ended, however that happened.
+
+    The end of a pipe tells at once; but other children of the parent may hold it open, hence the second look.
+    """
+    known = multiprocessing.parent_process()
+    while os.getppid() == parent:
+        if known is not None and wait([known.sentinel], WATCH):
+            break
+    os._exit(0)
 
 
 def _learn(
@@ -175,23 +264,31 @@ def _learn(
     precision: float,
     functions: bytes,
     queue: Any,
-    answers: Any,
+    answers: Connection,
+    parent: int,
 ) -> None:
-    """The process' life: learn what comes; answer every ``None`` with all that was learned so far.
+    """The process' life: learn what comes; answer every question with all that was learned so far.
 
     An error is reported at once, without being asked for.
     """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     trouble = _registered(functions)
     if trouble is not None:
         answers.send(trouble)
+    learned = 0
     while True:
-        for bundle in queue.get():
-            if bundle is None:
-                answers.send((model, prequential) if trouble is None else trouble)
+        number, bundles = queue.get()
+        for bundle in bundles:
+            if isinstance(bundle, int):
+                answers.send((bundle, model, prequential) if trouble is None else trouble)
             elif trouble is None:
                 try:
                     for transition in _unpacked(model.schema, bundle):
-                        _take_up(model, prequential, precision, transition)
+                        if number == learned:  # else it comes again, since sending was interrupted
+                            _take_up(model, prequential, precision, transition)
+                            learned += 1
+                        number += 1
                 except Exception as error:
                     trouble = error
                     answers.send(trouble)

@@ -11,6 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.envs.arguments import refuse_vector_env
 from relgym.envs.flat import FlatSpec, Flattener
 from relgym.errors import ConfigError
@@ -55,6 +56,7 @@ class FlatView(gym.ObservationWrapper[NDArray[np.float32], Any, Any], RecordCons
     ('truck.vx/5', 'box1.px/10', 'box1.py/5', 'box1.pz/10', 'box1.friction/0.25')
     """
 
+    @refusing(ConfigError)
     def __init__(self, env: gym.Env[Any, Any], spec: FlatSpec | None = None) -> None:
         refuse_vector_env(env)
         RecordConstructorArgs.__init__(self, spec=spec)
@@ -109,6 +111,7 @@ class VectorFlatView(gym.vector.VectorWrapper[Any, Any, Any, Any, Any], RecordCo
     (3, 15)
     """
 
+    @refusing(ConfigError)
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], spec: FlatSpec | None = None) -> None:
         RecordConstructorArgs.__init__(self, spec=spec)
         gym.vector.VectorWrapper.__init__(self, env)

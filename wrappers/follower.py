@@ -10,9 +10,10 @@ import gymnasium as gym
 from gymnasium.error import ResetNeeded
 
 from relgym.envs.views import View
-from relgym.errors import ConfigError, ObservationError
+from relgym.errors import ConfigError, ObservationError, ShapeError
 from relgym.model.prediction import ScenePrediction
 from relgym.scene.objects import Scene, Transition
+from relgym.scene.sizes import check_sizes
 
 __all__ = ["BadObservations", "Follower", "Look", "extrapolated", "scenes_of"]
 
@@ -36,7 +37,7 @@ class Look:
 
     scene: Scene | None = None
     outcome: Scene | None = None
-    trouble: ObservationError | None = None
+    trouble: ObservationError | ShapeError | None = None
 
 
 class Follower:
@@ -219,9 +220,11 @@ class Follower:
         self, observation: Any, info: Mapping[str, Any], last: Scene | None, expected: Scene | None
     ) -> Look:
         try:
-            return Look(self.view.scene(observation, info, last=last, expected=expected))
-        except ObservationError as error:
+            scene = self.view.scene(observation, info, last=last, expected=expected)
+            check_sizes(scene)
+        except (ObservationError, ShapeError) as error:
             return Look(trouble=error)
+        return Look(scene)
 
     def _heed(self, look: Look) -> None:
         self.check(look)

@@ -6,8 +6,10 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
+from relgym.arguments import refusing
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, View
+from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import ScenePrediction
 from relgym.model.prequential import Prequential
 from relgym.model.world_model import WorldModel
@@ -40,6 +42,7 @@ class Learning:
         """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``."""
         return self._observer.study.model
 
+    @refusing(ObservationError)
     def predict(
         self, observation: Any, action: Any, info: Mapping[str, Any] | None = None
     ) -> ScenePrediction:
@@ -101,6 +104,7 @@ class Learning:
         """What a model file says of the env: spaces and the first scenes of the first episodes."""
         return self._observer.record
 
+    @refusing(ConfigError)
     def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
         """Write the model, the env's spaces and view and some first scenes to one file, atomically.
 

@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
+from relgym.arguments import refusing
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.model.world_model import WorldModel
@@ -87,6 +88,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
     WorldModel(truck.vx: 0 modes; 1 transitions)
     """
 
+    @refusing(ConfigError)
     def __init__(
         self,
         env: gym.Env[Any, Any],

@@ -7,7 +7,9 @@ from typing import Any, SupportsFloat
 import gymnasium as gym
 from gymnasium.utils import RecordConstructorArgs
 
+from relgym.arguments import refusing
 from relgym.envs.arguments import checked_count, refuse_vector_env
+from relgym.errors import ConfigError
 
 __all__ = ["TruncatedEpisodes"]
 
@@ -33,6 +35,7 @@ class TruncatedEpisodes(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     An episode counts from its reset on. Don't use this where resets are expensive.
     """
 
+    @refusing(ConfigError)
     def __init__(self, env: gym.Env[Any, Any], steps: int, whole: int = 5) -> None:
         refuse_vector_env(env)
         self.steps = checked_count("steps", steps, 1, 10**9)

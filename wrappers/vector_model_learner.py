@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import iterate
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.config import ModelConfig
 from relgym.envs.model_files import made_how
 from relgym.errors import ConfigError
@@ -58,6 +59,7 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
     WorldModel(truck.vx: 0 modes; 4 transitions)
     """
 
+    @refusing(ConfigError)
     def __init__(
         self,
         env: gym.vector.VectorEnv[Any, Any, Any],

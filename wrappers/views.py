@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from relgym.envs.agents import AgentsSpace
-from relgym.envs.arguments import checked_action
+from relgym.envs.arguments import checked_action, checked_function
 from relgym.envs.model_files import made_how
 from relgym.envs.views import AgentsView, NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
@@ -120,7 +120,11 @@ def chosen_view(
     elif isinstance(given, Mapping):
         view = view_from_json(given)
     else:
-        view = given(observation_space, action_space) if callable(given) else given
+        view = given
+        if callable(given) and getattr(given, "__module__", "") != "builtins":
+            view = checked_function("view", given, "observation_space", "action_space")(
+                observation_space, action_space
+            )
     if not isinstance(view, View):
         raise ConfigError(
             f"view={given!r}: expected a view (NumbersView, TableView, FunctionView, ...), or a function of "
@@ -198,6 +202,6 @@ def readable(space: spaces.Space[Any], action: Any) -> Any:
             return None
     try:
         array = np.asarray(action, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return array if array.shape == space.shape and np.isfinite(array).all() else None

@@ -10,8 +10,9 @@ import numpy as np
 from gymnasium import spaces
 
 from relgym.envs.actions import without_action
+from relgym.envs.arguments import action_numbers
 from relgym.envs.views.records import identifiers
-from relgym.errors import ConfigError
+from relgym.errors import ActionError, ConfigError
 from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene
 
 __all__ = ["MOST_CHOICES", "Acts"]
@@ -88,13 +89,16 @@ class Acts:
 
     def values(self, action: Any) -> Float1D:
         """Properties of the action object, shape ``(len(properties),)``, for a legal action."""
-        numbers = np.asarray(action, dtype=np.float64).ravel()
+        numbers = action_numbers(action, len(self._counts))
         if not self._indicated:
             return numbers
         shown = [numbers]
         for k in self._indicated:
             one_hot = np.zeros(self._counts[k])
-            one_hot[int(numbers[k] - self._starts[k])] = 1.0
+            choice = int(numbers[k] - self._starts[k])
+            if not 0 <= choice < len(one_hot):
+                raise ActionError(f"action {action!r}: there is no such choice in {self.space}")
+            one_hot[choice] = 1.0
             shown.append(one_hot)
         return np.concatenate(shown)
 

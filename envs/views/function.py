@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 from gymnasium import spaces
 
+from relgym.arguments import refusing
 from relgym.envs.actions import acting, check_action_space
 from relgym.envs.views.acts import Acts
 from relgym.errors import ConfigError, ObservationError
@@ -63,6 +64,7 @@ class FunctionView:
 
     matches = False
 
+    @refusing(ConfigError)
     def __init__(
         self,
         schema: SceneSchema,

@@ -56,7 +56,7 @@ class Leaf:
         """The numbers of this part, shape ``(size,)``; `ObservationError` where it has others."""
         try:
             array = np.asarray(part, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ObservationError(f"{self._place()}expected numbers, got {part!r}") from None
         if array.size != self.size or (array.ndim > 0 and array.shape != (self.space.shape or ())):
             raise ObservationError(

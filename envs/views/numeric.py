@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
 from relgym.envs.views.angles import candidates, circular, decoded, disjoint, on_circle
@@ -67,6 +68,7 @@ class NumbersView:
 
     matches = False
 
+    @refusing(ConfigError)
     def __init__(
         self,
         observation_space: spaces.Space[Any],
@@ -164,6 +166,7 @@ class NumbersView:
         """Relative precision of the numbers that it shows: see `View`."""
         return precision_of(*self._numbers.single)
 
+    @refusing(ObservationError)
     def scene(
         self,
         observation: Any,
@@ -185,6 +188,7 @@ class NumbersView:
         """Raise `ConfigError` unless the view can read actions of a space."""
         self._acts.check(space)
 
+    @refusing(ObservationError)
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action's properties: see `Acts`."""
         return self._acts.acting(scene, action)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from relgym.arguments import refusing_fields
 from relgym.errors import ConfigError
 from relgym.model.storage import shape_from_json, shape_to_json
 from relgym.scene.objects import ObjectType
@@ -15,6 +16,7 @@ from relgym.scene.shapes import Shape
 __all__ = ["Angle", "Part", "Rows", "Static", "identifier", "identifiers", "merged"]
 
 
+@refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class Part:
     """One object, and the numbers of the observation that are its properties.
@@ -68,6 +70,7 @@ class Part:
         return cls(data["name"], columns, **_traits_from_json(data))
 
 
+@refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class Rows:
     """Consecutive rows of a table that show objects of one kind.
@@ -107,6 +110,7 @@ class Rows:
         return cls(data["name"], int(data["count"]), **_traits_from_json(data))
 
 
+@refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class Static:
     """An object that the observation doesn't show, because it never changes: a wall, the floor.
@@ -145,6 +149,7 @@ class Static:
         return cls(data["name"], {str(p): float(v) for p, v in data["values"]}, data["type"], shape)
 
 
+@refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class Angle:
     """Two numbers that are cosine and sine of an angle; scenes hold the angle instead, in radians.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from relgym.arguments import refusing
 from relgym.envs.actions import acting, check_action_space
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.base import as_shown, precision_of
@@ -38,6 +39,7 @@ class SceneView:
 
     matches = False
 
+    @refusing(ConfigError)
     def __init__(
         self, schema: SceneSchema, observation_space: spaces.Space[Any], action_space: spaces.Space[Any]
     ) -> None:
@@ -54,6 +56,7 @@ class SceneView:
         """Relative precision of the numbers that it shows: see `View`."""
         return precision_of(*(box.dtype == np.float32 for box in self._boxes.values()))
 
+    @refusing(ObservationError)
     def scene(
         self,
         observation: Any,
@@ -82,6 +85,7 @@ class SceneView:
         """Raise `ConfigError` unless the view can read actions of a space."""
         check_action_space(self.schema, space)
 
+    @refusing(ObservationError)
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action object, through the affine maps in ``schema.action_scale``."""
         return acting(scene, action)

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
 from relgym.envs.views.base import as_shown, precision_of
@@ -74,6 +75,7 @@ class TableView:
     (0.1, 4.9)
     """
 
+    @refusing(ConfigError)
     def __init__(
         self,
         observation_space: spaces.Space[Any],
@@ -95,7 +97,7 @@ class TableView:
         identifiers("columns", columns, width)
         self.columns, self._presence = tuple(columns), presence
         self._match = None if match is None else dict(match)
-        _check_columns(self.columns, [*([presence] if presence else ()), *(match or ()), *changes])
+        _check_columns(self.columns, [*([] if presence is None else [presence]), *(match or ()), *changes])
         self.changes, self._offsets = tuple(changes), offsets
         self.rows = (Rows("row", count),) if rows is None else tuple(rows)
         if sum(part.count for part in self.rows) != count:
@@ -152,6 +154,7 @@ class TableView:
         """Relative precision of the numbers that it shows: see `View`."""
         return precision_of(self._space.dtype in (np.float16, np.float32))
 
+    @refusing(ObservationError)
     def scene(
         self,
         observation: Any,
@@ -209,7 +212,7 @@ class TableView:
     def _checked(self, observation: Any) -> Float2D:
         try:
             table = np.asarray(observation, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ObservationError(f"expected a table of numbers, got {observation!r}") from None
         if table.shape != self._space.shape:
             raise ObservationError(
@@ -230,6 +233,7 @@ class TableView:
         """Raise `ConfigError` unless the view can read actions of a space."""
         self._acts.check(space)
 
+    @refusing(ObservationError)
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with the action's properties: see `Acts`."""
         return self._acts.acting(scene, action)

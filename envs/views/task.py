@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from relgym.arguments import refusing
 from relgym.envs.views.base import View
 from relgym.envs.views.numeric import NumbersView
 from relgym.errors import ConfigError, ObservationError
@@ -39,6 +40,7 @@ class TaskView:
         The view's scenes have an object `task` already.
     """
 
+    @refusing(ConfigError)
     def __init__(self, view: View, *, reward: bool = True, terminated: bool = True) -> None:
         if TASK in view.schema.order:
             raise ConfigError(
@@ -160,7 +162,7 @@ def _told(targets: Sequence[Target], names: Sequence[str]) -> tuple[Target, ...]
 def _number(reward: Any) -> float:
     try:
         numbers = np.asarray(reward, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = np.empty(0)
     if numbers.size != 1 or not np.isfinite(numbers).all():
         raise ObservationError(

@@ -95,8 +95,10 @@ def counts(y: NDArray[np.float64], scale: Scale, most: int = COUNTED) -> bool:
     if not 3 <= len(values) <= most:
         return False
     steps = np.diff(values)
+    if not steps.min() > 100.0 * scale.tolerance:
+        return False
     ratio = steps / steps.min()
-    return bool(steps.min() > 100.0 * scale.tolerance and np.abs(ratio - np.round(ratio)).max() < 1e-6)
+    return bool(np.abs(ratio - np.round(ratio)).max() < 1e-6)
 
 
 def find_mode(

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.errors import ConfigError
 
 __all__ = [
@@ -48,6 +49,7 @@ Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 _functions: dict[str, Function] = {}
 
 
+@refusing(ConfigError)
 def register_function(name: str, function: Function) -> None:
     """Make a function of one number available as a feature by its name.
 

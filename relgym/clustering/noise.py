@@ -39,6 +39,9 @@ MANY = 8
 SINGLES = 2.0
 """The same for numbers that were rounded to single precision when they were observed."""
 
+TINY = 1e-38
+"""Numbers may all be zero or subnormal; noise is never so small that its square vanishes."""
+
 ROUNDINGS = 32.0
 """A function of a few terms on differences of stored numbers carries at most about this many roundings."""
 
@@ -64,17 +67,18 @@ def rounding_noise(
     """
     largest = float(np.abs(y).max(initial=0.0))
     if bool((y.astype(np.float32).astype(np.float64) == y).all()) and bool(np.any(y != np.round(y))):
-        return SINGLES * float(np.finfo(np.float32).eps) * largest
-    if recent is not None and any(_rounded(column) for column in recent.T):
+        return SINGLES * float(np.finfo(np.float32).eps) * max(largest, TINY)
+    if recent is not None and _rounded(recent):
         return SINGLES * float(np.finfo(np.float32).eps) * max(largest, 1.0)
     scale = max(float(np.abs(x).max(initial=0.0)), largest, 1e-3)
     return ROUNDINGS * float(np.finfo(np.float64).eps) * scale
 
 
-def _rounded(column: NDArray[np.float64]) -> bool:
-    """Whether float32 represents all values of a column exactly, and there are enough of them to tell."""
-    exact = bool((column.astype(np.float32).astype(np.float64) == column).all())
-    return exact and len(np.unique(column[column != np.round(column)])) >= MANY
+def _rounded(rows: NDArray[np.float64]) -> bool:
+    """Whether float32 represents all values of some column exactly, and there are enough of them to tell."""
+    exact = (rows.astype(np.float32).astype(np.float64) == rows).all(axis=0)
+    columns = (rows[:, k] for k in np.flatnonzero(exact))
+    return any(len(np.unique(column[column != np.round(column)])) >= MANY for column in columns)
 
 
 def estimate_noise(

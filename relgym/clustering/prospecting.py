@@ -71,7 +71,10 @@ class Prospector(Population):
         slots = table.signatures[signature]
         dear, more = bool(slots.features), False
         patience = self._patience(search, dear, dear or bool(slots.chained))
-        if search.waiting <= patience or (dear and not turn.take()):
+        waits = search.waiting <= patience or (dear and not turn.take())
+        if waits or (
+            len(self._pool(table, signature)) >= self._needed and not turn.afford(len(slots.columns))
+        ):
             self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)  # costs little
             return
         for _ in range(1 if dear else MOST_DISCOVERIES):

@@ -26,8 +26,14 @@ class Search:
     failures: int = 0
 
 
+COLUMNS = 3_000
+"""Searches of one step look at no more columns than this together, some tenths of a second; one is always made."""
+
+
 class Turn:
     """Leave for one dear search in one step of the world: who asks first has it, the others ask again in the next.
+
+    Of plain searches it gives leave for many, unless they are of very many columns.
 
     Examples
     --------
@@ -38,6 +44,14 @@ class Turn:
 
     def __init__(self) -> None:
         self._free = True
+        self._columns = 0
+
+    def afford(self, columns: int) -> bool:
+        """Whether a search of so many columns may be made in this step; if so, it is counted."""
+        if self._columns and self._columns + columns > COLUMNS:
+            return False
+        self._columns += columns
+        return True
 
     def take(self) -> bool:
         """Whether it was still free; it isn't any more."""

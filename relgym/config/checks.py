@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import fields
 from typing import Any
 
@@ -10,6 +11,9 @@ import numpy as np
 from relgym.errors import ConfigError
 
 __all__ = ["at_least", "checked_count", "one_of", "plain", "unit"]
+
+LARGEST = 2**63 - 1
+"""Whole numbers beyond this fit no file, and no seed."""
 
 
 def plain(config: Any) -> None:
@@ -34,6 +38,12 @@ def plain(config: Any) -> None:
             kinds, said = (int, float), "a number"
         if kinds and (not isinstance(value, kinds) or (bool not in kinds and isinstance(value, bool))):
             raise ConfigError(f"{field.name} must be {said}, got {value!r}")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ConfigError(f"{field.name} must be finite, got {value!r}")
+        if isinstance(value, int) and not -LARGEST <= value <= LARGEST:
+            raise ConfigError(
+                f"{field.name} must lie within ±2**63, got a number of {value.bit_length()} bits"
+            )
 
 
 def one_of(config: object, **allowed: tuple[str, ...]) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from relgym.arguments import refusing_fields
 from relgym.config.checks import at_least, one_of, plain, unit
 from relgym.errors import ConfigError
 
 __all__ = ["ClassificationConfig"]
 
 
+@refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class ClassificationConfig:
     """Parameters of mode and role classifiers: when a mode holds, and role binding (§3.4, §3.5).

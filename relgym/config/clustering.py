@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from relgym.arguments import refusing_fields
 from relgym.config.checks import at_least, one_of, plain
 from relgym.errors import ConfigError
 
 __all__ = ["ClusteringConfig"]
 
 
+@refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class ClusteringConfig:
     """Modes: discovery, assignment and unification (§3.2).

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
+from relgym.arguments import refusing_fields
 from relgym.config.checks import at_least, one_of, plain
 from relgym.config.classification import ClassificationConfig
 from relgym.config.clustering import ClusteringConfig
@@ -14,6 +15,7 @@ from relgym.errors import ConfigError
 __all__ = ["ModelConfig"]
 
 
+@refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class ModelConfig:
     """All free parameters of a `WorldModel`; one default for every env.

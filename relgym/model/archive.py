@@ -32,6 +32,7 @@ def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
         **({"looks": [list(look) for look in parts.looks]} if history and parts.looks else {}),
         "tables": [parts.tables[name].to_json() for name in sorted(parts.tables)] if history else [],
         "laws": None if parts.laws is None else parts.laws.to_json(history=history),
+        **({"screen": parts.screen.to_json()} if history else {}),
     }
 
 
@@ -78,6 +79,8 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     for k, target in enumerate(targets):
         parts.models[target].restore(data["targets"][k]["model"], _of(arrays, f"target{k}."))
     parts.looks = [(name, prop, inert) for name, prop, inert in body.looks]
+    if "screen" in data:
+        parts.screen.restore(data["screen"])
     if parts.laws is not None:
         parts.laws.restore(data["laws"], _of(arrays, "laws."))
     return parts

@@ -99,6 +99,8 @@ def revise(parts: Parts, look: Look) -> None:
 def in_order(targets: Iterable[Target]) -> tuple[Target, ...]:
     """Targets such that each comes after those it is given, otherwise as they are; the task's come last."""
     left, done = sorted(targets, key=lambda t: t.type == TASK), []
+    if not any(t.given for t in left):
+        return tuple(left)
     while left:
         waiting = {(t.type, t.property) for t in left}
         nxt = next((t for t in left if waiting.isdisjoint(t.given)), left[0])

@@ -45,6 +45,7 @@ from relgym.model.file_format import (
     ModeRecord,
     PairRecord,
     PropertyRecord,
+    ScreenRecord,
     StopRecord,
     TableRecord,
     TargetRecord,
@@ -126,6 +127,8 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
         _require(all(wrong <= said for said, wrong in hindsight.steps), "hindsight", "more wrong than said")
     pairs = {(t.type, t.property) for t in targets}
     _require(all((name, prop) in pairs for name, prop, _ in body.looks), "looks", "expected targets")
+    if body.screen is not None:
+        _check_screen(body.screen, parts)
     _require((parts.laws is None) == (body.laws is None), "laws", "they don't go with config.frames")
     if parts.laws is not None and body.laws is not None:
         _check_laws(body.laws, parts.laws.learner, arrays)
@@ -482,6 +485,17 @@ def _within(values: NDArray[Any], low: int, high: int) -> bool:
 
 
 # ---------------------------------------------------------------------- laws of motion
+def _check_screen(record: ScreenRecord, parts: Parts) -> None:
+    known = {(t.name, prop) for t in parts.schema.types for prop in t.properties}
+    pairs = [(row[0], row[1]) for row in record.properties]
+    _require(
+        len(set(pairs)) == len(pairs) and set(pairs) <= known, "screen", "expected properties of the schema"
+    )
+    _require(
+        all(row[3] == sorted(row[3]) for row in record.properties), "screen", "expected ascending magnitudes"
+    )
+
+
 def _check_laws(record: LawsRecord, learner: LawLearner, arrays: _Arrays | None) -> None:
     laws, sources = record.laws, learner.sources
     free = [law.type for law in laws.free]

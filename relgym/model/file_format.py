@@ -494,6 +494,26 @@ class ReportRecord(Record):
     advice: list[Advice] = []
 
 
+class ScreenRecord(Record):
+    """What sizes of numbers are known, by which gross errors are told (`relgym.model.screening`).
+
+    Of each property its type and name, in how many scenes it was seen, its largest magnitudes in ascending order, the
+    suspicious numbers that wait for others like them, and how many transitions in a row held one.
+    """
+
+    set_aside: Count
+    properties: list[
+        tuple[
+            Name,
+            Name,
+            Count,
+            Annotated[list[Amount], Meta(min_length=5, max_length=5)],
+            Annotated[list[Finite], Meta(max_length=10_000)],
+            Count,
+        ]
+    ]
+
+
 class Body(Record):
     """All that a model file says, but for the arrays of its history."""
 
@@ -507,6 +527,7 @@ class Body(Record):
     seen: Count
     extra: dict[str, Any]
     looks: list[tuple[Name, Name, bool]] = []
+    screen: ScreenRecord | None = None
     hindsight: dict[str, HindsightRecord] = {}
     names: dict[str, Name] = {}
     report: ReportRecord = field(default_factory=ReportRecord)

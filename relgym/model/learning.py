@@ -31,10 +31,13 @@ class LearnReport:
         Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice.
     work
         Deterministic units of work spent on re-learning classifiers.
+    set_aside
+        Whether the transition held a gross error and wasn't learned from (`relgym.model.screening`).
     """
 
     parts: dict[tuple[str, str], ClusterReport]
     work: int
+    set_aside: bool = False
 
     @property
     def changed(self) -> bool:
@@ -54,8 +57,13 @@ def _ids(modes: tuple[int, ...]) -> str:
     return ", ".join(map(str, modes))
 
 
-def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport:
-    """Take up one transition, whose first scene has been perceived and whose numbers are finite."""
+def learn(
+    parts: Parts, percept: Percept, transition: Transition, only: frozenset[int] | None = None
+) -> LearnReport:
+    """Take up one transition, whose first scene has been perceived and whose numbers are finite.
+
+    With `only`, of the objects with these indices; all others are there to be seen.
+    """
     before, after = transition.before, transition.after
     if parts.open:
         parts.discover_targets(before, after)
@@ -66,7 +74,7 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
-            if stays(before, after, index):
+            if (only is None or index in only) and stays(before, after, index):
                 _learn_object(parts, percept, index, following, reports, turn)
     for type_name, table in parts.tables.items():
         if parts.open and table.seen in CHECK_AT:
@@ -75,9 +83,19 @@ def learn(parts: Parts, percept: Percept, transition: Transition) -> LearnReport
     if parts.looks and turn.take():
         revise(parts, parts.looks.pop(0))
     if parts.laws is not None:
-        there = {i: stays(before, after, i) for i in range(len(before))}
-        parts.laws.learn_one(percept, following, there, parts.models)
+        parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models)
     return LearnReport(reports, _refresh(parts))
+
+
+def _there(parts: Parts, transition: Transition, only: frozenset[int] | None) -> dict[int, bool]:
+    """Whether each object stays; of those that move, only some may teach."""
+    before, after = transition.before, transition.after
+    there = {i: stays(before, after, i) for i in range(len(before))}
+    if only is not None:
+        moving = {t.type for t in parts.targets}
+        others = (i for i, t in enumerate(before.layout.types) if t.name in moving and i not in only)
+        there |= dict.fromkeys(others, False)
+    return there
 
 
 def finish(parts: Parts) -> int:

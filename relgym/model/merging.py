@@ -50,6 +50,7 @@ def merge(parts: Parts, other: Parts, *, follow_laws: bool) -> None:
         mine = parts.property_model(theirs.type, theirs.property)
         rows = moved[theirs.type]
         _take_up(mine, model, parts.tables[theirs.type], rows)
+    parts.screen.absorb(other.screen)
     for name, table in parts.tables.items():
         forget(table, [m for t, m in parts.models.items() if t.type == name], parts.config.history)
     if follow_laws and parts.laws is not None:

@@ -18,10 +18,15 @@ from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Perception
 from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch, stays
+from relgym.model.screening import Screen
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
+from relgym.scene.sizes import check_sizes
 
-__all__ = ["Parts"]
+__all__ = ["MOST_TARGETS", "Parts"]
+
+MOST_TARGETS = 256
+"""More properties than this aren't learned by one model: a step would take seconds."""
 
 
 class Parts:
@@ -52,6 +57,8 @@ class Parts:
         Laws of motion; None with ``frames="world"``.
     looks
         Targets to be looked at for laws with next values, one in a step.
+    screen
+        Tells gross errors in observations, which aren't learned from.
     """
 
     def __init__(self, schema: SceneSchema, config: ModelConfig, targets: Sequence[Target] | None) -> None:
@@ -73,6 +80,7 @@ class Parts:
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}
         self.looks: list[Look] = []
+        self.screen = Screen()
         self.laws: Laws | None = None
         if config.frames == "auto":
             self.laws = Laws(schema, None if targets is None else tuple(targets), config)
@@ -85,7 +93,10 @@ class Parts:
         return self.__dict__ | {"_kin": {}, "_known": {}}  # keyed by identity, which a copy doesn't share
 
     def check(self, scene: Scene) -> None:
-        """Raise `ObservationError` for NaN, infinity, what is no scene, or one of another schema."""
+        """Raise `ObservationError` for NaN, infinity, what is no scene, or one of another schema.
+
+        `ShapeError` where a body can't be: an extent isn't positive, or a sphere isn't round.
+        """
         if not isinstance(scene, Scene):
             raise ObservationError(
                 f"expected a Scene, got {type(scene).__name__}; of an observation and an action a learner's "
@@ -102,6 +113,7 @@ class Parts:
             self._kin[id(schema)] = schema  # kept alive, so that its id stays its own
         if not np.isfinite(scene.vector).all():
             schema.scene(scene.values())  # raises, naming object and property
+        check_sizes(scene)
 
     def checked_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """State vectors as contiguous float64; `ObservationError` for other types or width, NaN or infinity."""
@@ -164,15 +176,19 @@ class Parts:
         What the task says is asked for, and a target at once: of ends, that most steps are none is half the story.
         """
         derived = {(k.type, k.property) for k in self.schema.kinematics}
+        found: list[Target] = []
         for i, t in enumerate(before.layout.types):
             if t.name == ACTION or not stays(before, after, i):
                 continue
             was, now = before.vector[before.layout.slice(i)], after[before.layout.names[i]].values
             for k in np.flatnonzero((was != now) | (t.name == TASK)):
                 prop = t.properties[k]
-                known = any(x.type == t.name and x.property == prop for x in self.targets)
+                known = any(x.type == t.name and x.property == prop for x in (*self.targets, *found))
                 if not known and (t.name, prop) not in derived and prop not in t.exogenous:
-                    self.add_target(Target(t.name, prop))
+                    found.append(Target(t.name, prop))
+        check_number(len(self.targets) + len(found))
+        for target in found:
+            self.add_target(target)
 
     def retarget(self, target: Target, other: Target) -> None:
         """Put another target of the same property in a target's place; it begins anew, order included."""
@@ -208,6 +224,15 @@ class Parts:
         return self.laws is not None and self.laws.governs(target)
 
 
+def check_number(count: int) -> None:
+    """Raise `ConfigError` for more targets than one model learns."""
+    if count > MOST_TARGETS:
+        raise ConfigError(
+            f"{count} properties change, and one model learns at most {MOST_TARGETS}: name those that matter "
+            "(targets=['type.property', ...]), or declare others exogenous; all may still be read"
+        )
+
+
 def check_targets(schema: SceneSchema, targets: Sequence[Target]) -> None:
     """Raise an error unless targets are in causal order, each of them once.
 
@@ -221,6 +246,7 @@ def check_targets(schema: SceneSchema, targets: Sequence[Target]) -> None:
     """
     derived = {(law.type, law.property) for law in schema.kinematics}
     known: set[tuple[str, str]] = set()
+    check_number(len(targets))
     for target in targets:
         if not isinstance(target, Target):
             raise ConfigError(f"target {target!r}: expected a Target, as Target('ball', 'vx')")

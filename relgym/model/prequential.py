@@ -11,7 +11,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.config.checks import checked_count
+from relgym.errors import ConfigError, ObservationError
 from relgym.html import html_table
 from relgym.model.hindsight import WRONG
 from relgym.model.learning import LearnReport
@@ -134,6 +136,7 @@ class Prequential:
     ({('ball', 'vx'): 2}, {('ball', 'vx'): 1}, 0.5)
     """
 
+    @refusing(ConfigError)
     def __init__(self, window: int = 1000) -> None:
         self.steps = 0
         self.predictions: dict[Key, int] = {}
@@ -141,6 +144,7 @@ class Prequential:
         self._window: deque[tuple[Key, ...]] = deque(maxlen=checked_count("window", window, 1, 10**9))
         self._outcomes: deque[Outcomes] = deque(maxlen=self._window.maxlen)
 
+    @refusing(ObservationError)
     def count(self, predicted: Iterable[Key], wrong: Iterable[Key], outcomes: Outcomes | None = None) -> None:
         """Take in one step: what was predicted, which of that was wrong, and by how much."""
         self.steps += 1

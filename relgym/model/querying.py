@@ -16,7 +16,7 @@ from relgym.model.scenes import wrap
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["predict", "predict_many"]
+__all__ = ["derive", "predict", "predict_many"]
 
 _PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED = (
     OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.OUTSIDE, Outcome.DEPENDS, Outcome.UNEXPLAINED)
@@ -47,7 +47,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
             if not one.ok:
                 lost.add((target.type, target.property))
             found.append(replace(one, object=layout.names[index], property=target.property))
-    _derive(parts.schema, layout, scene.vector[None], following[None])
+    derive(parts.schema, layout, scene.vector[None], following[None])
     wrap(layout, following)
     return ScenePrediction(Scene(scene.schema, layout, following), tuple(found))
 
@@ -102,7 +102,7 @@ def predict_many(
             lost[key] = lost.get(key, nowhere) | ~known
             keys.append((layout.names[index], target.property))
             verdicts.append(verdict)
-    _derive(parts.schema, layout, vectors, following)
+    derive(parts.schema, layout, vectors, following)
     wrap(layout, following)
     frames = tuple(_frame(parts, target) for target in parts.targets for _ in layout.of_type(target.type))
     return _stacked(layout, following, tuple(keys), verdicts, frames)
@@ -131,7 +131,7 @@ def _frame(parts: Parts, target: Target) -> str:
     return pair.frame if pair is not None and parts.governs(target) else "world"
 
 
-def _derive(
+def derive(
     schema: SceneSchema, layout: SceneLayout, now: NDArray[np.float64], following: NDArray[np.float64]
 ) -> None:
     """Declared kinematics, in place: simulate, then derive (§4.8)."""

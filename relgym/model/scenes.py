@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.errors import ObservationError
 from relgym.scene.objects import ACTION, Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
@@ -18,6 +19,7 @@ TURN = 2.0 * math.pi
 """A full turn, in radians."""
 
 
+@refusing(ObservationError)
 def with_action(scene: Scene, values: Sequence[float] | NDArray[np.float64]) -> Scene:
     """The scene with other values of the action object's properties (physical units)."""
     layout = scene.layout

@@ -5,15 +5,17 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, replace
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing, whole
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
-from relgym.errors import ConfigError, ModelFileError, RelgymError
+from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, RelgymError
 from relgym.files.reading import FileLimits
 from relgym.html import html_text
 from relgym.laws.book import LawBook
@@ -21,7 +23,17 @@ from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
 from relgym.model.fitting import Progress, as_transitions, progressive, transitions_of
 from relgym.model.hindsight import hindsight_to_json, look_back, restore_hindsight
+from relgym.model.journal import Journal
 from relgym.model.learning import LearnReport, finish, learn
+from relgym.model.locality import (
+    Neighbourhoods,
+    check_size,
+    foci,
+    large,
+    learn_locally,
+    predict_locally,
+    predict_many_locally,
+)
 from relgym.model.merging import merge
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
@@ -29,16 +41,19 @@ from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.rules import doubted, rule_list
-from relgym.model.scenes import with_action
+from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
 from relgym.model.storage import read_model, write_model
 from relgym.reporting.naming import named_text
 from relgym.reporting.parser import parse_rules
 from relgym.reporting.rules import RuleList
-from relgym.scene.objects import ObjectType, Scene, SceneLayout, Target, Transition
+from relgym.scene.objects import ACTION, ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LearnReport", "WorldModel", "with_action"]
+
+_OVERFLOWS = 1e30
+"""Products of several numbers as large as this may be infinite."""
 
 
 class WorldModel:
@@ -72,6 +87,7 @@ class WorldModel:
     1.5
     """
 
+    @refusing(ConfigError)
     def __init__(
         self,
         schema: SceneSchema,
@@ -79,7 +95,7 @@ class WorldModel:
         *,
         targets: Sequence[Target] | None = None,
     ) -> None:
-        self._parts = Parts(schema, ModelConfig.of(config), schema.targets if targets is None else targets)
+        self._state = Parts(schema, ModelConfig.of(config), schema.targets if targets is None else targets)
         self.seen = 0
         self.frozen = False
         self.extra: dict[str, Any] = {}
@@ -88,8 +104,53 @@ class WorldModel:
         self._rules: tuple[Any, RuleList] | None = None
         self._stored: tuple[RuleList, tuple[Advice, ...]] | None = None
 
+        self._neighbourhoods: tuple[Scene, Neighbourhoods] | None = None
+        self._journal = Journal()
+        self._damaged = False
+
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_percept": None, "_rules": None}
+        if self._damaged:
+            self._roll_back()
+        return self.__dict__ | {
+            "_percept": None,
+            "_neighbourhoods": None,
+            "_rules": None,
+            "_journal": Journal(),
+        }
+
+    @property
+    def _parts(self) -> Parts:
+        if self._damaged:  # a rollback was interrupted, too
+            self._roll_back()
+        return self._state
+
+    @contextmanager
+    def _step(self, name: str, *arguments: Any, numbers: int = 0) -> Iterator[None]:
+        """Make a step that is either made as a whole or not at all, whatever error comes in between."""
+        if self._damaged:
+            self._roll_back()
+        mark = self._journal.prepare(self)
+        try:
+            yield
+            self._journal.add(name, arguments, numbers)
+        except BaseException:
+            self._damaged = True
+            self._journal.drop(mark)
+            self._roll_back()
+            raise
+
+    def _roll_back(self) -> None:
+        """Be what it was after the last step that was made as a whole."""
+        whole: WorldModel = self._journal.replayed(lambda model, name, given: getattr(model, name)(*given))
+        # All at once, as far as interrupts go.
+        self.__dict__.update(
+            _state=whole._state,
+            seen=whole.seen,
+            _percept=None,
+            _neighbourhoods=None,
+            _rules=None,
+            _damaged=False,
+        )
 
     def __repr__(self) -> str:
         parts = ", ".join(f"{t}: {len(self._parts.models[t].modes)} modes" for t in self.targets)
@@ -123,14 +184,17 @@ class WorldModel:
         """Number of examples remembered of the type that has most; see `ModelConfig.history`."""
         return max((len(table) for table in self._parts.tables.values()), default=0)
 
+    @refusing(QueryError)
     def property_model(self, type_name: str, prop: str) -> PropertyModel:
         """The model of one target; `QueryError` when there is none."""
         return self._parts.property_model(type_name, prop)
 
+    @refusing(QueryError)
     def modes(self, type_name: str, prop: str) -> tuple[Mode, ...]:
         """Modes of one target, by id; `QueryError` when it is none."""
         return self.property_model(type_name, prop).modes
 
+    @refusing(ObservationError)
     def learn_one(self, transition: Transition) -> LearnReport:
         """Take up one transition.
 
@@ -143,11 +207,19 @@ class WorldModel:
         ------
         ObservationError
             NaN or infinity somewhere, or another schema; the model is unchanged.
+        ShapeError
+            A body can't be: an extent isn't positive, or a sphere isn't round; the model is unchanged.
         ModelFileError
             The model was loaded without its history and can't go on learning.
 
         Notes
         -----
+        Whatever else is raised, an interrupt from the keyboard included, the model is as it was before
+        (`relgym.model.journal`).
+
+        A transition in which a number is far larger than all that is known of its property is set aside, and counted in
+        `set_aside`, not in `seen` (`relgym.model.screening`).
+
         Cost: relations once, then per target O(modes); searches and re-learning when an example is news.
         """
         self._parts.check(transition.before)
@@ -157,9 +229,26 @@ class WorldModel:
                 "this model was loaded without its history and can only predict; "
                 "save it with save(path, history=True) to go on learning"
             )
-        report = learn(self._parts, self._perceive(transition.before), transition)
+        check_size(self._parts, transition.before.layout)
+        with self._step("_learn", transition, numbers=2 * len(transition.before.vector)):
+            return self._learn(transition)
+
+    def _learn(self, transition: Transition) -> LearnReport:
+        before = transition.before
+        following = next_values(before, transition.after)
+        if not self._parts.screen.admits(before.layout, before.vector, following):
+            return LearnReport({}, 0, set_aside=True)
+        if large(before.layout):
+            report = learn_locally(self._parts, self._near(before), transition, self.seen)
+        else:
+            report = learn(self._parts, self._perceive(before), transition)
         self.seen += 1
         return report
+
+    @property
+    def set_aside(self) -> int:
+        """Number of transitions that held a gross error and weren't learned from."""
+        return self._parts.screen.set_aside
 
     def fit(
         self,
@@ -285,6 +374,7 @@ class WorldModel:
             truncations=truncations,
         )
 
+    @refusing(ObservationError)
     def look_back(
         self,
         prediction: ScenePrediction,
@@ -306,8 +396,21 @@ class WorldModel:
         precision
             Relative precision of what was observed (`View.precision`); of numbers below 1 it is absolute.
         """
-        look_back(self._parts, prediction, residuals, precision)
+        with self._step("_look_back", prediction, dict(residuals), precision):
+            self._look_back(prediction, residuals, precision)
 
+    def _look_back(
+        self, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
+    ) -> None:
+        scene = prediction.scene
+        said = {(part.object, part.property): part.value for part in prediction.parts}
+        observed = scene.replace({key: said[key] + off for key, off in residuals.items() if key in said})
+        if all(
+            self._parts.screen.plausible(scene.layout, vector) for vector in (scene.vector, observed.vector)
+        ):
+            look_back(self._parts, prediction, residuals, precision)
+
+    @refusing(ConfigError)
     def merge(self, other: WorldModel) -> None:
         """Take up all that another model of the same world remembers, as if this one had seen it too.
 
@@ -327,10 +430,9 @@ class WorldModel:
             )
         whole = copy.deepcopy(self._parts)  # what fails half way leaves this model as it was
         merge(whole, other._parts, follow_laws=other.seen > self.seen)
-        self._parts = whole
-        self.seen += other.seen
-        self._percept = None
-        self.finish()
+        seen = self.seen + other.seen
+        finish(whole)
+        self.__dict__.update(_state=whole, seen=seen, _percept=None, _neighbourhoods=None, _journal=Journal())
 
     def untaught(self) -> WorldModel:
         """A model of the same schema, configuration and named targets that has learned nothing."""
@@ -343,7 +445,13 @@ class WorldModel:
         A model without its history has nothing to learn from and stays as it is.
         """
         self._rules = None
-        return 0 if self.frozen else finish(self._parts)
+        if self.frozen:
+            return 0
+        with self._step("_finish"):
+            return self._finish()
+
+    def _finish(self) -> int:
+        return finish(self._parts)
 
     @property
     def laws(self) -> LawBook | None:
@@ -355,6 +463,7 @@ class WorldModel:
         """Names of the types whose velocity laws of motion predict at present."""
         return frozenset() if self._parts.laws is None else self._parts.laws.governed
 
+    @refusing(QueryError)
     def governs(self, target: Target) -> bool:
         """Whether laws of motion, not modes, predict a target: they describe its transitions in fewer bits."""
         return self._parts.governs(target)
@@ -365,6 +474,7 @@ class WorldModel:
             self._percept = (scene, self._parts.perception.percept(scene.layout, scene.vector[None]))
         return self._percept[1]
 
+    @refusing(ObservationError)
     def predict_one(self, scene: Scene) -> ScenePrediction:
         """Predict the scene that follows (Figure 1.5, §3.6).
 
@@ -374,8 +484,24 @@ class WorldModel:
             NaN or infinity somewhere, or another schema.
         """
         self._parts.check(scene)
-        return predict(self._parts, self._perceive(scene), scene)
+        check_size(self._parts, scene.layout)
+        with self._calm(scene.vector):
+            if large(scene.layout):
+                return predict_locally(self._parts, self._near(scene), scene)
+            return predict(self._parts, self._perceive(scene), scene)
 
+    def _near(self, scene: Scene) -> Neighbourhoods:
+        """A large scene, taken apart; the last one is remembered."""
+        if self._neighbourhoods is None or self._neighbourhoods[0] is not scene:
+            self._neighbourhoods = (scene, Neighbourhoods(self._parts, scene))
+        return self._neighbourhoods[1]
+
+    def _calm(self, vectors: NDArray[np.float64]) -> AbstractContextManager[None]:
+        """Where numbers are so large that what is worked out from them may overflow, that needs no warning."""
+        largest = float(np.abs(vectors).max(initial=0.0))
+        return nullcontext() if largest < _OVERFLOWS else np.errstate(over="ignore", invalid="ignore")
+
+    @refusing(ObservationError)
     def predict_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> BatchPrediction:
         """Predict what follows n scenes with the same objects; bit for bit what `predict_one` gives.
 
@@ -387,9 +513,15 @@ class WorldModel:
             State vectors, shape ``(n, layout.width)``.
         """
         vectors = self._parts.checked_batch(layout, vectors)
-        percept = self._parts.perception.percept(layout, vectors)
-        return predict_many(self._parts, percept, layout, vectors)
+        check_size(self._parts, layout)
+        with self._calm(vectors):
+            if large(layout):
+                near = [Neighbourhoods(self._parts, Scene(self.schema, layout, v.copy())) for v in vectors]
+                return predict_many_locally(self._parts, near, layout, vectors)
+            percept = self._parts.perception.percept(layout, vectors)
+            return predict_many(self._parts, percept, layout, vectors)
 
+    @refusing(ObservationError)
     def rollout(
         self, scene: Scene, steps: int, actions: Sequence[Sequence[float]] | NDArray[np.float64] | None = None
     ) -> list[ScenePrediction]:
@@ -411,6 +543,11 @@ class WorldModel:
         """
         if steps < 1:
             raise ConfigError(f"steps must be at least 1, got {steps}")
+        if actions is not None:
+            given = np.asarray(actions, dtype=np.float64)
+            width = len(scene.layout.types[scene.layout.index(ACTION)].properties)
+            if given.ndim != 2 or len(given) < steps or given.shape[1] != width:
+                raise ObservationError(f"actions: expected shape ({steps}, {width}), got {given.shape}")
         predictions: list[ScenePrediction] = []
         for k in range(steps):
             if actions is not None:
@@ -421,6 +558,7 @@ class WorldModel:
             scene = predictions[-1].scene
         return predictions
 
+    @refusing(ConfigError)
     def describe(
         self,
         *,
@@ -458,6 +596,7 @@ class WorldModel:
         """
         from relgym.model.report import describe
 
+        digits = whole("digits", digits, 1, 18, ConfigError)
         return describe(
             self, details=details, digits=digits, names=names, check=check, frame=frame, incline=incline
         )
@@ -507,9 +646,15 @@ class WorldModel:
             for signature in table.signatures:
                 yield signature.types
 
+    @refusing(QueryError)
     def law_lines(self, scene: Scene, index: int, digits: int = 7) -> tuple[str, ...]:
         """What laws of motion say of an object: its free law, then every contact, a line each."""
+        index = whole("index", index, 0, len(scene), QueryError)
+        digits = whole("digits", digits, 1, 18, ConfigError)
         laws = self._parts.laws
+        if large(scene.layout):
+            small = self._near(scene).named(index)
+            scene, index = small, small.layout.index(scene.layout.names[index])
         return () if laws is None else laws.lines(self._perceive(scene), index, digits)
 
     def advice(self) -> tuple[Advice, ...]:
@@ -530,20 +675,28 @@ class WorldModel:
         known = now | known
         return tuple(known[str(t)] for t in self.targets if str(t) in known)
 
+    @refusing(ObservationError)
     def explain(self, scene: Scene) -> str:
         """Why this prediction: mode, function, roles, clause and runner-up of every target."""
         from relgym.model.explain import explain
 
-        return explain(self, scene)
+        with self._calm(scene.vector):
+            if large(scene.layout):
+                near = self._near(scene)
+                return "\n\n".join(explain(self, near.named(k)) for k in foci(self._parts, scene.layout))
+            return explain(self, scene)
 
+    @refusing(ObservationError)
     def percept(self, scene: Scene) -> Percept:
         """What the learners see of a scene."""
         return self._perceive(scene)
 
+    @refusing(QueryError)
     def situation(self, scene: Scene, index: int) -> Situation:
         """How the object with this index is situated in a scene."""
-        return self._perceive(scene).situation(index)
+        return self._perceive(scene).situation(whole("index", index, 0, len(scene), QueryError))
 
+    @refusing(ConfigError)
     def save(
         self, path: str | os.PathLike[str], *, history: bool = False, extra: dict[str, Any] | None = None
     ) -> None:
@@ -615,6 +768,7 @@ class WorldModel:
         return cls.load_with_extra(path, limits=limits)[0]
 
     @classmethod
+    @refusing(ConfigError)
     def load_with_extra(
         cls, path: str | os.PathLike[str], *, limits: FileLimits | None = None
     ) -> tuple[WorldModel, dict[str, Any]]:
@@ -633,7 +787,7 @@ class WorldModel:
             parts = parts_from_json(body, arrays)
             restore_hindsight(parts, body.get("hindsight", {}))
             model = cls(parts.schema, parts.config, targets=())
-            model._parts, model.seen, model.frozen = parts, body["seen"], arrays is None
+            model._state, model.seen, model.frozen = parts, body["seen"], arrays is None
             model.extra, model.condition_names = body["extra"], dict(body.get("names", {}))
             model._restore_report(body.get("report", {}))
         except RelgymError as error:

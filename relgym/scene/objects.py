@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing, refusing_fields, whole
 from relgym.errors import ObservationError, QueryError
 from relgym.scene.types import (
     ACTION,
@@ -81,6 +82,7 @@ class SceneLayout:
     def _index(self) -> dict[str, int]:
         return {name: i for i, name in enumerate(self.names)}
 
+    @refusing(QueryError)
     def index(self, name: str) -> int:
         """Position of the object of that name; `QueryError` when it is not in the scene."""
         try:
@@ -88,19 +90,25 @@ class SceneLayout:
         except KeyError:
             raise QueryError(f"no object {name!r} in the scene; it has {list(self.names)}") from None
 
+    @refusing(QueryError)
     def slice(self, index: int) -> slice:
-        """Where the `index`-th object's property vector lies."""
+        """Where the `index`-th object's property vector lies; `QueryError` where there are fewer objects."""
+        index = whole("index", index, -len(self.types), len(self.types), QueryError)
         start = self.offsets[index]
         return slice(start, start + len(self.types[index].properties))
 
+    @refusing(QueryError)
     def column(self, index: int, prop: str) -> int:
         """Column of a property of the `index`-th object; `QueryError` when its type has no such property."""
+        if not -len(self.types) <= index < len(self.types):
+            raise QueryError(f"index={index}: the scene has {len(self.types)} objects")
         try:
             return self.offsets[index] + self.types[index].properties.index(prop)
         except ValueError:
             t = self.types[index]
             raise QueryError(f"type {t.name!r} has no property {prop!r}; it has {t.properties}") from None
 
+    @refusing(QueryError)
     def of_type(self, type_name: str) -> tuple[int, ...]:
         """Indices of the objects of exactly that type."""
         return tuple(i for i, t in enumerate(self.types) if t.name == type_name)
@@ -114,6 +122,7 @@ class SceneObject:
     type: ObjectType
     values: Float1D
 
+    @refusing(QueryError)
     def __getitem__(self, prop: str) -> float:
         if prop not in self.type.properties:
             raise QueryError(f"object {self.name!r} has no property {prop!r}; it has {self.type.properties}")
@@ -141,10 +150,11 @@ class Scene:
 
     __slots__ = ("layout", "schema", "vector")
 
+    @refusing(ObservationError)
     def __init__(self, schema: SceneSchema, layout: SceneLayout, vector: Float1D) -> None:
         try:
             vector = np.asarray(vector, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ObservationError(f"expected {layout.width} numbers, got {vector!r}") from None
         if vector.shape != (layout.width,):
             raise ObservationError(
@@ -155,6 +165,7 @@ class Scene:
         self.layout = layout
         self.vector = vector
 
+    @refusing(QueryError)
     def __getitem__(self, name: str) -> SceneObject:
         i = self.layout.index(name)
         return SceneObject(name, self.layout.types[i], self.vector[self.layout.slice(i)])
@@ -186,6 +197,7 @@ class Scene:
         """Property vectors by object name; copies."""
         return {o.name: o.values.copy() for o in self}
 
+    @refusing(ObservationError)
     def replace(self, changes: Mapping[tuple[str, str], float]) -> Scene:
         """A scene with ``{(object, property): value}`` changed."""
         vector = self.vector.copy()
@@ -233,6 +245,7 @@ def pose_columns(layout: SceneLayout) -> tuple[NDArray[np.intp], Float1D]:
     return result
 
 
+@refusing_fields(ObservationError)
 @dataclass(frozen=True, slots=True)
 class Transition:
     """One step of the world: the scene before (with the action), and the scene after (§1.2.3)."""

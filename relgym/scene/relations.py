@@ -24,6 +24,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.errors import ConfigError, ObservationError, SchemaError
 from relgym.scene import contacts
 from relgym.scene.axes import Axes
@@ -260,6 +261,7 @@ class Extractor:
         A type has the name of a spatial relation.
     """
 
+    @refusing(ConfigError)
     def __init__(
         self, schema: SceneSchema, *, geometry: Literal["arrays", "fcl"] = "arrays", eps: float = TOUCH_EPS
     ) -> None:

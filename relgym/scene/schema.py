@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from relgym.arguments import refusing, refusing_fields, unfit
 from relgym.errors import ObservationError, QueryError, SchemaError
 from relgym.scene.objects import Scene, SceneLayout
 from relgym.scene.types import Float1D, Kinematics, ObjectType, Target
@@ -17,6 +18,7 @@ from relgym.scene.types import Float1D, Kinematics, ObjectType, Target
 __all__ = ["SceneSchema"]
 
 
+@refusing_fields(SchemaError)
 @dataclass(frozen=True)
 class SceneSchema:
     """Everything about a family of scenes that never changes while an env lives.
@@ -81,6 +83,10 @@ class SceneSchema:
     def _check_derivations(self) -> None:
         """Each property follows from one law, and none from itself by way of next values."""
         for law in self.kinematics:
+            if said := unfit(law):
+                raise SchemaError(
+                    f"kinematics {said}; expected a finite step, and names of a type and properties"
+                )
             for prop in (law.property, law.rate):
                 if prop not in self.type(law.type).properties:
                     raise SchemaError(f"kinematics {law}: type {law.type!r} has no property {prop!r}")
@@ -121,6 +127,7 @@ class SceneSchema:
         """Object names in the order of the state vector."""
         return tuple(name for name, _ in self.objects)
 
+    @refusing(QueryError)
     def type(self, name: str) -> ObjectType:
         """Return the type of that name; `QueryError` when there is none."""
         try:
@@ -144,6 +151,7 @@ class SceneSchema:
             chain.append(known.parent)
         return tuple(chain)
 
+    @refusing(ObservationError)
     def layout(self, names: Iterable[str] | None = None) -> SceneLayout:
         """Layout of a scene with these objects (default: all), in schema order; cached."""
         given = self.order if names is None else tuple(names)
@@ -160,6 +168,7 @@ class SceneSchema:
         self._layouts[given] = layout
         return layout
 
+    @refusing(ObservationError)
     def scene(self, values: Mapping[str, Any]) -> Scene:
         """Build a scene from ``{object name: property vector}``, checking lengths and finiteness.
 
@@ -183,7 +192,7 @@ class SceneSchema:
 def _checked(name: str, t: ObjectType, values: Sequence[float] | Float1D) -> Float1D:
     try:
         array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ObservationError(
             f"object {name!r} of type {t.name!r}: expected {len(t.properties)} numbers {t.properties}, got {values!r}"
         ) from None
@@ -192,7 +201,7 @@ def _checked(name: str, t: ObjectType, values: Sequence[float] | Float1D) -> Flo
             f"object {name!r} of type {t.name!r}: expected {len(t.properties)} properties {t.properties}, "
             f"got an array of shape {array.shape}"
         )
-    if not math.isfinite(array.sum()):
+    if not np.isfinite(array).all():
         for prop, value in zip(t.properties, array, strict=True):
             if not math.isfinite(value):
                 raise ObservationError(

@@ -18,6 +18,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing_fields
+from relgym.errors import ShapeError
 from relgym.scene.hull import check_polygon, facets, outline_of
 
 __all__ = ["Box", "ConvexPolyhedron", "Prism", "Shape", "Sphere", "Wedge", "outline"]
@@ -42,6 +44,7 @@ class Wedge:
     """Right-angled prism in the unit cube: vertical face at -1/2 of the first axis, slope down to +1/2."""
 
 
+@refusing_fields(ShapeError)
 @dataclass(frozen=True, slots=True)
 class Prism:
     """A convex polygon in the plane of first and up axis, extruded from -1/2 to 1/2 along the depth axis.
@@ -58,6 +61,7 @@ class Prism:
         check_polygon(self.vertices)
 
 
+@refusing_fields(ShapeError)
 @dataclass(frozen=True, slots=True)
 class ConvexPolyhedron:
     """The convex polyhedron with these corners, given along x, y and z.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from relgym.errors import QueryError
+from relgym.arguments import refusing
+from relgym.errors import ObservationError, QueryError
 from relgym.scene.objects import Scene
 from relgym.scene.relations import Extractor
 
@@ -38,6 +39,7 @@ class RelationalState:
         return "\n".join(f"{name}({', '.join(objects)})" for name, objects in self)
 
 
+@refusing(ObservationError)
 def relational_state(scene: Scene, extractor: Extractor | None = None) -> RelationalState:
     """Return the relations of a scene; pass an `extractor` of its schema to use its settings and caches."""
     extractor = Extractor(scene.schema) if extractor is None else extractor

@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing_fields
 from relgym.errors import SchemaError
 from relgym.scene.shapes import Shape
 
@@ -42,6 +43,7 @@ TERMINATED = "terminated"
 """Property of `task`: 1 where the step ended the episode (terminated, not truncated), else 0."""
 
 
+@refusing_fields(SchemaError)
 @dataclass(frozen=True, slots=True)
 class ObjectType:
     """A kind of object: its properties, its shape and what is known of them (§1.2.6).
@@ -145,6 +147,7 @@ class Kinematics:
     uses_next: bool = True
 
 
+@refusing_fields(SchemaError, always=True)
 @dataclass(frozen=True, slots=True, order=True)
 class Target:
     """What one `PropertyModel` predicts: a property of all objects of a type.
@@ -156,6 +159,11 @@ class Target:
     type: str
     property: str
     given: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "given", tuple((t, p) for t, p in self.given)
+        )  # lists can't be told apart in sets
 
     def __str__(self) -> str:
         return f"{self.type}.{self.property}"

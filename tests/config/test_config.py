@@ -31,7 +31,7 @@ from relgym.errors import ConfigError
         (
             ClassificationConfig,
             {"class_balance": float("nan")},
-            r"class_balance must lie in \[0, 1\], got nan",
+            "class_balance must be finite, got nan",
         ),
         (ClassificationConfig, {"min_precision": 0.4}, "min_precision must be at least 0.5, got 0.4"),
         (ClassificationConfig, {"relearn_growth": 1.0}, "relearn_growth must be greater than 1, got 1.0"),

@@ -1,0 +1,98 @@
+"""A long life of a learner: memory, cost and worst step, as they are after more and more transitions."""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import gymnasium as gym
+
+import relgym  # noqa: F401 - registers the envs
+from relgym.wrappers import ModelLearner
+
+__all__ = ["WORLDS", "main", "soak"]
+
+WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "ball": ("relgym/BallBoxRamp-v0", {}),
+    "cart": ("CartPole-v1", {}),
+    "lander": ("LunarLander-v3", {}),
+}
+"""Id and configuration of each world."""
+
+
+def soak(
+    name: str, steps: int, *, every: int, hours: float = float("inf"), seed: int = 0
+) -> list[list[float]]:
+    """Learn from random steps of a world, and print a line now and then.
+
+    Parameters
+    ----------
+    name
+        Of `WORLDS`.
+    steps, hours
+        When to end: after so many transitions, or so much time, whichever is first.
+    every
+        Transitions from one line to the next.
+    seed
+        Of the env and its actions.
+
+    Returns
+    -------
+    A row per line: transitions, hours, memory in MB, mean and worst step in ms of processor time since the last line.
+    """
+    env_id, config = WORLDS[name]
+    env = ModelLearner(gym.make(env_id), config=config)
+    env.action_space.seed(seed)
+    env.reset(seed=seed)
+    begin, rows, spent, worst = time.monotonic(), list[list[float]](), 0.0, 0.0
+    print(
+        f"{name}: {'transitions':>12} {'hours':>7} {'memory MB':>10} {'mean ms':>9} {'worst ms':>9}",
+        flush=True,
+    )
+    for k in range(1, steps + 1):
+        action, start = env.action_space.sample(), time.process_time()
+        _, _, terminated, truncated, _ = env.step(action)
+        took = time.process_time() - start
+        spent, worst = spent + took, max(worst, took)
+        if terminated or truncated:
+            env.reset()
+        over = time.monotonic() - begin >= 3600.0 * hours
+        if k % every == 0 or over:
+            passed = (time.monotonic() - begin) / 3600.0
+            rows.append([k, passed, _memory(), 1e3 * spent / (k % every or every), 1e3 * worst])
+            print(
+                f"{name}: {k:12,} {passed:7.3f} {rows[-1][2]:10.1f} {rows[-1][3]:9.3f} {rows[-1][4]:9.1f}",
+                flush=True,
+            )
+            spent = worst = 0.0
+        if over:
+            break
+    return rows
+
+
+def _memory() -> float:
+    """Memory of this process in MB: at present where the system tells, else its peak."""
+    statm = Path("/proc/self/statm")
+    if statm.exists():
+        return int(statm.read_text().split()[1]) * resource.getpagesize() / 2**20
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+
+
+def main() -> None:
+    """Soak the worlds that are named, one after the other."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("worlds", nargs="*", default=["ball"], help=f"of {', '.join(WORLDS)}")
+    parser.add_argument("--steps", type=int, default=1_000_000)
+    parser.add_argument("--every", type=int, default=10_000)
+    parser.add_argument("--hours", type=float, default=float("inf"))
+    given = parser.parse_args()
+    for name in given.worlds:
+        soak(name, given.steps, every=given.every, hours=given.hours)
+
+
+if __name__ == "__main__":
+    main()

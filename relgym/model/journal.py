@@ -1,0 +1,68 @@
+"""What brings a model back when learning fails half way: a checkpoint, and what was done since (write-ahead logging).
+
+Learning one transition changes many parts of a model. An error among them, be it a defect, a lack of memory or an
+interrupt from the keyboard, would leave some changed and some not. Copying the model before each step would cost more
+than learning; so a copy is taken now and then, and the steps since are kept. What was learned is a function of the
+steps alone: to take them again leads to the same model, bit for bit.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+__all__ = ["Journal"]
+
+Entry: TypeAlias = tuple[str, tuple[Any, ...]]
+"""Name of the method that made a step, and what it was given."""
+
+STEPS = 1_000
+"""A checkpoint is taken after so many steps at the latest: a rollback takes as long as so many steps."""
+
+NUMBERS = 1_000_000
+"""... or after steps of so many numbers together: of large scenes fewer are kept."""
+
+
+class Journal:
+    """The last checkpoint of an object, and the steps that it made since.
+
+    Notes
+    -----
+    Costs one serialised copy of the object in memory, the steps kept, and the time to serialise it once in `STEPS`
+    steps.
+    """
+
+    def __init__(self) -> None:
+        self._taken: tuple[bytes, list[Entry]] | None = None
+        self._numbers = 0
+
+    def prepare(self, whole: Any) -> int:
+        """Make ready for a step; what `undo` is to be given."""
+        if self._taken is None or len(self._taken[1]) >= STEPS or self._numbers >= NUMBERS:
+            self._taken = (pickle.dumps(whole, protocol=pickle.HIGHEST_PROTOCOL), [])
+            self._numbers = 0
+        return len(self._taken[1])
+
+    def add(self, name: str, arguments: tuple[Any, ...], numbers: int = 0) -> None:
+        """Take note of a step that was made."""
+        assert self._taken is not None, "prepared before"
+        self._taken[1].append((name, arguments))
+        self._numbers += numbers
+
+    def drop(self, mark: int) -> None:
+        """Forget the steps from a mark on."""
+        if self._taken is not None:
+            del self._taken[1][mark:]
+
+    def forget(self) -> None:
+        """Something else than steps has changed the object: the next step begins with a new checkpoint."""
+        self._taken = None
+
+    def replayed(self, step: Callable[[Any, str, tuple[Any, ...]], None]) -> Any:
+        """The object as it was after the last step kept, anew; `step` makes one."""
+        assert self._taken is not None, "prepared before"
+        whole = pickle.loads(self._taken[0])
+        for name, arguments in self._taken[1]:
+            step(whole, name, arguments)
+        return whole
