@@ -57,7 +57,7 @@ ALLOWED = {
         r"|\bbar\.(add_task|advance|tasks|update|reset|start|stop|console|finished|set_label)"
         r"|\bbar: Progress|^    bar$|\b(panel|axes|ax)\.bar(h)?\(|colour ?bar|color ?bar|bars? of progress"
     ),
-    "block": r"with`` block|code block|np\.block|[Bb]locks? the way|SIG_BLOCK|\(\"block\",\)",
+    "block": r"with`` block|code block|np\.block|[Bb]locks? the way|SIG_BLOCK|\(\"block\",\)|\{\"block\": Material",
     "issue": r"/issues",
     "rival": r'^_KEY = "rivals"',  # a key of model files
 }

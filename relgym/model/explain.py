@@ -175,10 +175,14 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
     Cost: some milliseconds, once the model's rules are known (`WorldModel.rules`).
     """
     prediction = model.predict_one(scene)
-    rules = model.rules()
     vectors = scene.vector[None]
-    said = evaluate(rules, scene.schema, scene.layout, vectors)
-    scenes = SceneBatch(scene.schema, scene.layout, vectors, said.following)
+    told = None
+    following = prediction.scene.vector[None]
+    if model.has_rules:
+        rules = model.rules()
+        told = rules, evaluate(rules, scene.schema, scene.layout, vectors)
+        following = told[1].following
+    scenes = SceneBatch(scene.schema, scene.layout, vectors, following)
     parts = iter(prediction.parts)
     found = []
     for target in model.targets:
@@ -190,44 +194,41 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
                 found.append(Explanation(one, now, digits, laws=lines))
             else:
                 part = model.property_model(target.type, target.property)
-                seen = _Seen(model, rules, part, scenes, said, prediction.scene, index, digits)
+                seen = _Seen(model, told, part, scenes, prediction.scene, index, digits)
                 found.append(seen.explained(one, now))
     return tuple(found)
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """One object of a scene, and what is known of one of its properties."""
+    """One object of a scene, and what is known of one of its properties.
+
+    `told`: the rules and what they say of the scene; None of a model that has none (`WorldModel.has_rules`).
+    """
 
     model: WorldModel
-    rules: RuleList
+    told: tuple[RuleList, Evaluated] | None
     part: PropertyModel
     scenes: SceneBatch
-    said: Evaluated
     following: Scene
     index: int
     digits: int
 
     def explained(self, one: Prediction, now: float) -> Explanation:
-        told = self.rules[str(self.part.target)]
+        if self.told is None:
+            return self._by_vote(one, now) if one.ok else Explanation(one, now, self.digits)
+        rules, said = self.told
+        told = rules[str(self.part.target)]
         key = (one.object, one.property)
-        number = int(self.said.branches[key][0])
-        value = float(self.said.values[key][0])
+        number = int(said.branches[key][0])
+        value = float(said.values[key][0])
         branch = told.branches[number] if number >= 0 else None
         if not one.ok:
             unsaid = branch is not None and branch.function is None
             return Explanation(one, now, self.digits, because=self._why(told, number) if unsaid else ())
         slack = self.part.clusterer.scale.tolerance + CLOSE * max(abs(one.value), abs(now))
         if branch is None or branch.function is None or not abs(value - one.value) <= slack:
-            mode = next(m for m in self.part.modes if m.id == one.mode)
-            return Explanation(
-                one,
-                now,
-                self.digits,
-                function=mode.formula(self.digits),
-                because=self._voted(one.mode),
-                runner_up=self._runner_up(one),
-            )
+            return self._by_vote(one, now)
         return Explanation(
             one,
             now,
@@ -236,9 +237,20 @@ class _Seen:
             _word(told, branch),
             f"{one.property}' = {branch.function.text(self.digits)}",
             self._why(told, number),
-            tuple(self._players(key)),
+            tuple(self._players(key, said)),
             bounds_reached(told, self.scenes, self.index, branch.function),
             self._runner_up(one),
+        )
+
+    def _by_vote(self, one: Prediction, now: float) -> Explanation:
+        """What the classifiers' votes say, where the rules say nothing or something else."""
+        return Explanation(
+            one,
+            now,
+            self.digits,
+            function=self.part.mode(one.mode).formula(self.digits),
+            because=self._voted(one.mode),
+            runner_up=self._runner_up(one),
         )
 
     def _why(self, told: PropertyRules, number: int) -> tuple[Because, ...]:
@@ -274,9 +286,9 @@ class _Seen:
                     found[test if true else test.opposite] = None
         return tuple(Because(test, self._with(test)) for test in found)
 
-    def _players(self, key: tuple[str, str]) -> Iterator[tuple[str, str]]:
+    def _players(self, key: tuple[str, str], said: Evaluated) -> Iterator[tuple[str, str]]:
         layout = self.scenes.layout
-        for label, bodies in self.said.players.get(key, {}).items():
+        for label, bodies in said.players.get(key, {}).items():
             if bodies[0] >= 0:
                 yield label, layout.names[layout.bodies[int(bodies[0])]]
 

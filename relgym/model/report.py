@@ -80,7 +80,8 @@ def describe(
     model
         The model; unchanged.
     details
-        Tables of modes, functions, clauses and roles instead of rules.
+        Tables of modes, functions, clauses and roles instead of rules; so they are of a model that has no rules
+        (`WorldModel.has_rules`).
     digits
         Significant digits of coefficients.
     names
@@ -102,7 +103,10 @@ def describe(
         raise ConfigError(f"frame={frame!r}: expected None (as learned) or 'world'")
     if details and (names or check is not None):
         raise ConfigError("details=True prints tables, which have no names and no agreement: leave them out")
-    text = str(report(model, digits=digits)) if details else _rules_text(model, digits, names, check)
+    if details or (not model.has_rules and not names and check is None):
+        text = str(report(model, digits=digits))
+    else:
+        text = _rules_text(model, digits, names, check)
     if frame is None or model.laws is None or not model.governed:
         return text
     angles = (incline,) if isinstance(incline, (int, float)) else tuple(incline)

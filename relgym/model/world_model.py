@@ -601,6 +601,11 @@ class WorldModel:
             self, details=details, digits=digits, names=names, check=check, frame=frame, incline=incline
         )
 
+    @property
+    def has_rules(self) -> bool:
+        """Whether there are rules: not of a model from a file of version 1 that was saved without its history."""
+        return not self.frozen or self._stored is not None
+
     def rules(self) -> RuleList:
         """The model as a rule list: what `describe` prints, for programs.
 
@@ -608,7 +613,7 @@ class WorldModel:
         learns on.
         """
         if self.frozen:
-            if self._stored is None:
+            if self._stored is None:  # see `has_rules`
                 raise ModelFileError(
                     "this model was loaded without its history, from a file that holds no rules; "
                     "save it again where it was learned"

@@ -176,7 +176,7 @@ def test_explanations(model: WorldModel, unseen: list[Episode]) -> None:
 
 
 def test_a_spinning_ball_is_predicted_told_and_kept(tmp_path: Path) -> None:
-    world = World(2, (Ball(spins=True),), materials={"episode": Material(0.9, 0.2)})
+    world = World(2, (Ball(spins=True),), materials={"block": Material(0.9, 0.2)})
     model = taught(trial_rooms(world, 5, seed=1))
     room = trial_rooms(world, 1, seed=2)[0]
     batch = model.predict_batch(room.layout, room.vectors[:-1])
