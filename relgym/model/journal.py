@@ -8,6 +8,7 @@ steps alone: to take them again leads to the same model, bit for bit.
 
 from __future__ import annotations
 
+import copy
 import pickle
 from collections.abc import Callable
 from typing import Any, TypeAlias
@@ -30,17 +31,24 @@ class Journal:
     Notes
     -----
     Costs one serialised copy of the object in memory, the steps kept, and the time to serialise it once in `STEPS`
-    steps.
+    steps. What can't be serialised, such as a user's function that has no name of its own, is copied, in some five
+    times the time.
     """
 
     def __init__(self) -> None:
-        self._taken: tuple[bytes, list[Entry]] | None = None
+        self._taken: tuple[Callable[[], Any], list[Entry]] | None = None
         self._numbers = 0
 
-    def prepare(self, whole: Any) -> int:
-        """Make ready for a step; what `undo` is to be given."""
+    def prepare(self, whole: Callable[[], Any]) -> int:
+        """Make ready for a step; what `drop` is to be given.
+
+        Parameters
+        ----------
+        whole
+            Gives all that steps change; called where a checkpoint is due.
+        """
         if self._taken is None or len(self._taken[1]) >= STEPS or self._numbers >= NUMBERS:
-            self._taken = (pickle.dumps(whole, protocol=pickle.HIGHEST_PROTOCOL), [])
+            self._taken = (_copied(whole()), [])
             self._numbers = 0
         return len(self._taken[1])
 
@@ -62,7 +70,17 @@ class Journal:
     def replayed(self, step: Callable[[Any, str, tuple[Any, ...]], None]) -> Any:
         """The object as it was after the last step kept, anew; `step` makes one."""
         assert self._taken is not None, "prepared before"
-        whole = pickle.loads(self._taken[0])
+        whole = self._taken[0]()
         for name, arguments in self._taken[1]:
             step(whole, name, arguments)
         return whole
+
+
+def _copied(whole: Any) -> Callable[[], Any]:
+    """A function that gives the object as it is now."""
+    try:
+        kept = pickle.dumps(whole, protocol=pickle.HIGHEST_PROTOCOL)
+    except (AttributeError, TypeError, pickle.PicklingError):
+        copied = copy.deepcopy(whole)
+        return lambda: copy.deepcopy(copied)
+    return lambda: pickle.loads(kept)

@@ -129,7 +129,7 @@ class WorldModel:
         """Make a step that is either made as a whole or not at all, whatever error comes in between."""
         if self._damaged:
             self._roll_back()
-        mark = self._journal.prepare(self)
+        mark = self._journal.prepare(self._learned)
         try:
             yield
             self._journal.add(name, arguments, numbers)
@@ -138,6 +138,12 @@ class WorldModel:
             self._journal.drop(mark)
             self._roll_back()
             raise
+
+    def _learned(self) -> WorldModel:
+        """A model with all that steps change, and nothing of what its owner has attached to this one."""
+        bare = WorldModel(self.schema, self.config, targets=())
+        bare._state, bare.seen = self._state, self.seen
+        return bare
 
     def _roll_back(self) -> None:
         """Be what it was after the last step that was made as a whole."""

@@ -23,7 +23,7 @@ from relgym.errors import ConfigError
         ({"min_precision": 0.4}, "min_precision must be at least 0.5"),
         ({"max_exemplars": 10}, "max_exemplars must be at least 100"),
         ({"clause_tree_threshold": 1.5}, r"clause_tree_threshold must lie in \[0, 1\], got 1.5"),
-        ({"class_balance": float("nan")}, "class_balance must lie in"),
+        ({"class_balance": float("nan")}, "class_balance must be finite, got nan"),
         ({"relearn_growth": 1.0}, "relearn_growth must be greater than 1"),
     ],
 )

@@ -14,6 +14,7 @@ RUNS = {
     "read_the_laws.py": (["--steps", "400"], "vy' = vy - 0.00098"),
     "live_in_a_dream.py": (["--episodes", "8", "--trials", "1"], "trial 0: the trucks were never more than"),
     "grandparents.py": ([], "grandparent(A, B) ← parent(A, C) ∧ parent(C, B)"),
+    "plan_pendulum.py": (["--steps", "200", "--episodes", "0"], "angle_x0' = angle_x0 + 0.05 x2'"),
     "vector_envs.py": (["--transitions", "400"], "8 envs: "),
     "view_dict.py": (["--steps", "120"], "lower.x: x' = 0.85 x + 0.1 upper.x"),
     "view_function.py": (["--steps", "40"], "wrong in the latest steps"),

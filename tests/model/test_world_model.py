@@ -472,6 +472,6 @@ def test_an_object_of_another_type_is_another_object() -> None:
 
 
 def test_configurations_are_records() -> None:
-    for bad in ({"features": ("trig",)}, 3):
-        with pytest.raises(ConfigError, match="expected a ModelConfig"):
-            WorldModel(points(), bad)  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match="expected a ModelConfig"):
+        WorldModel(points(), 3)  # type: ignore[arg-type]
+    assert WorldModel(points(), {"features": ("trig",)}).config == ModelConfig(features=("trig",))
