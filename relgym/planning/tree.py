@@ -39,7 +39,7 @@ class TreeSearch:
     batch
         Branches tried at once: one call of the simulator for each decision of theirs.
     hold
-        Most decisions that an action is held for.
+        Most decisions that an action is held for; the numbers tried are the powers of two up to it.
     cells
         Intervals that the range of each changing property is cut into.
     greedy
@@ -51,15 +51,15 @@ class TreeSearch:
 
     Notes
     -----
-    Cost: ``expansions x (hold + 1) / 2`` decisions of the simulator; memory for as many states as there are cells.
+    Cost: ``expansions`` times the mean of the powers of two up to ``hold`` decisions of the simulator; memory for as many states as there are cells.
     Branches of which an outcome isn't known end there, at no worth.
     """
 
     horizon: int = 50
     expansions: int = 4_096
     batch: int = 128
-    hold: int = 3
-    cells: int = 16
+    hold: int = 8
+    cells: int = 32
     greedy: float = 0.3
     patience: int = 2_048
     refine: Search | None = None
@@ -108,7 +108,8 @@ class TreeSearch:
         """One batch of branches; whether the best one that ends the episode has become better."""
         nodes = tree.chosen(self.batch, self.greedy, rng)
         latents = rng.standard_normal((len(nodes), coder.size))
-        hold = min(int(rng.integers(1, self.hold + 1)), self.horizon)
+        # 1, 2, 4, … decisions, each as often: to coast to a halt takes many, to steer few.
+        hold = min(2 ** int(rng.integers(int(np.log2(self.hold)) + 1)), self.horizon)
         actions = coder.actions(latents)
         before = tree.ended_worth
         alive = np.arange(len(nodes))
