@@ -51,8 +51,8 @@ class TreeSearch:
 
     Notes
     -----
-    Cost: for each of the ``expansions`` as many decisions of the simulator as the mean of the powers of two up to ``hold``;
-    memory for as many states as there are decisions.
+    Cost: for each of the ``expansions`` as many decisions of the simulator as the mean of the powers of two up to
+    ``hold``; memory for as many states as there are decisions.
     Branches of which an outcome isn't known end there, at no worth.
     """
 
