@@ -91,7 +91,7 @@ class Checker:
         if match := COMPARED.match(text):
             left, sign, right = match.groups()
             value = self._number(left, names)
-            if "(" in left and abs(value - float(right)) <= ROUNDING:
+            if CALL.match(left) and abs(value - float(right)) <= ROUNDING:
                 return True  # which side of the threshold it lies on, this geometry's own rounding decides
             return not math.isnan(value) and COMPARE[sign](value, float(right))
         call = CALL.match(text)
