@@ -74,25 +74,26 @@ class Checker:
         return [self.target, *(met or self.touched or nearest)]
 
     def true(self, text: str) -> bool:
-        return all(self._true(part, {"A": self.target}, self.bodies) for part in _split(text))
+        return all(self._true(part, {"A": self.target}, self.bodies, True) for part in _split(text))
 
-    def _true(self, text: str, names: dict[str, str], seen: list[str]) -> bool:
+    def _true(self, text: str, names: dict[str, str], seen: list[str], open_: bool) -> bool:
+        """Whether it is true; where this geometry's rounding decides, the answer is `open_`."""
         if match := QUANTIFIED.match(text):
             sign, word, variables, body = match.groups()
             shown = self.seen(word.strip())
             found = any(
-                all(self._true(part, names | dict(zip(variables.split(", "), chosen, strict=True)), shown)
+                all(self._true(part, names | dict(zip(variables.split(", "), chosen, strict=True)), shown, open_ == (sign == "some"))
                     for part in _split(body))
                 for chosen in product(shown, repeat=len(variables.split(", ")))
             )  # fmt: skip
             return found == (sign == "some")
         if text.startswith("not "):
-            return not self._true(text[4:], names, seen)
+            return not self._true(text[4:], names, seen, not open_)
         if match := COMPARED.match(text):
             left, sign, right = match.groups()
             value = self._number(left, names)
             if CALL.match(left) and abs(value - float(right)) <= ROUNDING:
-                return True  # which side of the threshold it lies on, this geometry's own rounding decides
+                return open_
             return not math.isnan(value) and COMPARE[sign](value, float(right))
         call = CALL.match(text)
         if call is None:
