@@ -80,9 +80,9 @@ class Checker:
         """Whether it is true; where this geometry's rounding decides, the answer is `open_`."""
         if match := QUANTIFIED.match(text):
             sign, word, variables, body = match.groups()
-            shown = self.seen(word.strip())
+            shown, within = self.seen(word.strip()), open_ == (sign == "some")
             found = any(
-                all(self._true(part, names | dict(zip(variables.split(", "), chosen, strict=True)), shown, open_ == (sign == "some"))
+                all(self._true(part, names | dict(zip(variables.split(", "), chosen, strict=True)), shown, within)
                     for part in _split(body))
                 for chosen in product(shown, repeat=len(variables.split(", ")))
             )  # fmt: skip
