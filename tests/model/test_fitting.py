@@ -126,7 +126,9 @@ def test_what_is_no_config_is_refused_as_by_the_learner() -> None:
     assert WorldModel(ALONE, None).config == ModelConfig()
     with pytest.raises(ConfigError, match="expected a ModelConfig, or a dict of what differs"):
         WorldModel(ALONE, 3)  # type: ignore[arg-type]
-    with pytest.raises(ConfigError, match=r"unexpected keyword argument 'speed'"):
+    with pytest.raises(
+        ConfigError, match=r"ModelConfig: got an unexpected keyword argument 'speed'; see help"
+    ):
         WorldModel(ALONE, {"speed": 3})
     with pytest.raises(ConfigError, match="draws must be a whole number"):
         WorldModel(ALONE, {"clustering": {"draws": "many"}})

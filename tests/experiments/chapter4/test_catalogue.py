@@ -107,7 +107,7 @@ def test_the_command_stops_where_the_disk_is_full(tmp_path: Path, monkeypatch: p
     with monkeypatch.context() as patch:
         patch.setattr(os, "replace", full)
         failed = CliRunner().invoke(app, command)
-    assert failed.exit_code == 2 and "no space left" in " ".join(failed.output.split())
+    assert failed.exit_code == 2 and "can't be written (no space left" in " ".join(failed.output.split())
     assert not list(tmp_path.iterdir())
     assert CliRunner().invoke(app, command).exit_code == 0
     assert (tmp_path / "table-4.1.txt").is_file()
