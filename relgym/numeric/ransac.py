@@ -133,11 +133,15 @@ def consensus(
     samples = draw_samples(n, size, draws, rng=rng, strata=strata, apart=apart, anchors=anchors)
     chosen = _forward_batch(x[:, columns][samples], y[samples], terms=terms, sigma=sigma, loose=loose)
     best: Consensus | None = None
+    tried: set[tuple[tuple[int, ...], bytes]] = set()  # what is refined depends on columns and inliers alone
     for sample, picked in _distinct(samples, chosen, limit):
         fit = least_squares(x[sample], y[sample], tuple(int(columns[c]) for c in picked))
         found = Consensus(fit, np.abs(y - fit.predict(x)) <= loose * tolerance)
+        key = (fit.columns, found.inliers.tobytes())
         if best is None or (found.size, -found.fit.terms) > (best.size, -best.fit.terms):
-            best = refine(x, y, found, sigma=sigma, tolerance=tolerance)
+            again, _ = key in tried, tried.add(key)
+            if not again:
+                best = refine(x, y, found, sigma=sigma, tolerance=tolerance)
     return best
 
 

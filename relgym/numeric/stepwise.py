@@ -12,6 +12,7 @@ thread counts.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,14 +94,15 @@ def least_squares(
     -----
     Cost O(n p^2) for p columns.
     """
-    centre = x[:, list(columns)].mean(axis=0) if intercept else np.zeros(len(columns))
-    a = x[:, list(columns)] - centre
+    a = x[:, list(columns)]
+    centre = a.mean(axis=0) if intercept else np.zeros(len(columns))
+    a = a - centre
     shift = float(y.mean()) if intercept else 0.0
-    factors = _factors(a)
-    weights = factors.solve(y - shift)
-    weights += factors.solve((y - shift) - _combine(a, weights))
+    factors, rest = _factors(a), y - shift
+    weights = factors.solve(rest)
+    weights += factors.solve(rest - _combine(a, weights))
     constant = shift - float((centre * weights).sum()) if intercept else 0.0
-    kept = [k for k in np.argsort(columns, kind="stable") if weights[k] != 0.0]
+    kept = [k for k in sorted(range(len(columns)), key=columns.__getitem__) if weights[k] != 0.0]
     fit = LinearFit(tuple(columns[k] for k in kept), tuple(float(weights[k]) for k in kept), constant, 0.0)
     return LinearFit(fit.columns, fit.weights, constant, float(np.square(y - fit.predict(x)).sum()))
 
@@ -112,20 +114,26 @@ def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np
 
 @dataclass(frozen=True, slots=True)
 class _Factors:
-    """Orthonormal directions (None for columns collinear with earlier ones), and the triangle that leads back."""
+    """Orthonormal directions, shape ``(p, n)``, zero for columns collinear with earlier ones, and the triangle back."""
 
-    q: list[NDArray[np.float64] | None]
+    q: NDArray[np.float64]
     r: NDArray[np.float64]
+
+    @property
+    def independent(self) -> bool:
+        """Whether no column is collinear with earlier ones."""
+        return bool(self.r.diagonal().all())
 
     def solve(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights of the least-squares solution; exactly zero for columns collinear with earlier ones."""
-        p = len(self.q)
-        weights = np.zeros(p)
-        for k, own in reversed(list(enumerate(self.q))):
-            if own is not None:
-                rest = sum(self.r[k, j] * weights[j] for j in range(k + 1, p) if self.q[j] is not None)
-                weights[k] = (float((own * y).sum()) - rest) / self.r[k, k]
-        return weights
+        r, parts = self.r.tolist(), (self.q * y).sum(axis=1).tolist()
+        weights = [0.0] * len(parts)
+        for k in reversed(range(len(parts))):
+            row = r[k]
+            if row[k]:
+                rest = sum(row[j] * weights[j] for j in range(k + 1, len(parts)) if weights[j])
+                weights[k] = (parts[k] - rest) / row[k]
+        return np.array(weights)
 
     def shares(self) -> NDArray[np.float64]:
         """Square of what of each column all others don't reproduce, shape ``(p,)``; no column may be collinear."""
@@ -139,24 +147,35 @@ class _Factors:
 
 
 def _factors(a: NDArray[np.float64]) -> _Factors:
-    """Gram-Schmidt, column by column, twice."""
-    p = a.shape[1]
-    q: list[NDArray[np.float64] | None] = []
-    r = np.zeros((p, p))
+    """Gram-Schmidt, column by column against all before it at once, twice.
+
+    Twice is enough for orthogonality to rounding, with the directions taken one by one or all at once [1]_.
+
+    References
+    ----------
+    .. [1] L. Giraud, J. Langou, M. Rozloznik, J. van den Eshof, "Rounding error analysis of the classical
+       Gram-Schmidt orthogonalization process", Numerische Mathematik 101 (2005).
+    """
+    columns = np.array(a.T, order="C")  # a copy, worked on in place
+    p, n = columns.shape
+    q, r = np.zeros((p, n)), np.zeros((p, p))
     for k in range(p):
-        column = a[:, k].copy()
-        size = float(np.sqrt(np.square(column).sum()))
-        for _ in range(2):  # twice is enough for orthogonality to rounding
-            for j, other in enumerate(q):
-                if other is not None:
-                    part = float((other * column).sum())
-                    r[j, k] += part
-                    column -= part * other
-        norm = float(np.sqrt(np.square(column).sum()))
-        independent = norm > PIVOT * size
-        q.append(column / norm if independent else None)
-        r[k, k] = norm if independent else 0.0
+        column = columns[k]
+        size = _length(column)
+        if k:
+            for _ in range(2):
+                parts = (q[:k] * column).sum(axis=1)
+                r[:k, k] += parts
+                column -= (q[:k] * parts[:, None]).sum(axis=0)
+        left = _length(column)
+        if left > PIVOT * size:
+            np.divide(column, left, out=q[k])
+            r[k, k] = left
     return _Factors(q, r)
+
+
+def _length(column: NDArray[np.float64]) -> float:
+    return math.sqrt(float(np.square(column).sum()))
 
 
 def forward_stepwise(
@@ -286,7 +305,7 @@ def _needless(x: NDArray[np.float64], fit: LinearFit, allowed: float) -> list[in
     """Terms without which the residuals' squares may grow by no more than so much; the others needn't be tried."""
     a = x[:, list(fit.columns)]
     factors = _factors(a - a.mean(axis=0) if fit.intercept != 0.0 else a)
-    if any(own is None for own in factors.q):
+    if not factors.independent:
         return list(range(len(fit.columns)))
     growth = np.square(np.array(fit.weights)) * factors.shares()
     return [int(k) for k in np.flatnonzero(growth <= allowed)]
