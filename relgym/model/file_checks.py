@@ -61,6 +61,9 @@ _Arrays = Mapping[str, NDArray[Any]]
 
 _CEILINGS: Final = {
     "work_per_step": 10**12,
+    "cells_per_step": 10**15,
+    "most_cells": 10**15,
+    "saved_cells": 10**15,
     "history": 10**9,
     "draws": 100_000,
     "max_terms": 64,

@@ -18,9 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.scheduling.work import CALL, Steps, resumable
+
 __all__ = [
     "LinearFit",
     "eliminate_backward",
+    "fitting_cells",
     "forward_order",
     "forward_stepwise",
     "least_squares",
@@ -107,6 +110,11 @@ def least_squares(
     return LinearFit(fit.columns, fit.weights, constant, float(np.square(y - fit.predict(x)).sum()))
 
 
+def fitting_cells(rows: int, terms: int) -> int:
+    """What `least_squares` of so many rows and terms costs, in cells: each term is taken out of all others, twice."""
+    return CALL + terms * (CALL // 4 + 4 * rows * (terms + 1))
+
+
 def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
     total: NDArray[np.float64] = (a * weights).sum(axis=1)
     return total
@@ -178,6 +186,7 @@ def _length(column: NDArray[np.float64]) -> float:
     return math.sqrt(float(np.square(column).sum()))
 
 
+@resumable
 def forward_stepwise(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -185,7 +194,7 @@ def forward_stepwise(
     sigma: float,
     max_terms: int | None = None,
     eliminate: bool = True,
-) -> LinearFit:
+) -> Steps[LinearFit]:
     """Forward-stepwise regression with Mallows's Cp (Algorithm 1), then backward elimination.
 
     Each round adds the column that lowers ``Cp = RSS / sigma^2 - n + 2 (p + 1)`` most; columns that do
@@ -207,13 +216,18 @@ def forward_stepwise(
     -----
     Cost O(n d p) for p chosen columns.
     """
-    fit = least_squares(x, y, forward_order(x, y, sigma=sigma, max_terms=max_terms))
-    return eliminate_backward(x, y, fit, sigma=sigma) if eliminate else fit
+    order = yield from forward_order.steps(x, y, sigma=sigma, max_terms=max_terms)
+    fit = least_squares(x, y, order)
+    yield fitting_cells(len(y), fit.terms)
+    if eliminate:
+        fit = yield from eliminate_backward.steps(x, y, fit, sigma=sigma)
+    return fit
 
 
+@resumable
 def forward_order(
     x: NDArray[np.float64], y: NDArray[np.float64], *, sigma: float, max_terms: int | None = None
-) -> tuple[int, ...]:
+) -> Steps[tuple[int, ...]]:
     """Columns in the order in which `forward_stepwise` adds them; the first k are what it finds with k at most.
 
     Parameters and cost as of `forward_stepwise`.
@@ -223,11 +237,13 @@ def forward_order(
     candidates = varying_columns(x) if n else np.empty(0, dtype=np.intp)
     a = x[:, candidates] - x[:, candidates].mean(axis=0) if len(candidates) else np.empty((n, 0))
     choose = _choose_among_many if len(candidates) > MANY else _choose
-    chosen = choose(a, y - y.mean(), sigma, limit) if n else []
+    chosen = (yield from choose(a, y - y.mean(), sigma, limit)) if n else []
     return tuple(int(candidates[c]) for c in chosen)
 
 
-def _choose(a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int) -> list[int]:
+def _choose(
+    a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int
+) -> Steps[list[int]]:
     """Centred columns in the order in which they lower Cp most; what is chosen is swept out of all others."""
     sizes, chosen = np.square(a).sum(axis=0), list[int]()
     while len(chosen) < limit:
@@ -243,12 +259,13 @@ def _choose(a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float,
         residual = residual - (q * residual).sum() * q
         a -= q[:, None] * (q[:, None] * a).sum(axis=0)
         a[:, best] = 0.0
+        yield CALL + 4 * a.size
     return chosen
 
 
 def _choose_among_many(
     a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int
-) -> list[int]:
+) -> Steps[list[int]]:
     """The same at a fraction of the cost: only what is left of the columns' squares is kept up to date.
 
     That is less exact for columns that are nearly collinear with the chosen ones, hence `COARSE`.
@@ -270,6 +287,7 @@ def _choose_among_many(
         residual = residual - (basis[-1] * residual).sum() * basis[-1]
         pivots -= np.square(np.einsum("i,ij->j", basis[-1], a))
         pivots[best] = 0.0
+        yield CALL + a.size
     return chosen
 
 
@@ -282,9 +300,10 @@ def _first_of_the_best(gains: NDArray[np.float64], rows: int, sigma: float) -> i
     return int(np.argmax(gains >= max(least, 2.0 * sigma**2)))
 
 
+@resumable
 def eliminate_backward(
     x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, *, sigma: float
-) -> LinearFit:
+) -> Steps[LinearFit]:
     """Drop terms, the constant included, as long as that raises Cp by less than it saves.
 
     Later columns are tried first, so that of two interchangeable ones the earlier stays.
@@ -294,6 +313,7 @@ def eliminate_backward(
         smaller = [_without(x, y, fit, k) for k in _needless(x, fit, 4.0 * allowed + fit.rss)]
         if fit.intercept != 0.0:
             smaller.append(least_squares(x, y, fit.columns, intercept=False))
+        yield (1 + len(smaller)) * fitting_cells(len(y), fit.terms)
         smaller = [s for s in smaller if s.rss <= fit.rss + allowed and s.terms < fit.terms]
         if not smaller:
             return fit
