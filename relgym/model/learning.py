@@ -14,6 +14,7 @@ from relgym.model.chaining import CHECK_AT, due, inquire, revise
 from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
+from relgym.model.prediction import ScenePrediction
 from relgym.model.property_model import bodies_of
 from relgym.model.scenes import next_values, stays, unwrapped
 from relgym.scene.objects import Transition
@@ -63,11 +64,16 @@ def _ids(modes: tuple[int, ...]) -> str:
 
 
 def learn(
-    parts: Parts, percept: Percept, transition: Transition, only: frozenset[int] | None = None
+    parts: Parts,
+    percept: Percept,
+    transition: Transition,
+    only: frozenset[int] | None = None,
+    told: ScenePrediction | None = None,
 ) -> LearnReport:
     """Take up one transition, whose first scene has been perceived and whose numbers are finite.
 
-    With `only`, of the objects with these indices; all others are there to be seen.
+    With `only`, of the objects with these indices; all others are there to be seen. What was predicted of it, if
+    somebody asked, saves looking at what came as it was told.
     """
     before, after = transition.before, transition.after
     if parts.open:
@@ -89,7 +95,7 @@ def learn(
         forget(table, [m for t, m in parts.models.items() if t.type == type_name], parts.config.history)
     _inquire(parts, budget)
     if parts.laws is not None:
-        parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models)
+        parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models, told)
     work = _refresh(parts, budget)
     parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
     return LearnReport(reports, work)
