@@ -16,7 +16,7 @@ from relgym.laws.pair import Encounters
 from relgym.laws.records import Kind, Share
 from relgym.laws.shares import EXTENT, find_share
 from relgym.laws.store import Store
-from relgym.laws.touching import Contacts
+from relgym.laws.touching import Cast, Contacts
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.schema import SceneSchema

@@ -17,7 +17,7 @@ from relgym.model.perception import Percept
 from relgym.model.prediction import ScenePrediction
 from relgym.model.property_model import bodies_of
 from relgym.model.scenes import next_values, stays, unwrapped
-from relgym.scene.objects import Transition
+from relgym.scene.objects import Target, Transition
 from relgym.scheduling.agenda import Budget
 
 __all__ = ["LearnReport", "finish", "learn"]
@@ -109,9 +109,9 @@ def _go_on(parts: Parts, budget: Budget) -> None:
         if parts.models[target].guesses.underway:
             parts.models[target].reconsider(table, budget)
     searches = budget.part(SEARCHES)
-    for target in parts.agenda.waiting:
-        if target in parts.models:
-            parts.models[target].go_on(parts.tables[target.type], searches)
+    for waiting in parts.agenda.waiting:
+        if isinstance(waiting, Target) and waiting in parts.models:
+            parts.models[waiting].go_on(parts.tables[waiting.type], searches)
 
 
 def _inquire(parts: Parts, budget: Budget) -> None:

@@ -129,8 +129,8 @@ class Laws:
             kind = layout.types[layout.bodies[body]].name
             if kind not in self.governed or one.property not in self.learner.book.components(kind):
                 continue
-            if not one.ok or one.mode not in (FREE, TOUCHING):
-                return False
+            if not one.ok or len(one.roles) < one.mode or one.mode not in (FREE, TOUCHING):
+                return False  # a batch tells no roles
             column = layout.column(layout.bodies[body], one.property)
             error = abs(one.value - float(following[column]))
             said[body] = said.get(body, 0) + 1

@@ -275,7 +275,7 @@ class WorldModel:
         if not self._parts.screen.admits(before.layout, before.vector, following):
             return LearnReport({}, 0, set_aside=True)
         if large(before.layout):
-            report = learn_locally(self._parts, self._near(before), transition, self.seen)
+            report = learn_locally(self._parts, self._near(before), transition, self.seen, told)
         else:
             report = learn(self._parts, self._perceive(before), transition, told=told)
         self.seen += 1

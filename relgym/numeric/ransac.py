@@ -147,8 +147,8 @@ def consensus(
         found = Consensus(fit, np.abs(y - fit.predict(x)) <= loose * tolerance)
         key = (fit.columns, found.inliers.tobytes())
         if best is None or (found.size, -found.fit.terms) > (best.size, -best.fit.terms):
-            again, _ = key in tried, tried.add(key)
-            if not again:
+            if key not in tried:
+                tried.add(key)
                 best = yield from refine.steps(x, y, found, sigma=sigma, tolerance=tolerance)
         yield CALL + n * len(picked)
     return best
