@@ -277,7 +277,7 @@ class WorldModel:
         if large(before.layout):
             report = learn_locally(self._parts, self._near(before), transition, self.seen, told)
         else:
-            report = learn(self._parts, self._perceive(before), transition, told=told)
+            report = learn(self._parts, self._perceive(before), transition, None, told)
         self.seen += 1
         return report
 

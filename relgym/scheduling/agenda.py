@@ -82,7 +82,7 @@ class Agenda:
     """
 
     def __init__(self, *, earned: int, most: int, saved: int) -> None:
-        self.earned, self.most, self.limit = earned, most, saved
+        self.earned, self.most, self.limit = earned, most, max(saved, earned)
         self.saved = saved
         self.waiting: tuple[Hashable, ...] = ()
 

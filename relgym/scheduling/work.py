@@ -104,6 +104,8 @@ class Task(Generic[T]):
 
     def advance(self, budget: int) -> int:
         """Work until it is done or the budget is spent; what was spent, in cells: the last piece may overdraw it."""
+        if self.done:
+            return 0
         if self._steps is None:
             self._start()
         assert self._steps is not None
