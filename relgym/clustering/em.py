@@ -59,6 +59,13 @@ class Cluster:
                 error[part], assignment[part] = binding.closest(table.x[rows[part]], y[part], scale.sigma)
         return error, assignment
 
+    def error_one(self, table: ExampleTable, row: int, x: list[float], y: float, scale: Scale) -> float:
+        """`errors` of one example, whose row of the table is ``x``; the same bits."""
+        binding = self.binding(table, int(table.signature_ids[row]))
+        if binding is not None and not binding.open:
+            return abs(binding.value(x) - y)
+        return float(self.errors(table, np.array([row]), np.array([y]), scale)[0][0])
+
     def idle(self, table: ExampleTable, rows: NDArray[np.integer], tolerance: float) -> NDArray[np.bool_]:
         """Where the own role's terms all vanish and no other object has a say, shape ``(n,)``."""
         still = np.full(len(rows), not any(r.terms for r in self.mode.open_roles))

@@ -135,8 +135,9 @@ class Population:
         return ids, found
 
     def _errors_of(self, table: ExampleTable, example: int) -> dict[int, float]:
-        rows, y = self.rows[example : example + 1], self.y[example : example + 1]
-        return {i: float(c.errors(table, rows, y, self.scale)[0][0]) for i, c in self.clusters.items()}
+        row, y = int(self.rows[example]), float(self.y[example])
+        x = table.x[row].tolist()
+        return {i: c.error_one(table, row, x, y, self.scale) for i, c in self.clusters.items()}
 
     def _choose(self, table: ExampleTable, example: int, errors: dict[int, float]) -> int:
         """E-step for one example that no mode has: the one of those that explain it; `NOISE` if none does."""

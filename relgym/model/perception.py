@@ -143,10 +143,19 @@ class Perception:
         self._own_columns: dict[tuple[int, int], NDArray[np.intp]] = {}
         self._unary: dict[int, NDArray[np.bool_]] = {}
         self._features: dict[int, NDArray[np.intp]] = {}
+        self._pair_counts: dict[str, int] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         # Caches are keyed by identity, which a copy doesn't share.
-        caches = ("_signatures", "_gathers", "_layouts", "_own_columns", "_unary", "_features")
+        caches = (
+            "_signatures",
+            "_gathers",
+            "_layouts",
+            "_own_columns",
+            "_unary",
+            "_features",
+            "_pair_counts",
+        )
         return {name: value for name, value in self.__dict__.items() if name not in caches}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -170,6 +179,12 @@ class Perception:
         pair = [*self._contact_names, *(f"other-{p}" if p in taken else p for p in self._pair_names)]
         contact = frozenset({*self._contact_names, "approaching", "approaching-fastest"})
         return Vocabulary(binary, self._unary_names, tuple(pair), tuple(own), contact)
+
+    def pair_count(self, target: ObjectType) -> int:
+        """Number of names that a type's vocabulary has for pairs; cached."""
+        if (known := self._pair_counts.get(target.name)) is None:
+            known = self._pair_counts[target.name] = len(self.vocabulary(target).pair)
+        return known
 
     def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:
         """The slot signature of these types."""
@@ -302,7 +317,7 @@ class Percept:
         """An object without a body stands alone: no relations, only numbers."""
         perception, n = self.perception, len(self)
         own = self._padded()[:, perception.own_columns(self.layout, target)]
-        names = len(perception.vocabulary(self.layout.types[target]).pair)
+        names = perception.pair_count(self.layout.types[target])
         binary, single = len(perception.extractor.names), len(perception._unary_names)
         return ExampleBatch(
             np.zeros((n, binary, 1, 1), dtype=bool),

@@ -1,11 +1,11 @@
-"""What came as predicted is only counted and offered to what is kept: the model is the same as if it had been studied."""
+"""What came as predicted is only counted and offered to what is kept: the model is as if it had been studied."""
 
 from __future__ import annotations
 
 import gymnasium as gym
 import pytest
 
-import relgym  # noqa: F401  (registers the ids)
+import relgym
 from relgym.model.archive import parts_to_arrays, parts_to_json
 from relgym.model.fitting import compare_and_learn
 from relgym.model.motion import Laws
