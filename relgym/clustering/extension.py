@@ -75,6 +75,8 @@ def extended(
     half = least_examples(known.y, known.scale, known.config) / 2
     if int((known.y[pool] == value).sum()) >= max(2, half) and bool(_flags(known.y)):
         return LinearFit((), (), value, 0.0)
+    if not known.clusters:
+        return None
     pool, exact = pool[-SEARCH:], bits >= EXACT and not flags
     counting = counts(known.y, known.scale, RECENT)  # where whole numbers agree, they often do so by chance
     if counting and not exact:
