@@ -14,7 +14,7 @@ from relgym.classification.learning import SHORT, Lesson, learn_pair
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
-from relgym.logic.search import BLOCK, LITERAL
+from relgym.logic.search import GROUP, LITERAL
 from relgym.scheduling.work import Task
 
 __all__ = ["PairState", "covered_by", "pair_labels"]
@@ -103,7 +103,7 @@ class PairState:
             grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
             mendable = config.repair and not grown and all(lesson.counts)
             mended = mend(self.classifier, lesson, self.errors, config) if mendable else None
-            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + BLOCK // LITERAL
+            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + GROUP // LITERAL
             if mended is not None:
                 self._adopt(mended, lesson, mended=True)
                 return work + mended.work

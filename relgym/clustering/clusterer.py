@@ -250,7 +250,7 @@ class ModeClusterer(Prospector):
             self._resort = Resort.of(self, table, floor=self.floor)
         if not budget.work(self._resort.task):
             return False
-        found = self._resort.judged(self, table, floor=self.floor, again=self.approximate)
+        found = self._resort.found(self, table, floor=self.floor, again=self.approximate)
         self._resort, self.due = None, False
         if found is None:
             return False

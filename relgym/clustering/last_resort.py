@@ -74,7 +74,7 @@ def last_resort(
     """
     resort = Resort.of(population, table, floor=floor)
     resort.task.advance(2**62)
-    return resort.judged(population, table, floor=floor, again=again)
+    return resort.found(population, table, floor=floor, again=again)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,15 +105,15 @@ class Resort:
         )
         return cls(signature, order, task)
 
-    def judged(
+    def found(
         self, population: Population, table: ExampleTable, *, floor: float, again: bool
     ) -> LastResort | None:
         """What was found, if it is better than what there is by now; parameters as of `last_resort`."""
         found = self.task.result
-        return None if found is None else _judged(self, found, population, table, floor=floor, again=again)
+        return None if found is None else _accepted(self, found, population, table, floor=floor, again=again)
 
 
-def _judged(
+def _accepted(
     resort: Resort,
     found: Approximation,
     population: Population,

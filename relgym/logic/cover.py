@@ -14,7 +14,7 @@ from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
 from relgym.logic.growing import EPS, Growing, Score, Weights
 from relgym.logic.pruning import Problem, center_thresholds, prune
-from relgym.logic.search import BLOCK, Harvest, grow
+from relgym.logic.search import GROUP, Harvest, grow
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 from relgym.scheduling.work import Steps
@@ -95,7 +95,7 @@ class Cover:
             clause = prune(Clause.of(growing.literals, self._tables.arity), rest)
             clause = center_thresholds(clause.connected(), rest)
             covered = problem.count(alive & problem.matches(clause))
-            yield BLOCK
+            yield GROUP
             if self._accepts(clause, covered, problem.count(alive)):
                 return clause
         return None

@@ -39,7 +39,7 @@ TIGHT, CLOSE = 4.0, 0.01
 unless a few standard deviations are."""
 
 
-BLOCK = 30_000
+CHUNK = 30_000
 """So many numbers of samples are worked on at a time: they fit into the processor's cache."""
 
 
@@ -187,14 +187,14 @@ def _forward_batch(
     enough = size * (loose * sigma) ** 2
     choose = _choose_among_many if x.shape[1] > MANY else _choose
     every = np.empty((draws, max(terms, 1)), dtype=np.intp)
-    block = max(16, BLOCK // max(1, size * x.shape[1]))
-    for begin in range(0, draws, block):
-        part = samples[begin : begin + block]
+    step = max(16, CHUNK // max(1, size * x.shape[1]))
+    for begin in range(0, draws, step):
+        part = samples[begin : begin + step]
         a, b = x[part], y[part]
         a -= a.mean(axis=1, keepdims=True)
         chosen, left = choose(a, b - b.mean(axis=1, keepdims=True), terms, sigma, enough)
         chosen[left > enough, 0] = -2
-        every[begin : begin + block] = chosen
+        every[begin : begin + step] = chosen
         yield CALL + 4 * a.size * max(terms, 1)
     return every
 
