@@ -25,6 +25,7 @@ from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.mode import Mode
 from relgym.clustering.roles import bind
 from relgym.errors import ModelFileError
+from relgym.files.records import LARGEST
 from relgym.laws.frames import axis_names
 from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE
@@ -59,27 +60,6 @@ __all__ = ["check_body"]
 
 _Arrays = Mapping[str, NDArray[Any]]
 
-_CEILINGS: Final = {
-    "work_per_step": 10**12,
-    "history": 10**9,
-    "draws": 100_000,
-    "max_terms": 64,
-    "max_literals": 64,
-    "max_clauses": 256,
-    "max_new_variables": 4,
-    "beam": 256,
-    "tree_max_depth": 64,
-    "max_exemplars": 10**7,
-    "exemplars_per_state": 10**7,
-    "exemplars_alone": 10**7,
-    "noise_per_state": 10**7,
-    "seed": 2**63 - 1,
-    "support": 10**6,
-    "tree_min_leaf": 10**6,
-    "min_examples": 10**6,
-}
-"""Greatest parameters that a file may ask for: a search may take long, but not for ever."""
-
 _CHOICES: Final = 4
 """More roles of one kind aren't filled at once: all ways to do so are gone through."""
 
@@ -112,7 +92,6 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
     ModelFileError
         Something names what isn't there, or doesn't fit.
     """
-    _check_config(body)
     targets = [_target(part.target) for part in body.targets]
     _require(
         list(parts.targets) == targets and set(parts.models) == set(targets),
@@ -140,15 +119,6 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
 
 def _target(record: TargetRecord) -> Target:
     return Target(record.type, record.property, tuple((t, p) for t, p in record.given))
-
-
-def _check_config(body: Body) -> None:
-    config = body.config
-    for part in (config, config.clustering, config.classification):
-        for name, most in _CEILINGS.items():
-            value = getattr(part, name, 0)
-            if isinstance(value, (int, float)):
-                _require(value <= most, "config", f"expected {name} of at most {most:,}, got {value:,}")
 
 
 # ---------------------------------------------------------------------- one target
@@ -484,6 +454,14 @@ def _within(values: NDArray[Any], low: int, high: int) -> bool:
     return not values.size or bool(values.min() >= low and values.max() < high)
 
 
+def _sized(values: NDArray[np.float64]) -> bool:
+    """Whether numbers are such that can be learned from: the squares of larger ones would overflow."""
+    return bool((np.abs(values) <= LARGEST).all())
+
+
+_SIZED: Final = f"expected finite numbers of at most {LARGEST:g}"
+
+
 # ---------------------------------------------------------------------- laws of motion
 def _check_screen(record: ScreenRecord, parts: Parts) -> None:
     known = {(t.name, prop) for t in parts.schema.types for prop in t.properties}
@@ -599,7 +577,7 @@ def _stored(arrays: _Arrays, name: str, width: int, limit: int, seen: int, cells
     _require(
         len(rows) <= min(limit, seen), f"{name}.rows", f"expected at most {min(limit, seen)}, got {len(rows)}"
     )
-    _require(np.isfinite(rows).all(), f"{name}.rows", "expected finite numbers")
+    _require(_sized(rows), f"{name}.rows", _SIZED)
     found = _array(arrays, f"{name}.cells", "int64", (len(rows),))
     _require(_within(found, 0, cells), f"{name}.cells", "expected one of the cells")
     return rows
@@ -658,7 +636,7 @@ def _check_table(
     width = max((len(s.columns) for s in signatures), default=0)
     x = _array(arrays, f"{at}.x", "float64", (None, width))
     n = len(x)
-    _require(np.isfinite(x).all(), f"history: {at}.x", "expected finite numbers")
+    _require(_sized(x), f"history: {at}.x", _SIZED)
     ids = _array(arrays, f"{at}.signature", "int32", (n,))
     _require(_within(ids, 0, len(signatures)), f"history: {at}.signature", "expected one of the signatures")
     strata = _array(arrays, f"{at}.stratum", "int32", (n,))
@@ -695,7 +673,7 @@ def _check_examples(
 ) -> None:
     ids = [mode.id for mode in model.clusterer.modes]
     y = _array(arrays, f"{at}.y", "float64", (None,))
-    _require(np.isfinite(y).all(), f"history: {at}.y", "expected finite numbers")
+    _require(_sized(y), f"history: {at}.y", _SIZED)
     labels = _array(arrays, f"{at}.labels", "int32", (len(y),))
     _require(np.isin(labels, [0, *ids]).all(), f"history: {at}.labels", f"expected 0 or one of {ids}")
     rows = _array(arrays, f"{at}.rows", "int64", (len(y),))

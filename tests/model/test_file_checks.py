@@ -120,7 +120,15 @@ DAMAGES: dict[str, tuple[str, Change, str]] = {
     ),
     "a configuration out of range": ("truck", lambda b, a: b["config"].update(history=1), "history must be at least"),
     "a search for ever": (
-        "truck", lambda b, a: b["config"]["clustering"].update(draws=10**9), "expected draws of at most"
+        "truck", lambda b, a: b["config"]["clustering"].update(draws=10**9), "draws must be at most 100,000"
+    ),
+    "a noise of zero": ("truck", lambda b, a: _target(b)["clusterer"].update(sigma=0.0), "sigma"),
+    "a noise whose square overflows": (
+        "truck", lambda b, a: _target(b)["clusterer"].update(rounding=1e200), "rounding"
+    ),
+    "laws without a tolerance": ("ball-laws", lambda b, a: b["laws"]["laws"].update(tolerance=0.0), "tolerance"),
+    "a number in the history that is no size": (
+        "truck-history", lambda b, a: a["table0.x"].__setitem__((0, 0), 1e200), "at most 1e"
     ),
     "an unknown type": ("truck", lambda b, a: b["schema"]["objects"][0].__setitem__(1, "cow"), "unknown type 'cow'"),
     "a shape without a surface": (
