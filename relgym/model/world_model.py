@@ -801,7 +801,7 @@ class WorldModel:
         return model, model.extra
 
     @classmethod
-    def _restored(cls, body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None) -> WorldModel:
+    def _restored(cls, body: dict[str, Any], arrays: Mapping[str, NDArray[Any]] | None) -> WorldModel:
         """The model that a file's body and history stand for; `ModelFileError` unless all of it fits together."""
         try:
             parts = parts_from_json(body, arrays)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-import copy
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from relgym.errors import ModelFileError
+from relgym.files import reading
 from relgym.files.reading import FileLimits
 from relgym.model.storage import read_model, write_model
 from relgym.model.world_model import WorldModel
@@ -25,7 +26,8 @@ Change = Callable[[dict[str, Any], dict[str, Any]], object]
 
 def changed(name: str, change: Change, path: Path) -> Path:
     """A file whose content was changed, with the checksum that goes with that."""
-    body, arrays = copy.deepcopy(read_model(FILES / f"{name}.relgym"))
+    body, stored = read_model(FILES / f"{name}.relgym")
+    arrays = None if stored is None else dict(stored)
     change(body, arrays or {})
     write_model(path, body, arrays)
     return path
@@ -48,8 +50,9 @@ def test_files_of_version_1_are_read_and_saved_as_version_2(name: str, tmp_path:
 def test_the_checksum_covers_the_history(tmp_path: Path) -> None:
     from relgym.files.reading import read_members, write_arrays, write_members
 
-    body, arrays = read_model(FILES / "mountain-car-history.relgym")
-    assert arrays is not None
+    body, stored = read_model(FILES / "mountain-car-history.relgym")
+    assert stored is not None
+    arrays = dict(stored)
     write_model(tmp_path / "file", body, arrays)
     members = read_members((tmp_path / "file").read_bytes(), ("model.json", "history.npz"))
     arrays["target0.y"][0] += 1.0
@@ -249,3 +252,36 @@ def test_what_does_not_fit_is_named(name: str, tmp_path: Path) -> None:
     path = tmp_path / "model"
     with pytest.raises(ModelFileError, match=match):
         WorldModel.load(changed(file, change, path))
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "said"),
+    [
+        ("table0.x", (20_000, 3), "expected float64 of shape"),
+        ("table0.serial", (20_000,), "expected int64 of shape"),
+        ("target0.y", (20_000,), "as many as there are rows"),
+        ("target0.forgotten", (20_000, 2), "more than modes"),
+    ],
+)
+def test_arrays_that_can_not_fit_are_refused_by_their_headers(
+    name: str, shape: tuple[int, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def more(body: dict[str, Any], arrays: dict[str, Any]) -> None:
+        arrays[name] = np.zeros(shape, dtype=arrays[name].dtype)
+
+    path = changed("truck-history", more, tmp_path / "model")
+    monkeypatch.setattr(reading, "_array", lambda *_: pytest.fail("room was made for an array"))
+    with pytest.raises(ModelFileError, match=said):
+        WorldModel.load(path)
+
+
+def test_a_number_of_the_next_mode_needs_no_memory(tmp_path: Path) -> None:
+    path = changed(
+        "truck-history",
+        lambda b, a: _target(b)["clusterer"].update(next_id=2**31 - 1),
+        tmp_path / "model",
+    )
+    tracemalloc.start()
+    assert WorldModel.load(path).describe(details=True)
+    assert tracemalloc.get_traced_memory()[1] < 100 << 20
+    tracemalloc.stop()

@@ -10,7 +10,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from file_mutations import Arrays, Mutator
+from numpy.typing import NDArray
 
 from relgym.envs.learned_model import LearnedModelEnv
 from relgym.errors import RelgymError
@@ -119,7 +120,7 @@ class Fuzzer:
         self.folder, self.seed = folder, seed
         self.steps = worlds() | {path.stem: _kept(path) for path in sorted(SMALL.glob("*.npz"))}
         paths = [path for corpus in (CORPUS, SMALL) for path in sorted(corpus.glob("*.relgym"))]
-        self.files = {path.stem: read_model(path) for path in paths}
+        self.files = {path.stem: _content(path) for path in paths}
         self._mutators: dict[str, Mutator] = {}
 
     def case(self, number: int) -> tuple[str, dict[str, Any], Arrays | None]:
@@ -151,7 +152,8 @@ class Fuzzer:
         """Try one case."""
         self._try(number, *self.case(number), tally)
 
-    def _try(self, number: int, name: str, body: dict[str, Any], arrays: Arrays | None, tally: Tally) -> None:
+    def _try(self, number: int, name: str, body: dict[str, Any], given: Arrays | None, tally: Tally) -> None:
+        arrays: Mapping[str, NDArray[Any]] | None = given
         path = self.folder / "case.relgym"
         stage = ["write"]
         began = time.process_time()
@@ -241,6 +243,11 @@ class Fuzzer:
                     env.reset()
         except RelgymError as error:  # what the file says of the env isn't the model's
             tally.typed_later[f"dream: {type(error).__name__}"] += 1
+
+
+def _content(path: Path) -> tuple[dict[str, Any], Arrays | None]:
+    body, stored = read_model(path)
+    return body, None if stored is None else dict(stored)
 
 
 def _kept(path: Path) -> list[Transition]:
