@@ -762,7 +762,16 @@ class WorldModel:
             advice = tuple(
                 Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
             )
-            self._stored = parse_rules(data.get("rules", "")), advice
+            rules = parse_rules(data.get("rules", ""))
+            told, spoken = (
+                [part.target for part in rules.properties],
+                [str(target) for target in self.targets if not self.governs(target)],
+            )
+            if told != spoken:
+                raise ModelFileError(
+                    f"report.rules: expected rules of {spoken}, got {told}; save the model again"
+                )
+            self._stored = rules, advice
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""

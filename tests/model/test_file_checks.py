@@ -129,6 +129,9 @@ DAMAGES: dict[str, tuple[str, Change, str]] = {
     "a noise whose square overflows": (
         "truck", lambda b, a: _target(b)["clusterer"].update(rounding=1e200), "rounding"
     ),
+    "rules that leave a target out": (
+        "truck", lambda b, a: b.update(report={"rules": "Learned from 9 transitions."}), "expected rules of"
+    ),
     "laws without a tolerance": ("ball-laws", lambda b, a: b["laws"]["laws"].update(tolerance=0.0), "tolerance"),
     "a number in the history that is no size": (
         "truck-history", lambda b, a: a["table0.x"].__setitem__((0, 0), 1e200), "at most 1e"
