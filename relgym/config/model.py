@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from relgym.arguments import refusing_fields
-from relgym.config.checks import at_least, one_of, plain
+from relgym.config.checks import at_least, at_most, one_of, plain
 from relgym.config.classification import ClassificationConfig
 from relgym.config.clustering import ClusteringConfig
 from relgym.errors import ConfigError
@@ -34,8 +34,8 @@ class ModelConfig:
         Default true; false: the votes decide there as everywhere.
     work_per_step
         Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
-        literals examined). Default 400,000, some 20 ms; a search once begun is finished, whatever it costs.
-        Raising it makes rules fresher and single steps slower.
+        literals examined). Default 400,000, some 20 ms, range 0 to 10**12; a search once begun is finished,
+        whatever it costs. Raising it makes rules fresher and single steps slower.
     frames
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
@@ -48,7 +48,7 @@ class ModelConfig:
         to one type only. Default none; where linear laws don't explain a property, the report says what would.
         A linear law wins where it is enough; every kind offered makes searches slower.
     history
-        Examples kept per object type; memory stays flat beyond. Default 200,000, range >= 100. Of more, a uniform
+        Examples kept per object type; memory stays flat beyond. Default 200,000, range 100 to 10**9. Of more, a uniform
         choice stays, and everything rare: small modes, recent noise, and what classifiers remember. Raising it costs
         memory (some 100 bytes an example and upwards), lowering it makes late discoveries rest on fewer examples.
     """
@@ -71,6 +71,7 @@ class ModelConfig:
         one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
         at_least(self, 0, "seed", "work_per_step")
         at_least(self, 100, "history")
+        at_most(self, work_per_step=10**12, history=10**9)
         features: object = self.features
         if not isinstance(features, (tuple, list)) or not all(isinstance(entry, str) for entry in features):
             raise ConfigError(f"features must be a tuple of names, such as ('trig',), got {features!r}")

@@ -102,6 +102,7 @@ class WorldModel:
         self.condition_names: dict[str, str] = {}
         self._percept: tuple[Scene, Percept] | None = None
         self._rules: tuple[Any, RuleList] | None = None
+        self._advice: tuple[Any, tuple[Advice, ...]] | None = None
         self._stored: tuple[RuleList, tuple[Advice, ...]] | None = None
 
         self._neighbourhoods: tuple[Scene, Neighbourhoods] | None = None
@@ -115,6 +116,7 @@ class WorldModel:
             "_percept": None,
             "_neighbourhoods": None,
             "_rules": None,
+            "_advice": None,
             "_journal": Journal(),
         }
 
@@ -155,6 +157,7 @@ class WorldModel:
             _percept=None,
             _neighbourhoods=None,
             _rules=None,
+            _advice=None,
             _damaged=False,
         )
 
@@ -450,7 +453,7 @@ class WorldModel:
 
         A model without its history has nothing to learn from and stays as it is.
         """
-        self._rules = None
+        self._rules = self._advice = None
         if self.frozen:
             return 0
         with self._step("_finish"):
@@ -672,8 +675,14 @@ class WorldModel:
         """What isn't explained, target by target, and which features would explain it (`ModelConfig.features`).
 
         A model that was loaded without its history knows what was known when it was saved.
+
+        Cost: up to a second for each such target; kept until the model learns on.
         """
-        found = advices(self._parts)
+        models = self._parts.models.values()
+        state = self.seen, tuple((m.undecided, m.hindsight.wrong, m.hindsight.spoken) for m in models)
+        if self._advice is None or self._advice[0] != state:
+            self._advice = state, advices(self._parts)
+        found = self._advice[1]
         if self._stored is None:
             return found
         # Hindsight goes on without the history; what features would do is known from when there was one.
@@ -753,7 +762,16 @@ class WorldModel:
             advice = tuple(
                 Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
             )
-            self._stored = parse_rules(data.get("rules", "")), advice
+            rules = parse_rules(data.get("rules", ""))
+            told, spoken = (
+                [part.target for part in rules.properties],
+                [str(target) for target in self.targets if not self.governs(target)],
+            )
+            if told != spoken:
+                raise ModelFileError(
+                    f"report.rules: expected rules of {spoken}, got {told}; save the model again"
+                )
+            self._stored = rules, advice
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
@@ -792,7 +810,7 @@ class WorldModel:
         return model, model.extra
 
     @classmethod
-    def _restored(cls, body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None) -> WorldModel:
+    def _restored(cls, body: dict[str, Any], arrays: Mapping[str, NDArray[Any]] | None) -> WorldModel:
         """The model that a file's body and history stand for; `ModelFileError` unless all of it fits together."""
         try:
             parts = parts_from_json(body, arrays)
