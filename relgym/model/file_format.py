@@ -172,6 +172,7 @@ class ClustererRecord(Record):
     random: Random
     due: bool = False
     chancy: bool = False
+    estimating: bool = False
 
 
 # ---------------------------------------------------------------------- clauses and trees
@@ -529,6 +530,7 @@ class Body(Record):
     seen: Count
     extra: dict[str, Any]
     looks: list[tuple[Name, Name, bool]] = []
+    saved_cells: int | None = None
     screen: ScreenRecord | None = None
     hindsight: dict[str, HindsightRecord] = {}
     names: dict[str, Name] = {}

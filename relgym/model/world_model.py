@@ -231,6 +231,38 @@ class WorldModel:
 
         Cost: relations once, then per target O(modes); searches and re-learning when an example is news.
         """
+        self._check_step(transition)
+        with self._step("_learn", transition, numbers=2 * len(transition.before.vector)):
+            return self._learn(transition)
+
+    @refusing(ObservationError)
+    def take_up(
+        self,
+        transition: Transition,
+        prediction: ScenePrediction,
+        residuals: Mapping[tuple[str, str], float],
+        precision: float = 0.0,
+    ) -> LearnReport:
+        """`look_back` and `learn_one` in one: what came as predicted is only counted, and offered to what is kept.
+
+        Parameters, errors and notes as there; the model is the same as if both had been called.
+        """
+        self._check_step(transition)
+        numbers = 3 * len(transition.before.vector)
+        with self._step("_take_up", transition, prediction, dict(residuals), precision, numbers=numbers):
+            return self._take_up(transition, prediction, residuals, precision)
+
+    def _take_up(
+        self,
+        transition: Transition,
+        prediction: ScenePrediction,
+        residuals: Mapping[tuple[str, str], float],
+        precision: float,
+    ) -> LearnReport:
+        self._look_back(prediction, residuals, precision)
+        return self._learn(transition, prediction)
+
+    def _check_step(self, transition: Transition) -> None:
         self._parts.check(transition.before)
         self._parts.check(transition.after)
         if self.frozen:
@@ -239,18 +271,16 @@ class WorldModel:
                 "save it with save(path, history=True) to go on learning"
             )
         check_size(self._parts, transition.before.layout)
-        with self._step("_learn", transition, numbers=2 * len(transition.before.vector)):
-            return self._learn(transition)
 
-    def _learn(self, transition: Transition) -> LearnReport:
+    def _learn(self, transition: Transition, told: ScenePrediction | None = None) -> LearnReport:
         before = transition.before
         following = next_values(before, transition.after)
         if not self._parts.screen.admits(before.layout, before.vector, following):
             return LearnReport({}, 0, set_aside=True)
         if large(before.layout):
-            report = learn_locally(self._parts, self._near(before), transition, self.seen)
+            report = learn_locally(self._parts, self._near(before), transition, self.seen, told)
         else:
-            report = learn(self._parts, self._perceive(before), transition)
+            report = learn(self._parts, self._perceive(before), transition, None, told)
         self.seen += 1
         return report
 
