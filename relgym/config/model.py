@@ -51,6 +51,16 @@ class ModelConfig:
         Examples kept per object type; memory stays flat beyond. Default 200,000, range >= 100. Of more, a uniform
         choice stays, and everything rare: small modes, recent noise, and what classifiers remember. Raising it costs
         memory (some 100 bytes an example and upwards), lowering it makes late discoveries rest on fewer examples.
+    claim_error
+        By how much what is claimed may be off, as a share of the median of what the property changes by where it
+        changes. Default 0.05, range (0, 1]. Raising it claims approximations, too; lowering it claims exact laws alone.
+    claim_probability
+        How probable it must be, after how such predictions came out, that a prediction is no further off than that,
+        for it to be claimed (`Prediction.ok`). Default 0.95, range (0, 1]. Raising it claims less, and more of that
+        is right. It counts only where predictions are looked back at, as wrappers and `WorldModel.fit` do.
+    regression_columns
+        Regressions on all that a target may depend on are made on at most so many columns, squares and products
+        included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.
     """
 
     clustering: ClusteringConfig = field(default_factory=ClusteringConfig)
@@ -62,6 +72,9 @@ class ModelConfig:
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()
     history: int = 200_000
+    claim_error: float = 0.05
+    claim_probability: float = 0.95
+    regression_columns: int = 320
 
     def __post_init__(self) -> None:
         plain(self)
@@ -71,6 +84,10 @@ class ModelConfig:
         one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
         at_least(self, 0, "seed", "work_per_step")
         at_least(self, 100, "history")
+        at_least(self, 0, "regression_columns")
+        for name in ("claim_error", "claim_probability"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise ConfigError(f"{name} must lie in (0, 1], got {getattr(self, name)}")
         features: object = self.features
         if not isinstance(features, (tuple, list)) or not all(isinstance(entry, str) for entry in features):
             raise ConfigError(f"features must be a tuple of names, such as ('trig',), got {features!r}")

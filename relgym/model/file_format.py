@@ -382,6 +382,7 @@ class PropertyRecord(Record):
     scope: ScopeRecord = field(default_factory=ScopeRecord)
     limits: LimitsRecord = field(default_factory=LimitsRecord)
     stops: StopsRecord = field(default_factory=StopsRecord)
+    latest: ModeOrNoise = 0
 
 
 class TargetModel(Record):
@@ -396,6 +397,39 @@ class HindsightRecord(Record):
 
     steps: Annotated[list[tuple[Count, Count]], Meta(max_length=200)]
     undecided: bool
+
+
+class CellRecord(Record):
+    """How one kind of predictions came out: its key, who speaks, trials and hits, bins of errors, and squares."""
+
+    key: tuple[int, int, int]
+    speaker: Annotated[int, Meta(ge=0, lt=6)]
+    trials: Weight
+    hits: Weight
+    run: int
+    errors: list[tuple[int, Weight]]
+    squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6, max_length=6)]
+
+
+class CalibrationRecord(Record):
+    """How right a target's predictions were, and what it changes by, in bins."""
+
+    trials: Count
+    changes: list[tuple[int, Weight]]
+    cells: list[CellRecord]
+
+
+class RegressionRecord(Record):
+    """Least squares on all numbers of a type: columns, targets, and for each kind rows, when due, and weights."""
+
+    names: list[Name]
+    seen: Count
+    targets: list[Name]
+    centre: list[float]
+    scale: list[float]
+    range: tuple[list[float], list[float]]
+    waiting: Annotated[list[tuple[list[float], list[float]]], Meta(max_length=64)]
+    ridges: Annotated[list[tuple[Count, Count, list[list[float]]]], Meta(max_length=2)]
 
 
 class TableRecord(Record):
@@ -507,7 +541,7 @@ class ScreenRecord(Record):
             Name,
             Name,
             Count,
-            Annotated[list[Amount], Meta(min_length=5, max_length=5)],
+            Annotated[list[Amount], Meta(min_length=6, max_length=6)],
             Annotated[list[Finite], Meta(max_length=10_000)],
             Count,
         ]
@@ -529,5 +563,7 @@ class Body(Record):
     looks: list[tuple[Name, Name, bool]] = []
     screen: ScreenRecord | None = None
     hindsight: dict[str, HindsightRecord] = {}
+    calibration: dict[str, CalibrationRecord] = {}
+    regressions: dict[str, RegressionRecord] = {}
     names: dict[str, Name] = {}
     report: ReportRecord = field(default_factory=ReportRecord)

@@ -230,6 +230,7 @@ class Percept:
     vectors: NDArray[np.float64]
     relations: Relations
     _situations: dict[int, Situation] = field(default_factory=dict)
+    regressed: dict[int, tuple[int, NDArray[np.float64] | None]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.vectors)
