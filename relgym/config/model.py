@@ -58,6 +58,10 @@ class ModelConfig:
         How probable it must be, after how such predictions came out, that a prediction is no further off than that,
         for it to be claimed (`Prediction.ok`). Default 0.95, range (0, 1]. Raising it claims less, and more of that
         is right. It counts only where predictions are looked back at, as wrappers and `WorldModel.fit` do.
+    claim_slips
+        Where more than this share of a property's latest predictions were claimed and off, only what is at least one
+        minus this probable is claimed. Default 0.005, range (0, 1]: of what is claimed, half a per cent is off in the
+        long run, though some kinds of predictions are less sure than that.
     regression_columns
         Regressions on all that a target may depend on are made on at most so many columns, squares and products
         included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.
@@ -74,6 +78,7 @@ class ModelConfig:
     history: int = 200_000
     claim_error: float = 0.05
     claim_probability: float = 0.95
+    claim_slips: float = 0.005
     regression_columns: int = 320
 
     def __post_init__(self) -> None:
@@ -85,7 +90,7 @@ class ModelConfig:
         at_least(self, 0, "seed", "work_per_step")
         at_least(self, 100, "history")
         at_least(self, 0, "regression_columns")
-        for name in ("claim_error", "claim_probability"):
+        for name in ("claim_error", "claim_probability", "claim_slips"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise ConfigError(f"{name} must lie in (0, 1], got {getattr(self, name)}")
         features: object = self.features

@@ -122,8 +122,18 @@ class Answers(StandIns):
 
     def claims(self, told: Judgement) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
-        sure = told.probability >= self.config.claim_probability or not self._record.trials
-        return told.speaker in (OWN, LATEST) and sure
+        if told.speaker not in (OWN, LATEST):
+            return False
+        least, slips = self.config.claim_probability, self.config.claim_slips
+        if self._record.slips > slips:
+            least = max(least, 1.0 - slips)
+        return told.probability >= least or not self._record.trials
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether no kind of its modes' predictions came true often enough to be claimed."""
+        kinds = [told for _, told in self._record.kinds(_PREDICTED)]
+        return bool(kinds) and not any(map(self.claims, kinds))
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]

@@ -14,7 +14,8 @@ cell
 A run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a law that changed is
 doubted at once, and a mode whose conditions were found is believed at once.
 
-A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
+A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`;
+where more than `ModelConfig.claim_slips` of a target's predictions were claimed and off lately, it must be that sure.
 Of a model that was never told how its predictions came out nothing is known, and nothing is doubted.
 """
 
@@ -73,10 +74,11 @@ class Key(NamedTuple):
 
 
 class Audit(NamedTuple):
-    """What is needed to look back at a prediction: its cell, and what each of `EXPERTS` said; NaN: nothing."""
+    """What looking back at a prediction needs: its cell, what each of `EXPERTS` said (NaN: nothing), and who spoke."""
 
     key: Key
     values: tuple[float, ...]
+    speaker: int = 0
 
 
 class Judgement(NamedTuple):
@@ -199,6 +201,7 @@ class Calibration:
         self.trials = 0
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
+        self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
         self._judged: dict[Key, tuple[tuple[int, ...], Judgement]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -211,6 +214,11 @@ class Calibration:
         A median, since a few crashes make most of the squares, and no outlier is to say what is right.
         """
         return _quantile({k: n for k, n in self._changes.items() if k != _EXACT}, 0.5)
+
+    @property
+    def slips(self) -> float:
+        """Share of the latest predictions that were claimed and off; of few, as if more had been right."""
+        return self._slips[1] / max(self._slips[0], 100.0)
 
     # ------------------------------------------------------------------ what is made of a prediction
     def judge(self, key: Key, values: Sequence[float]) -> Judgement:
@@ -248,7 +256,14 @@ class Calibration:
 
     # ------------------------------------------------------------------ how it came out
     def look_back(
-        self, audit: Audit, came: float, *, rounding: float, error: float, turn: float = 0.0
+        self,
+        audit: Audit,
+        came: float,
+        *,
+        claimed: bool,
+        rounding: float,
+        error: float,
+        turn: float = 0.0,
     ) -> None:
         """Take in how a prediction came out.
 
@@ -258,6 +273,8 @@ class Calibration:
             What was said.
         came
             What came.
+        claimed
+            Whether the prediction was a claim.
         rounding
             Errors up to this aren't told from none.
         error
@@ -271,6 +288,10 @@ class Calibration:
         self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
         spoke = self.judge(audit.key, audit.values).speaker
         within = max(rounding, error * self.change)
+        self._slips[0] += 1.0
+        self._slips[1] += claimed and errors[spoke] > within
+        if self._slips[0] > MEMORY:
+            self._slips = [0.5 * each for each in self._slips]
         for key in dict.fromkeys((_whole(audit.key), audit.key)):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(spoke)
@@ -296,10 +317,16 @@ class Calibration:
         """What follows is another model's word: only what mostly changes stays."""
         self._cells, self._judged, self.trials = {}, {}, 0
 
-    def share(self, outcome: int) -> tuple[float, float]:
-        """Trials of an outcome, and the share of them that were hits."""
-        whole = self._cells.get(Key(outcome, -1, -1))
-        return (0.0, math.nan) if whole is None else (whole.trials, whole.hits / max(whole.trials, 1.0))
+    def share(self, outcome: int) -> float:
+        """Share of an outcome's predictions that were hits lately; NaN where there were none."""
+        whole = self._cells.get(_whole(Key(outcome, 0, 0)))
+        return math.nan if whole is None or not whole.trials else whole.hits / whole.trials
+
+    def kinds(self, outcome: int) -> Iterator[tuple[float, Judgement]]:
+        """Trials of each kind of predictions of an outcome, and what is made of such a prediction."""
+        for key, cell in sorted(self._cells.items()):
+            if key.outcome == outcome and key != _whole(key):
+                yield cell.squares[PERSISTENCE][0], self._judge(key, tuple(range(len(EXPERTS))))
 
     def united(self, other: Calibration) -> Calibration:
         """What two models know together: cell by cell, the record of who looked back more often."""
@@ -315,6 +342,7 @@ class Calibration:
         """Plain data that `from_json` reads back."""
         return {
             "trials": self.trials,
+            "slips": list(self._slips),
             "changes": [[place, count] for place, count in sorted(self._changes.items())],
             "cells": [
                 {
@@ -335,6 +363,7 @@ class Calibration:
         """Read what `to_json` wrote."""
         found = cls()
         found.trials = int(data["trials"])
+        found._slips = [float(each) for each in data["slips"]]
         found._changes = {int(place): float(count) for place, count in data["changes"]}
         for each in data["cells"]:
             found._cells[Key(*map(int, each["key"]))] = _Cell(

@@ -144,6 +144,7 @@ def _check_calibration(body: Body, known: set[str]) -> None:
     for name, calibration in body.calibration.items():
         _require(name in known, "calibration", f"{name!r} is no target")
         _distinct([cell.key for cell in calibration.cells], "calibration")
+        _require(calibration.slips[1] <= calibration.slips[0], "calibration", "more slips than predictions")
         for cell in calibration.cells:
             _require(cell.hits <= cell.trials, "calibration", "more hits than trials")
         for bins in (calibration.changes, *(cell.errors for cell in calibration.cells)):

@@ -415,6 +415,7 @@ class CalibrationRecord(Record):
     """How right a target's predictions were, and what it changes by, in bins."""
 
     trials: Count
+    slips: tuple[Weight, Weight]
     changes: list[tuple[int, Weight]]
     cells: list[CellRecord]
 
@@ -541,7 +542,7 @@ class ScreenRecord(Record):
             Name,
             Name,
             Count,
-            Annotated[list[Amount], Meta(min_length=6, max_length=6)],
+            Annotated[list[Amount], Meta(min_length=5, max_length=5)],
             Annotated[list[Finite], Meta(max_length=10_000)],
             Count,
         ]

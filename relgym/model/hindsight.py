@@ -137,10 +137,9 @@ def look_back(
             error, noise = parts.config.claim_error, parts.config.clustering.noise_std
             if not isinstance(noise, str):  # who says how large the noise is takes it for granted
                 rounding = max(rounding, parts.config.clustering.inlier_stds * noise)
-            model.calibration.look_back(part.audit, came, rounding=rounding, error=error, turn=turn)
-            if math.isfinite(part.audit.values[OWN]):  # another one may have given the value
-                residual = came - part.audit.values[OWN]
-                residual = math.remainder(residual, turn) if turn else residual
+            model.calibration.look_back(
+                part.audit, came, claimed=part.ok, rounding=rounding, error=error, turn=turn
+            )
         if not abs(residual) <= rounding:
             off.add(pair)
         if not part.mode or parts.governs(target):
@@ -148,6 +147,9 @@ def look_back(
         if not off.isdisjoint(target.given) and not off.isdisjoint(model.needs):
             continue
         spread = SPREADS * part.spread if part.spread == part.spread else 0.0
+        if part.audit is not None and part.audit.speaker != OWN:  # another one gave the value, and the spread
+            residual, spread = came - part.audit.values[OWN], 0.0
+            residual = math.remainder(residual, turn) if turn else residual
         count = counts.setdefault(pair, [0, 0])
         count[0] += 1
         count[1] += not abs(residual) <= max(rounding, model.clusterer.scale.tolerance, spread)

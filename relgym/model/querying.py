@@ -85,7 +85,7 @@ def _settled(
         spread=spread,
         probability=told.probability,
         interval=told.interval,
-        audit=Audit(key, values),
+        audit=Audit(key, values, told.speaker),
     )
 
 

@@ -631,7 +631,7 @@ class WorldModel:
                     "save it again where it was learned"
                 )
             return doubted(self._stored[0], self._parts.models.values()).renamed(self.condition_names)
-        state = tuple((m.undecided, m.unexplained) for m in self._parts.models.values())
+        state = tuple((m.undecided, m.unexplained, m.calibration.trials) for m in self._parts.models.values())
         if self._rules is None or self._rules[0] != (self.seen, state):
             self._rules = (self.seen, state), rule_list(self)
         return self._rules[1].renamed(self.condition_names)

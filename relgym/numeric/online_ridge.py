@@ -98,11 +98,13 @@ class OnlineRidge:
         slope = np.where(alive, (self._moments[:, 1:] / n - level[:, None] * mean) / std_of, 0.0)
         solved = np.linalg.solve(scaled + (PENALTY / n) * np.eye(len(scaled)), slope.T).T / std_of
         if np.isfinite(solved).all():
-            self.weights = np.concatenate([(level - (solved * mean).sum(axis=1))[:, None], solved], axis=1)
+            level -= (solved * mean).sum(axis=1)
+            # Rows lie side by side in memory: so sums along them are taken in the same order, however many there are.
+            self.weights = np.ascontiguousarray(np.concatenate([level[:, None], solved], axis=1))
 
     def predict(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Responses of rows ``(n, d)``, shape ``(n, responses)``; of a row alone the same bits as among others."""
-        rows = np.concatenate([np.ones((len(x), 1)), x], axis=1)
+        rows = np.ascontiguousarray(np.concatenate([np.ones((len(x), 1)), x], axis=1))
         found = np.empty((len(x), len(self.weights)))
         if len(x) == 1:  # the same sums along the same axis
             found[0] = (self.weights * rows).sum(axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def stream(
 ) -> list[Transition]:
     rows = list(islice(world(np.random.default_rng(seed)), steps + 2))[1:]
     scenes = [schema.scene({"self": row, "action": ()}) for row in rows]
-    return [Transition(a, b) for a, b in zip(scenes, scenes[1:], strict=False)]
+    return [Transition(a, b) for a, b in pairwise(scenes)]
 
 
 def typical(steps: list[Transition], prop: str) -> float:
