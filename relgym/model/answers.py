@@ -89,7 +89,7 @@ class Answers(StandIns):
         self.limits = Limits()
         self.stops = Stops()
         self.hindsight = Hindsight()
-        self.calibration = Calibration()
+        self.calibration = Calibration(config.claim_probability)
         self.latest = NOISE
         self.leaned_on = False
 

@@ -6,7 +6,8 @@ that nothing changes. A learner that predicts before each step reports how each 
 cell
 
 - the expert who coded what came in fewest bits gives the value; another one takes over when it leads by
-  `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984);
+  `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984). A law that can be claimed keeps the word
+  where it is hardly worse;
 - the *probability* of being right is the posterior mean of the share of hits, its prior that of all cells of the
   outcome. A hit is off by no more than `ModelConfig.claim_error` of what mostly changes;
 - the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
@@ -23,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -37,6 +38,9 @@ since what decides may be hidden, and a law that changed stays changed; and that
 
 OWN, GUESS, LINEAR, LATEST, PERSISTENCE = 0, 1, 2, 4, 5
 
+_KNOWN: Final = (LINEAR, LINEAR + 1, PERSISTENCE)
+"""What anybody would try first."""
+
 _BY_DEFAULT: Final = (OWN, GUESS, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
 
@@ -48,6 +52,9 @@ MEMORY: Final = 1024
 
 FEW: Final = 32
 """In a cell of fewer trials what all cells of the outcome say counts."""
+
+LEAVE: Final = 1.1
+"""A law that can be claimed, and read, may leave so much more than regressions and persistence (root mean square)."""
 
 PRIOR: Final = 1.0
 """Trials that the prior of a share counts for, as Jeffreys' does."""
@@ -125,23 +132,18 @@ def _bins(margins: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 @dataclass(slots=True)
-class _Cell:
-    """Trials of one kind, the older ones counting less."""
+class _Record:
+    """How one expert's values came out, the older ones counting less."""
 
-    speaker: int
-    trials: float
-    hits: float
-    run: int  # of hits (> 0) or misses (< 0), up to now
-    errors: dict[int, float]  # trials by bin of the speaker's error
-    squares: list[
-        list[float]
-    ]  # for each expert: trials, its squares, those of persistence in the same trials
+    trials: float = 0.0
+    hits: float = 0.0
+    run: int = 0  # of hits (> 0) or misses (< 0), up to now
+    errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
 
-    @classmethod
-    def new(cls, speaker: int) -> _Cell:
-        return cls(speaker, 0.0, 0.0, 0, {}, [[0.0, 0.0, 0.0] for _ in EXPERTS])
-
-    def count(self, hit: bool) -> None:
+    def count(self, error: float, within: float) -> None:
+        """Take in an error; it is a hit if it is no larger than so much."""
+        self.errors = _counted(self.errors, _place(error))
+        hit = error <= within
         if hit != (self.run > 0):
             self.run = 0
         self.run += 1 if hit else -1
@@ -156,11 +158,30 @@ class _Cell:
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
 
-    def note(self, place: int) -> None:
-        self.errors = _counted(self.errors, place)
+    def share(self, prior: float) -> float:
+        """Posterior mean of the share of hits."""
+        return (self.hits + prior * PRIOR) / (self.trials + PRIOR)
 
-    def compare(self, errors: Sequence[float]) -> None:
+
+@dataclass(slots=True)
+class _Cell:
+    """Predictions of one kind."""
+
+    speaker: int
+    records: dict[int, _Record]  # of the winner and of the speaker
+    squares: list[
+        list[float]
+    ]  # for each expert: trials, its squares, those of persistence in the same trials
+
+    @classmethod
+    def new(cls, speaker: int) -> _Cell:
+        return cls(speaker, {}, [[0.0, 0.0, 0.0] for _ in EXPERTS])
+
+    def count(self, errors: Sequence[float], within: float) -> None:
         """Take in what each expert was off by; the best one speaks, if it leads by enough."""
+        for expert in sorted({OWN, self.speaker}):
+            if errors[expert] == errors[expert]:
+                self.records.setdefault(expert, _Record()).count(errors[expert], within)
         base = errors[PERSISTENCE] ** 2
         for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
@@ -171,8 +192,8 @@ class _Cell:
                 sums[2] += base
         best = min(range(len(EXPERTS)), key=self.left)
         if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
+            self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
-            self.trials, self.hits, self.run, self.errors = 0.0, 0.0, 0, {}
 
     def left(self, expert: int) -> float:
         """Squares left of what saying that nothing changes leaves; infinite if the expert was never heard."""
@@ -187,9 +208,21 @@ class _Cell:
         ratio = self.left(other) / self.left(expert)
         return 0.5 * trials * math.log2(min(max(ratio, 1e-300), 1e300))
 
+    def preferred(self, probability: float) -> int:
+        """Who speaks: the winner where that can be claimed and leaves hardly more than what anybody would try."""
+        own = self.records.get(OWN)
+        near = self.left(OWN) <= LEAVE * LEAVE * min(map(self.left, _KNOWN))
+        return OWN if own is not None and near and own.share(0.5) >= probability else self.speaker
+
 
 class Calibration:
     """The record of one target's predictions.
+
+    Parameters
+    ----------
+    probability
+        How probable it must be that what the winner says is right, for it to be claimed
+        (`ModelConfig.claim_probability`).
 
     Attributes
     ----------
@@ -197,7 +230,8 @@ class Calibration:
         Predictions that somebody looked back at.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, probability: float = 0.95) -> None:
+        self.probability = probability
         self.trials = 0
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
@@ -244,15 +278,18 @@ class Calibration:
         if whole is None:
             return Judgement(default, math.nan if not self.trials else 0.5, math.nan, math.nan)
         trusted = cell if cell is not None and cell.squares[PERSISTENCE][0] >= FEW else whole
-        if trusted.speaker not in able:
+        speaker = trusted.preferred(self.probability)
+        if speaker not in able:
             return Judgement(default, 0.0, math.nan, math.nan)
-        share = (whole.hits + 0.5 * PRIOR) / (whole.trials + PRIOR)
-        if cell is not None and cell.speaker == trusted.speaker:
-            share = (cell.hits + share * PRIOR) / (cell.trials + PRIOR)
-        trials, own, _ = trusted.squares[trusted.speaker]
-        spread = math.sqrt(own / trials) if trials else math.nan
-        half = _quantile(trusted.errors, COVERED) if sum(trusted.errors.values()) >= ENOUGH else math.nan
-        return Judgement(trusted.speaker, share, half, spread)
+        share = 0.5
+        for each in (whole, cell):
+            if each is not None and speaker in each.records:
+                share = each.records[speaker].share(share)
+        record = trusted.records.get(speaker)
+        few = record is None or sum(record.errors.values()) < ENOUGH
+        half = math.nan if record is None or few else _quantile(record.errors, COVERED)
+        trials, own, _ = trusted.squares[speaker]
+        return Judgement(speaker, share, half, math.sqrt(own / trials) if trials else math.nan)
 
     # ------------------------------------------------------------------ how it came out
     def look_back(
@@ -295,12 +332,7 @@ class Calibration:
         for key in dict.fromkeys((_whole(audit.key), audit.key)):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(spoke)
-            cell = self._cells[key]
-            said = errors[cell.speaker]
-            if said == said:
-                cell.count(said <= within)
-                cell.note(_place(said))
-            cell.compare(errors)
+            self._cells[key].count(errors, within)
         self._judged.clear()
 
     def keep(self, modes: Collection[int]) -> None:
@@ -311,7 +343,7 @@ class Calibration:
     def doubts(self, outcome: int, probability: float) -> bool:
         """Whether what won the vote was right less often than that, or the mode that held last speaks instead."""
         whole = self._cells.get(Key(outcome, -1, -1))
-        return whole is not None and (whole.speaker != OWN or whole.hits < probability * whole.trials)
+        return whole is not None and (whole.speaker != OWN or self.share(outcome) < probability)
 
     def forget(self) -> None:
         """What follows is another model's word: only what mostly changes stays."""
@@ -320,7 +352,8 @@ class Calibration:
     def share(self, outcome: int) -> float:
         """Share of an outcome's predictions that were hits lately; NaN where there were none."""
         whole = self._cells.get(_whole(Key(outcome, 0, 0)))
-        return math.nan if whole is None or not whole.trials else whole.hits / whole.trials
+        own = None if whole is None else whole.records.get(OWN)
+        return math.nan if own is None or not own.trials else own.hits / own.trials
 
     def kinds(self, outcome: int) -> Iterator[tuple[float, Judgement]]:
         """Trials of each kind of predictions of an outcome, and what is made of such a prediction."""
@@ -331,8 +364,8 @@ class Calibration:
     def united(self, other: Calibration) -> Calibration:
         """What two models know together: cell by cell, the record of who looked back more often."""
         more, less = (self, other) if self.trials >= other.trials else (other, self)
-        found = Calibration.from_json(more.to_json())
-        for key, cell in Calibration.from_json(less.to_json())._cells.items():
+        found = Calibration.from_json(more.to_json(), self.probability)
+        for key, cell in Calibration.from_json(less.to_json(), self.probability)._cells.items():
             found._cells.setdefault(key, cell)
         found.trials = self.trials + other.trials
         return found
@@ -348,10 +381,10 @@ class Calibration:
                 {
                     "key": list(key),
                     "speaker": cell.speaker,
-                    "trials": cell.trials,
-                    "hits": cell.hits,
-                    "run": cell.run,
-                    "errors": [[place, count] for place, count in sorted(cell.errors.items())],
+                    "records": [
+                        [who, r.trials, r.hits, r.run, [[k, n] for k, n in sorted(r.errors.items())]]
+                        for who, r in sorted(cell.records.items())
+                    ],
                     "squares": [list(sums) for sums in cell.squares],
                 }
                 for key, cell in sorted(self._cells.items())
@@ -359,21 +392,19 @@ class Calibration:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Calibration:
+    def from_json(cls, data: Mapping[str, Any], probability: float) -> Calibration:
         """Read what `to_json` wrote."""
-        found = cls()
+        found = cls(probability)
         found.trials = int(data["trials"])
         found._slips = [float(each) for each in data["slips"]]
         found._changes = {int(place): float(count) for place, count in data["changes"]}
         for each in data["cells"]:
-            found._cells[Key(*map(int, each["key"]))] = _Cell(
-                int(each["speaker"]),
-                float(each["trials"]),
-                float(each["hits"]),
-                int(each["run"]),
-                {int(place): float(count) for place, count in each["errors"]},
-                [[float(s) for s in sums] for sums in each["squares"]],
-            )
+            records = {
+                int(who): _Record(float(n), float(hits), int(run), {int(k): float(c) for k, c in bins})
+                for who, n, hits, run, bins in each["records"]
+            }
+            squares = [[float(s) for s in sums] for sums in each["squares"]]
+            found._cells[Key(*map(int, each["key"]))] = _Cell(int(each["speaker"]), records, squares)
         return found
 
 

@@ -145,9 +145,13 @@ def _check_calibration(body: Body, known: set[str]) -> None:
         _require(name in known, "calibration", f"{name!r} is no target")
         _distinct([cell.key for cell in calibration.cells], "calibration")
         _require(calibration.slips[1] <= calibration.slips[0], "calibration", "more slips than predictions")
+        records = [record for cell in calibration.cells for record in cell.records]
         for cell in calibration.cells:
-            _require(cell.hits <= cell.trials, "calibration", "more hits than trials")
-        for bins in (calibration.changes, *(cell.errors for cell in calibration.cells)):
+            _distinct([who for who, *_ in cell.records], "calibration")
+        _require(
+            all(hits <= trials for _, trials, hits, _, _ in records), "calibration", "more hits than trials"
+        )
+        for bins in (calibration.changes, *(record[-1] for record in records)):
             _distinct([place for place, _ in bins], "calibration")
             _require(all(-(1 << 14) <= place < 1 << 12 for place, _ in bins), "calibration", "no such size")
 

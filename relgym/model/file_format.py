@@ -399,15 +399,22 @@ class HindsightRecord(Record):
     undecided: bool
 
 
+Expert: TypeAlias = Annotated[
+    int, Meta(ge=0, lt=6, description="who gave a value, as a place among all experts")
+]
+Bins: TypeAlias = list[tuple[int, Weight]]
+
+
 class CellRecord(Record):
-    """How one kind of predictions came out: its key, who speaks, trials and hits, bins of errors, and squares."""
+    """How one kind of predictions came out: its key, who speaks, and of every expert what it left.
+
+    A record is an expert, trials, hits, the run under way and bins of errors; squares are trials, the expert's own and
+    those of saying that nothing changes.
+    """
 
     key: tuple[int, int, int]
-    speaker: Annotated[int, Meta(ge=0, lt=6)]
-    trials: Weight
-    hits: Weight
-    run: int
-    errors: list[tuple[int, Weight]]
+    speaker: Expert
+    records: list[tuple[Expert, Weight, Weight, int, Bins]]
     squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6, max_length=6)]
 
 
@@ -416,7 +423,7 @@ class CalibrationRecord(Record):
 
     trials: Count
     slips: tuple[Weight, Weight]
-    changes: list[tuple[int, Weight]]
+    changes: Bins
     cells: list[CellRecord]
 
 

@@ -180,4 +180,6 @@ def restore_calibration(parts: Parts, data: Mapping[str, Any]) -> None:
     """Take over what `calibration_to_json` wrote."""
     for target in parts.targets:
         if str(target) in data:
-            parts.models[target].calibration = Calibration.from_json(data[str(target)])
+            parts.models[target].calibration = Calibration.from_json(
+                data[str(target)], parts.config.claim_probability
+            )
