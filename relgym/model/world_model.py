@@ -22,7 +22,13 @@ from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
 from relgym.model.fitting import Progress, as_transitions, progressive, transitions_of
-from relgym.model.hindsight import hindsight_to_json, look_back, restore_hindsight
+from relgym.model.hindsight import (
+    calibration_to_json,
+    hindsight_to_json,
+    look_back,
+    restore_calibration,
+    restore_hindsight,
+)
 from relgym.model.journal import Journal
 from relgym.model.learning import LearnReport, finish, learn
 from relgym.model.locality import (
@@ -658,7 +664,7 @@ class WorldModel:
                     "save it again where it was learned"
                 )
             return doubted(self._stored[0], self._parts.models.values()).renamed(self.condition_names)
-        state = tuple((m.undecided, m.unexplained) for m in self._parts.models.values())
+        state = tuple((m.undecided, m.unexplained, m.calibration.trials) for m in self._parts.models.values())
         if self._rules is None or self._rules[0] != (self.seen, state):
             self._rules = (self.seen, state), rule_list(self)
         return self._rules[1].renamed(self.condition_names)
@@ -779,7 +785,9 @@ class WorldModel:
         body = self.to_json(history=history) | {"extra": self.extra if extra is None else extra}
         known = hindsight_to_json(self._parts)
         body |= {"names": self.condition_names} if self.condition_names else {}
-        return body | {"hindsight": known} if known else body
+        body |= {"hindsight": known} if known else {}
+        stated = calibration_to_json(self._parts)
+        return body | {"calibration": stated} if stated else body
 
     def _report(self) -> dict[str, Any]:
         """What can't be told without the history: rules, as text, and advice."""
@@ -845,6 +853,7 @@ class WorldModel:
         try:
             parts = parts_from_json(body, arrays)
             restore_hindsight(parts, body.get("hindsight", {}))
+            restore_calibration(parts, body.get("calibration", {}))
             model = cls(parts.schema, parts.config, targets=())
             model._state, model.seen, model.frozen = parts, body["seen"], arrays is None
             model.extra, model.condition_names = body["extra"], dict(body.get("names", {}))

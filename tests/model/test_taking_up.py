@@ -5,7 +5,7 @@ from __future__ import annotations
 import gymnasium as gym
 import pytest
 
-import relgym  # noqa: F401  (registers the ids)
+import relgym
 from relgym.model.archive import parts_to_arrays, parts_to_json
 from relgym.model.fitting import compare_and_learn
 from relgym.model.motion import Laws
