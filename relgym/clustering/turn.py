@@ -26,7 +26,7 @@ class Search:
     failures: int = 0
 
 
-COLUMNS = 3_000
+COLUMNS = 1_500
 """Searches of one step look at no more columns than this together, some tenths of a second; one is always made."""
 
 
