@@ -647,14 +647,7 @@ def _check_history(body: Body, parts: Parts, targets: Sequence[Target], arrays: 
     if body.laws is not None:
         stores = ["contacts", *(f"free{k}" for k in range(len(body.laws.laws.learners or ())))]
         expected |= {f"laws.{store}.{name}" for store in stores for name in ("rows", "cells")}
-    for k, (_, regression) in enumerate(sorted(body.regressions.items())):
-        for number, (_, _, weights) in enumerate(regression.ridges):
-            at = f"regression{k}"
-            expected |= {f"{at}.gram{number}", f"{at}.moments{number}"}
-            width = len(weights[0]) if weights else 0
-            _require(weights, at, "expected weights")
-            for name, shape in (("gram", (width, width)), ("moments", (len(weights), width))):
-                _rows(arrays, f"{at}.{name}{number}", "float64", shape)
+    expected |= _check_regression_shapes(body, arrays)
     _require(
         set(arrays) == expected,
         "history",
@@ -669,14 +662,27 @@ def _check_history(body: Body, parts: Parts, targets: Sequence[Target], arrays: 
     for k, (part, target) in enumerate(zip(body.targets, targets, strict=True)):
         most = _rows(arrays, f"table{types.index(target.type)}.serial", "int64", (None,))
         _check_target_shapes(part.model, most, arrays, f"target{k}")
-    for name in expected:
-        if name.startswith("regression"):
-            _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
     for k, (name, table) in enumerate(zip(types, body.tables, strict=True)):
         _check_table(table, signatures[name], arrays, f"table{k}")
     for k, (part, target) in enumerate(zip(body.targets, targets, strict=True)):
         table_at = f"table{types.index(target.type)}"
         _check_examples(part.model, target, signatures[target.type], arrays, table_at, f"target{k}")
+
+
+def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
+    """Names of the arrays of regressions, whose shapes and numbers are such as they must be."""
+    names: set[str] = set()
+    for k, (_, regression) in enumerate(sorted(body.regressions.items())):
+        for number, (_, _, weights) in enumerate(regression.ridges):
+            _require(weights, f"regression{k}", "expected weights")
+            width = len(weights[0])
+            shapes = {f"gram{number}": (width, width), f"moments{number}": (len(weights), width)}
+            for part, shape in shapes.items():
+                name = f"regression{k}.{part}"
+                _rows(arrays, name, "float64", shape)
+                _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
+                names.add(name)
+    return names
 
 
 _TABLE: Final = ("x", "signature", "stratum", "bodies", "serial")
