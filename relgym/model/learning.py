@@ -17,7 +17,7 @@ from relgym.model.perception import Percept
 from relgym.model.prediction import ScenePrediction
 from relgym.model.property_model import bodies_of
 from relgym.model.scenes import next_values, stays, unwrapped
-from relgym.scene.objects import Target, Transition
+from relgym.scene.objects import TASK, Target, Transition
 from relgym.scheduling.agenda import Budget
 
 __all__ = ["LearnReport", "finish", "learn"]
@@ -166,11 +166,18 @@ def _learn_object(
     bodies = bodies_of(situation.order[0], layout)
     row = table.add(situation.signature, x, situation.keys[0], bodies)
     example = replace(situation.examples[0], key=situation.keys[0])
+    changes: dict[str, float] = {}
+    rough = False
     for target in parts.targets:
         if target.type == type_name:
-            y = float(following[layout.column(index, target.property)])
+            column = layout.column(index, target.property)
+            y = float(following[column])
+            rough |= parts.models[target].rough
+            changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
             report = parts.models[target].learn_one(table, row, y, situation, example, budget)
             reports[layout.names[index], target.property] = report
+    if rough:
+        parts.regressions[type_name].learn_one(situation.signature, x, changes)
 
 
 def _refresh(parts: Parts, budget: Budget) -> int:

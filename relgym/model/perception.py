@@ -245,6 +245,7 @@ class Percept:
     vectors: NDArray[np.float64]
     _relations: Relations | None = None
     _situations: dict[int, Situation] = field(default_factory=dict)
+    regressed: dict[int, tuple[int, NDArray[np.float64] | None]] = field(default_factory=dict)
 
     @property
     def relations(self) -> Relations:

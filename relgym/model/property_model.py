@@ -117,6 +117,8 @@ class PropertyModel(Answers):
         """
         self._compare(situation, example, table.x[row], y)
         report = self.clusterer.learn_one(table, row, y, budget)
+        if report.mode != NOISE and self.latest not in report.fits:
+            self.latest = report.mode
         self._unexplained = self._assess()
         if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
             self._measure(table)
@@ -238,6 +240,7 @@ class PropertyModel(Answers):
         self.casting = Casting(self._base, self.config.classification)
         self.guesses.drop()
         self.hindsight = Hindsight()  # what follows is another model's word
+        self.calibration.forget()
         self._follow(table)
         self._widen(table, self.classifier.vocabulary.follows)
 
@@ -269,6 +272,7 @@ class PropertyModel(Answers):
         fits = fits[:, [not self.bounds(i) for i in known]]
         values = self._values_many(table, self.clusterer.rows[numbers], ids)
         labels = self.clusterer.labels[numbers].astype(np.int64)
+        self.calibration.keep(ids)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self._recast(table, self.classifier.exemplars)
@@ -288,6 +292,7 @@ class PropertyModel(Answers):
             "guess": self.guesses.to_json(),
             "spreads": self.spreads.to_json(),
             "scope": self.scope.to_json(),
+            "latest": self.latest,
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
             "limits": self.limits.to_json(),
@@ -305,6 +310,7 @@ class PropertyModel(Answers):
         self.guesses = Guesses.from_json(self.target, data.get("guess", {}))
         self.spreads = Spreads.from_json(data["spreads"])
         self.scope = Scope.from_json(data.get("scope", {}))
+        self.latest = int(data.get("latest", NOISE))
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))

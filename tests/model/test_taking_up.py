@@ -1,4 +1,4 @@
-"""What came as predicted is only counted and offered to what is kept: the model is as if it had been studied."""
+"""What came as predicted is counted and offered to what is kept: the model is as if it had been studied."""
 
 from __future__ import annotations
 
