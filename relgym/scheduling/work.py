@@ -110,18 +110,14 @@ class Task(Generic[T]):
             self._start()
         assert self._steps is not None
         spent = 0
-        while not self.done and spent < budget:
-            spent += self._piece(self._steps)
+        while spent < budget:
+            try:
+                spent += next(self._steps)
+            except StopIteration as end:
+                self.done, self.result = True, end.value
+                break
+            self.pieces += 1
         return spent
-
-    def _piece(self, steps: Steps[T]) -> int:
-        try:
-            cells = next(steps)
-        except StopIteration as end:
-            self.done, self.result = True, end.value
-            return 0
-        self.pieces += 1
-        return cells
 
     def _start(self) -> None:
         kwargs = dict(self._kwargs)
