@@ -282,11 +282,10 @@ class BatchStepEvaluator:
         ConfigError
             A reward is not finite, or a function returns another shape.
         """
+        told: tuple[Any, Any] = self.reward, self.terminated
         if self.both is not None:
             outcome = self.both(self.layout, before, actions, after)
             told = (lambda *_: outcome.rewards), (lambda *_: outcome.terminated)
-        else:
-            told = self.reward, self.terminated
         rewards = self._verdicts("reward", told[0], before, actions, after, doubts=self.doubts)
         return rewards, self._verdicts("terminated", told[1], before, actions, after) > _ENDED
 

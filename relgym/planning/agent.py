@@ -16,19 +16,20 @@ from relgym.envs.arguments import checked_count, checked_least
 from relgym.envs.learned_model_rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.planning.exploration import Coverage, relative_columns
+from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
 from relgym.planning.review import learned_again, right
 from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
-from relgym.planning.simulators import ModelSimulator
+from relgym.planning.simulators import ModelSimulator, Simulator
 from relgym.planning.tree import TreeSearch
-from relgym.scene.objects import TASK, Float1D, Scene
+from relgym.scene.objects import Float1D, Scene
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.sb3.acceptance import Spread
 from relgym.wrappers.sb3.config import DynaConfig
+from relgym.wrappers.sb3.lens import Lens
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
-from relgym.wrappers.sb3.stock import changing
+from relgym.wrappers.sb3.stock import DreamModel, changing
 from relgym.wrappers.sb3.trainer import ModelTrainer
 from relgym.wrappers.views import ViewLike
 
@@ -81,8 +82,14 @@ class PlanningAgent:
         (root mean square so far); 0: it does what the model says pays. Steps of unknown outcome count as entirely new.
     discount
         Of each decision: what comes sooner is surer, and episodes may be cut short.
+    safe
+        Whether `predict` stays where it has been: what no real step has shown counts as unknown (`Familiar`), and no
+        action of unknown outcome is taken while there is another. `learn` explores all the same.
     commit, tolerance, seed
         As for `Planner`.
+    simulator
+        Function from what has been learned to where plans are searched for; default: a `ModelSimulator`, of a
+        `WorldModel`. Other models need one.
 
     Attributes
     ----------
@@ -102,10 +109,13 @@ class PlanningAgent:
     8
     """
 
+    DISCOUNT: Final = 0.97
+    """Of each decision, unless the user says otherwise: some thirty decisions ahead count."""
+
     def __init__(
         self,
         env: gym.Env[Any, Any],
-        model: WorldModel | None = None,
+        model: DreamModel | None = None,
         *,
         config: ModelConfig | None = None,
         task: Any = "learned",
@@ -114,10 +124,12 @@ class PlanningAgent:
         repeat: int = 1,
         random_steps: int = 150,
         exploration: float = 0.5,
-        discount: float = 0.97,
+        discount: float = DISCOUNT,
+        safe: bool = False,
         commit: int | None = None,
         tolerance: float = 1e-6,
         seed: int = 0,
+        simulator: Callable[[ModelTrainer], Simulator] | None = None,
     ) -> None:
         self._recorder = TransitionRecorder(env, view=view)
         self.repeat = checked_count("repeat", repeat, 1, 10**6)
@@ -125,16 +137,19 @@ class PlanningAgent:
             ActionRepeat(self._recorder, self.repeat) if repeat > 1 else self._recorder
         )
         self.exploration = checked_least("exploration", exploration, 0.0)
-        self.discount = Objective(discount=discount).discount
+        self.discount, self.safe = Objective(discount=discount).discount, safe
         if model is None:
             model = WorldModel(self._recorder.view.schema, config)
         self.trainer = ModelTrainer(
             model, _task(task, env), DynaConfig(shuffle=0, seed=checked_count("seed", seed, 0, 2**31))
         )
+        adopt = getattr(self.trainer.reward_model, "adopt", None)
+        if adopt is not None:  # it is asked about actions as the env understands them
+            adopt(Lens(self._recorder).acting)
         self.random_steps = checked_count("random_steps", random_steps, 0, 10**9)
         self.coverage: Coverage | None = None
         self.steps = 0
-        self._like = env
+        self._like, self._simulator = env, simulator
         self._search = TreeSearch() if search is None else search
         self._options = {"commit": commit, "tolerance": tolerance, "seed": seed}
         self._rng = np.random.default_rng([seed, 5])
@@ -143,18 +158,22 @@ class PlanningAgent:
         self._at_random = True
         self._next_review = max(self.random_steps, 50)
         self._size = Spread()
+        self._limit: int | None = None
         self._hold = 1
         self._held: tuple[int, Any] = (0, None)
         self._thread: PlannerState | None = None
         self._observation: Any = None
-        self._planner: Planner | None = None
+        self._planners: dict[bool, tuple[Any, Planner]] = {}
 
     @property
-    def model(self) -> WorldModel:
-        """The model at work."""
-        model = self.trainer.model
-        assert isinstance(model, WorldModel), "made by the agent, or checked by the trainer"
-        return model
+    def model(self) -> Any:
+        """The model at work: a `WorldModel`, unless another one was passed."""
+        return self.trainer.model
+
+    @property
+    def ready(self) -> bool:
+        """Whether the steps at random are over and there is a model to plan in."""
+        return self.steps >= self.random_steps and bool(self.model.targets)
 
     @property
     def doubt(self) -> float:
@@ -177,17 +196,34 @@ class PlanningAgent:
         QueryError
             The model knows none of its targets yet.
         """
-        simulator = ModelSimulator(
-            self.model,
-            self._like,
-            task=cast(TaskFunctions, self.trainer.reward_model),
-            repeat=self.repeat,
-        )
+        if self._simulator is not None:
+            simulator: Simulator = self._simulator(self.trainer)
+        else:
+            task = cast(TaskFunctions, self.trainer.reward_model)
+            simulator = ModelSimulator(
+                self.model, self._like, view=self._recorder.view, task=task, repeat=self.repeat
+            )
+        safe = self.safe and not explores
+        if safe and self.coverage is not None:
+            simulator = Familiar(simulator, self.coverage)
+        objective, options = self._objective(explores=explores), {"safe": safe, "limit": self._limit}
+        return Planner(simulator, self._search, objective, **options, **self._options)  # type: ignore[arg-type]
+
+    def _objective(self, *, explores: bool) -> Objective:
         objective = Objective(discount=self.discount)
         if explores and self.exploration > 0.0 and self.coverage is not None:
             weight = self.exploration * (self._size.scale or 1.0)
-            objective = replace(objective, bonus=self.coverage.bonus(weight), curiosity=weight)
-        return Planner(simulator, self._search, objective, **self._options)  # type: ignore[arg-type]
+            return replace(objective, bonus=self.coverage.bonus(weight), curiosity=weight)
+        return objective
+
+    def _at_work(self, *, explores: bool) -> Planner:
+        """The planner for what has been learned by now; made anew only when another model takes over."""
+        found = self._planners.get(explores)
+        if found is None or found[0] is not self.model:
+            found = self._planners[explores] = self.model, self.planner(explores=explores)
+        planner = found[1]
+        planner.objective, planner.limit = self._objective(explores=explores), self._limit
+        return planner
 
     def learn(
         self, total_steps: int, callback: Callable[[PlanningAgent], bool | None] | None = None
@@ -211,6 +247,11 @@ class PlanningAgent:
             self._observation, _, terminated, truncated, _ = self.env.step(action)
             for real in self._recorder.take():
                 self._take_up(real)
+            assert self._thread is not None, "made with the episode"
+            if self._at_random:
+                self._thread.decisions += 1
+            if truncated:  # so long, then, an episode may last
+                self._limit = max(self._limit or 1, self._thread.decisions)
             if terminated or truncated:
                 self._observation = None
             if callback is not None and callback(self) is False:
@@ -225,9 +266,7 @@ class PlanningAgent:
         deterministic: bool = True,
     ) -> tuple[Any, States]:
         """Choose what pays; as `Planner.predict`."""
-        if self._planner is None or self._planner.simulator.model is not self.model:  # type: ignore[attr-defined]
-            self._planner = self.planner()
-        return self._planner.predict(observation, state, episode_start, deterministic)
+        return self._at_work(explores=False).predict(observation, state, episode_start, deterministic)
 
     def _choose(self, observation: Any) -> Any:
         """A random action at first and while nothing is known; then the next of a plan."""
@@ -235,7 +274,7 @@ class PlanningAgent:
             return self._random()
         assert self._thread is not None, "made with the episode"
         try:
-            action = self.planner(explores=True).act(observation, self._thread)
+            action = self._at_work(explores=True).act(observation, self._thread)
         except QueryError:  # no target known yet
             return self._random()
         plan = self._thread.plan
@@ -297,7 +336,7 @@ class PlanningAgent:
         latest of them before it learns those, too.
         """
         self._next_review = int(self.steps * _GROWTH) + 1
-        if self.model.frozen or not any(self._wrong):
+        if not isinstance(self.model, WorldModel) or self.model.frozen or not any(self._wrong):
             return
         seen = [real.transition for real in self._history]
         count = min(len(self._wrong), len(seen) // 5)

@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Final
 
+import gymnasium as gym
 import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
+from relgym.envs.arguments import checked_least
 from relgym.errors import ConfigError
-from relgym.scene.objects import POSE, TASK, Float1D, Float2D, SceneLayout
+from relgym.planning.simulators import Simulator, Steps
+from relgym.scene.objects import POSE, TASK, Float1D, Float2D, Scene, SceneLayout
+from relgym.wrappers.views import ViewLike, recordable, view_of
 
-__all__ = ["Coverage", "relative_columns"]
+__all__ = ["Coverage", "Explore", "Familiar", "relative_columns"]
 
 _OCTAVES: Final = 6
 """Values are told apart by sign and power of two, down to this many powers below the largest one seen; below it they
@@ -68,7 +74,9 @@ class Coverage:
         self._paid: dict[bytes, tuple[float, int]] = {}
         self._largest = np.zeros(len(pairs))
         self._varying = varying
-        self._active = np.zeros(len(pairs), dtype=np.bool_) if varying else np.ones(len(pairs), dtype=np.bool_)
+        self._active = (
+            np.zeros(len(pairs), dtype=np.bool_) if varying else np.ones(len(pairs), dtype=np.bool_)
+        )
         self._lay_out()
 
     def __len__(self) -> int:
@@ -120,6 +128,15 @@ class Coverage:
         at = np.arange(len(self._first)), cells[:, self._first], cells[:, self._second]
         fresh: Float1D = ((self._counts[at] == 0) | self._open[at]).mean(axis=1)
         return fresh
+
+    def familiar(self, states: Float2D) -> NDArray[np.bool_]:
+        """Whether every value of n states, each by itself, was seen before; shape ``(n,)``."""
+        alone = np.flatnonzero(self._first == self._second)
+        if not len(alone):
+            return np.ones(len(states), dtype=np.bool_)
+        cells = self._cells(self._values(states))[:, self._active]
+        seen = self._counts[alone, cells, cells] > 0
+        return np.asarray(seen.all(axis=1), dtype=np.bool_)
 
     def surplus(self, states: Float2D) -> Float1D:
         """What is expected beyond what the model can account for, of n states; shape ``(n,)``.
@@ -174,6 +191,116 @@ class Coverage:
         level = np.clip(octave, 0, _OCTAVES + 1).astype(np.intp)
         found: NDArray[np.intp] = _OCTAVES + 1 + np.sign(rows).astype(np.intp) * level
         return found
+
+
+class Familiar:
+    """A simulator that knows the outcomes only of steps into what is familiar: for agents that must not err.
+
+    A law says what will happen where nothing like it was ever seen, too: that the road goes on behind the edge. So steps
+    to values that no real step has shown (`Coverage.familiar`), such as a distance smaller than any so far, count as
+    of unknown outcome.
+
+    Parameters
+    ----------
+    simulator
+        What predicts.
+    coverage
+        What was seen; live.
+    """
+
+    def __init__(self, simulator: Simulator, coverage: Coverage) -> None:
+        self._simulator, self._coverage = simulator, coverage
+
+    @property
+    def action_space(self) -> gym.spaces.Space[Any]:
+        """Space of one action."""
+        return self._simulator.action_space
+
+    @property
+    def observation_space(self) -> gym.spaces.Space[Any]:
+        """Space of one observation."""
+        return self._simulator.observation_space
+
+    def state(self, observation: Any) -> Float1D:
+        """State vector that an observation (or a `Scene`) shows."""
+        return self._simulator.state(observation)
+
+    def prepare(self) -> None:
+        """As the simulator's."""
+        self._simulator.prepare()
+
+    def step(self, states: Float2D, actions: NDArray[Any]) -> Steps:
+        """Follow n actions from n states."""
+        stepped = self._simulator.step(states, actions)
+        known = stepped.known & self._coverage.familiar(stepped.states)
+        after = np.where(known[:, None], stepped.states, states)
+        return Steps(after, np.where(known, stepped.rewards, 0.0), stepped.terminated & known, known)
+
+
+class Explore(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """Says of every step how new the scene is that it led to: for agents of any kind, and for collecting data.
+
+    The novelty, in [0, 1], is in ``info["novelty"]``; with a `weight` so many times as much is added to the reward.
+
+    Parameters
+    ----------
+    env
+        As for `relgym.wrappers.ModelLearner`.
+    weight
+        Of the novelty in the reward; 0: rewards stay as they are.
+    view
+        How observations become scenes, as for `relgym.wrappers.ModelLearner`.
+
+    Attributes
+    ----------
+    coverage : Coverage or None
+        What has been seen; made with the first step.
+
+    Examples
+    --------
+    >>> import gymnasium as gym, relgym
+    >>> from relgym.planning import Explore
+    >>> env = Explore(gym.make("relgym/TruckPush-v0"), weight=0.1)
+    >>> _ = env.reset(seed=0)
+    >>> *_, info = env.step(env.action_space.sample())
+    >>> 0.0 <= info["novelty"] <= 1.0
+    True
+    """
+
+    def __init__(self, env: gym.Env[Any, Any], *, weight: float = 0.0, view: ViewLike = None) -> None:
+        RecordConstructorArgs.__init__(self, weight=weight, view=recordable(view))
+        gym.Wrapper.__init__(self, env)
+        self.weight = checked_least("weight", weight, 0.0)
+        self.view = view_of(env, view)
+        self.coverage: Coverage | None = None
+        self._scene: Scene | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._scene = self.view.scene(observation, info)
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Step the env, and compare with all that was seen."""
+        if self._scene is None:
+            raise ResetNeeded("no current scene: call reset() first")
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        before, after = self._scene, self.view.scene(observation, info, last=self._scene)
+        self._scene = after
+        if self.coverage is None:
+            every = {(t.name, prop) for t in after.layout.types for prop in t.properties}
+            self.coverage = Coverage(relative_columns(after.layout, every), varying=True)
+            self._layout = after.layout
+        novelty = 0.0
+        if after.layout == self._layout:
+            novelty = float(self.coverage.novelty(after.vector[None])[0])
+            known = before.layout == self._layout
+            self.coverage.add(after.vector, before=before.vector if known else None)
+        paid = float(reward) + self.weight * novelty if self.weight else reward
+        return observation, paid, terminated, truncated, {**info, "novelty": novelty}
 
 
 def relative_columns(layout: SceneLayout, moving: set[tuple[str, str]]) -> list[int | tuple[int, int]]:

@@ -130,8 +130,9 @@ class TreeSearch:
             worth = objective.discount ** tree.depths[nodes[alive]] * worth
             known = stepped.known
             if objective.curiosity is not None and not known.all():
-                curious = objective.discount ** tree.depths[nodes[alive[~known]]] * objective.curiosity
-                tree.leave(nodes[alive[~known]], curious, latents[alive[~known]])
+                off = nodes[alive[~known]]
+                curious = np.asarray(objective.discount ** tree.depths[off] * objective.curiosity, np.float64)
+                tree.leave(off, curious, latents[alive[~known]])
             grown = tree.grow(
                 nodes[alive[known]],
                 stepped.states[known],
