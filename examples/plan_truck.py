@@ -1,4 +1,4 @@
-"""Can an agent find out in 300 real steps what its world and its task are like, and then just plan?
+"""Can an agent find out in 300 real steps what its world and its task are like? It plans; nothing is trained.
 
 Run: python examples/plan_truck.py --steps 300 --episodes 20
 """

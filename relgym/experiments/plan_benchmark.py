@@ -106,18 +106,9 @@ def told(course: str, found: Mapping[str, Sequence[Any]], *, steps: int, episode
                 measured(f"{name}: seconds a decision", _DECISION, [run["decision"] for run in runs])
             )
     rows: list[list[Cell]] = [_row(ARMS[arm].title, runs, steps) for arm, runs in learned.items()]
-    for run in found.get("engine", ()):
-        rows.append(
-            [
-                "the same search, exact engine",
-                "-",
-                "-",
-                "-",
-                run["successes"],
-                "-",
-                f"{run['decision']:.3f} s",
-            ]
-        )
+    for made in found.get("engine", ()):
+        rest = made["successes"], "-", f"{made['decision']:.3f} s"
+        rows.append(["the same search, exact engine", "-", "-", "-", *rest])
     rows += _others(course, others)
     heading = ["arm", "solved", "median", "each", "last, %", "learning", "decision"]
     return report(COURSES[course].title, measures, [table(heading, rows), f"Tests of {episodes} episodes."])
@@ -172,8 +163,8 @@ def draw(path: Path, course: str, found: Mapping[str, Sequence[Any]]) -> Path:
     axes = figure.subplots()
     for arm, runs in found.items():
         if arm == "engine":
-            for run in runs:
-                axes.axhline(run["successes"], color="0.3", linestyle=":", label="the exact engine")
+            for made in runs:
+                axes.axhline(made["successes"], color="0.3", linestyle=":", label="the exact engine")
             continue
         if not runs:
             continue

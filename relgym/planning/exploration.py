@@ -196,9 +196,9 @@ class Coverage:
 class Familiar:
     """A simulator that knows the outcomes only of steps into what is familiar: for agents that must not err.
 
-    A law says what will happen where nothing like it was ever seen, too: that the road goes on behind the edge. So steps
-    to values that no real step has shown (`Coverage.familiar`), such as a distance smaller than any so far, count as
-    of unknown outcome.
+    A law says what will happen where nothing like it was ever seen, too: that the road goes on behind the edge. So
+    steps to values that no real step has shown (`Coverage.familiar`), such as a distance smaller than any so far,
+    count as of unknown outcome.
 
     Parameters
     ----------

@@ -29,9 +29,9 @@ class TreeSearch:
     change, the best branch, and grows again from cells that were seldom grown from (cells as in Go-Explore, Ecoffet et
     al. 2021; kinodynamic trees, LaValle and Kuffner 2001, the RRT that the thesis wished for, §5.1). While it grows,
     branches of different lengths are compared as if what remains of the horizon paid the mean reward of all steps of
-    the tree. The plan is a whole branch: one that ends the episode or lasts to the horizon, or, with curiosity, leads to
-    a step of unknown outcome. Of others nobody knows what they lead to: who races towards a goal does well until he
-    can't brake any more. Only while there is no whole branch the best part of one is the plan.
+    the tree. The plan is a whole branch: one that ends the episode or lasts to the horizon, or, with curiosity, leads
+    to a step of unknown outcome. Of others nobody knows what they lead to: who races towards a goal does well until
+    he can't brake any more. Only while there is no whole branch the best part of one is the plan.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ import numpy as np
 class Pit(gym.Env[Any, Any]):
     """One walks by `action` along a road that pays for every step forward, and ends in a pit.
 
-    Observed are the speed and how far the edge is away. Beyond it the episode is over, without a word of warning before.
+    Observed are the speed and how far the edge is away. Beyond it the episode is over; nothing warns of that.
 
     Parameters
     ----------
