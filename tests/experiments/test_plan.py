@@ -59,17 +59,21 @@ def test_nets_are_planned_in_by_the_same_agent() -> None:
     seen, _ = agent.env.reset(seed=0)
     now = world.state(seen)
     stepped = world.step(np.repeat(now[None], 2, axis=0), np.zeros((2, 1), np.float32))
-    assert stepped.states.shape == (2, len(now)) and stepped.known.tolist() == [agent.model.ensemble.ready] * 2
+    assert (
+        stepped.states.shape == (2, len(now)) and stepped.known.tolist() == [agent.model.ensemble.ready] * 2
+    )
 
 
 def test_medians_are_measured_against_their_limits() -> None:
     found = {
-        "relgym": [made_up(250, 0, 40, 95, 96, 97), made_up(350, 0, 0, 0, 0, 20, 95, 95), made_up(None, 0, 5)],
+        "relgym": [
+            made_up(250, 0, 40, 95, 96, 97),
+            made_up(350, 0, 0, 0, 0, 20, 95, 95),
+            made_up(None, 0, 5),
+        ],
         "engine": [{"successes": 99, "decision": 0.4, "episodes": 25}],
     }
-    others = (
-        "# x\n\n## truck: TruckPush\n\n```text\nSAC  5 of 5  8,250  1, 2  90  49 s  0 s  0 s\n```\n\n## b: c\n"
-    )
+    others = "# x\n\n## truck: TruckPush\n\n```text\nSAC  5 of 5  8,250  1, 2  90  49 s  0 s  0 s\n```\n\n## b: c\n"
     text = plan_benchmark.told("truck", found, steps=400, episodes=25, others=others)
     limit = next(line for line in text.splitlines() if "decisions to success, median" in line)
     assert "350" in limit and "MISSED" in limit
