@@ -37,6 +37,8 @@ class Course:
         What `gymnasium.make` is asked for.
     repeat
         Env steps that a decision lasts.
+    limit
+        Decisions that an episode lasts at most; agents that learn find out by themselves.
     every
         Decisions between two tests.
     agent
@@ -50,6 +52,7 @@ class Course:
     env_id: str
     arguments: Mapping[str, Any] = field(default_factory=dict)
     repeat: int = 1
+    limit: int | None = None
     every: int = 50
     agent: Mapping[str, Any] = field(default_factory=dict)
     search: TreeSearch = field(default_factory=TreeSearch)
@@ -58,12 +61,15 @@ class Course:
 COURSES: Final = {
     course.name: course
     for course in (
-        Course("truck", "TruckPush", "relgym/TruckPush-v0", search=TreeSearch(horizon=20, batch=512)),
+        Course(
+            "truck", "TruckPush", "relgym/TruckPush-v0", limit=20, search=TreeSearch(horizon=20, batch=512)
+        ),
         Course(
             "ball",
             "BallGoal",
             "relgym/BallGoal-v0",
             repeat=5,
+            limit=100,
             search=TreeSearch(horizon=60, batch=512, expansions=8_192),
         ),
     )
@@ -258,7 +264,8 @@ def ceiling(*, course: str, episodes: int = EPISODES) -> dict[str, Any]:
     env = gym.make(place.env_id, disable_env_checker=True, **place.arguments)
     objective = Objective(discount=PlanningAgent.DISCOUNT)
     tests = Tests(place, episodes)
-    good = tests.successes(Planner(EnvSimulator(env, repeat=place.repeat), place.search, objective))
+    simulator = EnvSimulator(env, repeat=place.repeat)
+    good = tests.successes(Planner(simulator, place.search, objective, limit=place.limit))
     return {
         "successes": round(good * 100 / episodes),
         "decision": tests.seconds / max(1, tests.decisions),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any, Final
 
 import gymnasium as gym
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.arguments import checked_least
 from relgym.errors import ConfigError
+from relgym.planning.rollouts import Bonus
 from relgym.planning.simulators import Simulator, Steps
 from relgym.scene.objects import POSE, TASK, Float1D, Float2D, Scene, SceneLayout
 from relgym.wrappers.views import ViewLike, recordable, view_of
@@ -150,13 +152,9 @@ class Coverage:
                 found[(cells == np.frombuffer(key, dtype=np.int8)).all(axis=1)] = max(0.0, total / visits)
         return found
 
-    def bonus(self, weight: float) -> Any:
+    def bonus(self, weight: float) -> Bonus:
         """A `Bonus` that pays `weight` times the novelty of the next state, and its surplus."""
-
-        def paid(states: Float2D, actions: NDArray[Any], following: Float2D) -> Float1D:
-            return weight * self.novelty(following) + self.surplus(following)
-
-        return paid
+        return _Paid(self, weight)
 
     def _lay_out(self) -> None:
         """Empty tables for the pairs of what counts; a column with itself: the values alone."""
@@ -191,6 +189,18 @@ class Coverage:
         level = np.clip(octave, 0, _OCTAVES + 1).astype(np.intp)
         found: NDArray[np.intp] = _OCTAVES + 1 + np.sign(rows).astype(np.intp) * level
         return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Paid:
+    """What `Coverage.bonus` returns; no closure, so that agents can be copied and pickled in mid-life."""
+
+    coverage: Coverage
+    weight: float
+
+    def __call__(self, states: Float2D, actions: NDArray[Any], following: Float2D) -> Float1D:
+        paid: Float1D = self.weight * self.coverage.novelty(following) + self.coverage.surplus(following)
+        return paid
 
 
 class Familiar:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import gymnasium as gym
@@ -105,3 +106,9 @@ def test_where_more_was_paid_than_it_can_account_for_it_looks_again() -> None:
 def test_episodes_that_were_cut_short_tell_how_long_they_may_last() -> None:
     made = PlanningAgent(Pit(begin=60.0, steps=6), search=SEARCH, random_steps=20).learn(30)
     assert made._limit == 6
+
+
+def test_an_agent_is_pickled_in_mid_life() -> None:
+    made = agent().learn(50)
+    again = pickle.loads(pickle.dumps(made))
+    assert again.learn(54).model.to_json() == made.learn(54).model.to_json()
