@@ -29,6 +29,7 @@ from relgym.wrappers.sb3.acceptance import Spread
 from relgym.wrappers.sb3.config import DynaConfig
 from relgym.wrappers.sb3.lens import Lens
 from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
+from relgym.wrappers.sb3.reward_models import LearnedRewardModel, RewardModel
 from relgym.wrappers.sb3.stock import DreamModel, changing
 from relgym.wrappers.sb3.trainer import ModelTrainer
 from relgym.wrappers.views import ViewLike
@@ -155,6 +156,7 @@ class PlanningAgent:
         self._rng = np.random.default_rng([seed, 5])
         self._history: deque[Experience] = deque(maxlen=_REMEMBERED)
         self._wrong: deque[bool] = deque(maxlen=_LATEST)
+        self._task_wrong: deque[bool] = deque(maxlen=_LATEST)
         self._at_random = True
         self._next_review = max(self.random_steps, 50)
         self._size = Spread()
@@ -163,7 +165,7 @@ class PlanningAgent:
         self._held: tuple[int, Any] = (0, None)
         self._thread: PlannerState | None = None
         self._observation: Any = None
-        self._planners: dict[bool, tuple[Any, Planner]] = {}
+        self._planners: dict[bool, tuple[Any, Any, Planner]] = {}
 
     @property
     def model(self) -> Any:
@@ -218,10 +220,10 @@ class PlanningAgent:
 
     def _at_work(self, *, explores: bool) -> Planner:
         """The planner for what has been learned by now; made anew only when another model takes over."""
-        found = self._planners.get(explores)
-        if found is None or found[0] is not self.model:
-            found = self._planners[explores] = self.model, self.planner(explores=explores)
-        planner = found[1]
+        found, task = self._planners.get(explores), self.trainer.reward_model
+        if found is None or found[0] is not self.model or found[1] is not task:
+            found = self._planners[explores] = self.model, task, self.planner(explores=explores)
+        planner = found[2]
         planner.objective, planner.limit = self._objective(explores=explores), self._limit
         return planner
 
@@ -299,7 +301,8 @@ class PlanningAgent:
 
     def _take_up(self, real: Experience) -> None:
         """Learn from a real step."""
-        surplus = self._unaccounted(real)
+        surplus, missed = self._surplus(self.trainer.reward_model, real)
+        self._task_wrong.append(missed)
         self.trainer.take_up(real)
         self.steps += 1
         self._size.add(real.reward)
@@ -336,8 +339,12 @@ class PlanningAgent:
         latest of them before it learns those, too.
         """
         self._next_review = int(self.steps * _GROWTH) + 1
-        if not isinstance(self.model, WorldModel) or self.model.frozen or not any(self._wrong):
-            return
+        if isinstance(self.model, WorldModel) and not self.model.frozen and any(self._wrong):
+            self._review_model()
+        if isinstance(self.trainer.reward_model, LearnedRewardModel) and any(self._task_wrong):
+            self._review_task(self.trainer.reward_model)
+
+    def _review_model(self) -> None:
         seen = [real.transition for real in self._history]
         count = min(len(self._wrong), len(seen) // 5)
         least = sum(list(self._wrong)[-count:])
@@ -356,16 +363,36 @@ class PlanningAgent:
             self.trainer.adopt(fresh)
             self._wrong = deque(wrong.tolist(), maxlen=_LATEST)
 
-    def _unaccounted(self, real: Experience) -> float:
-        """What a step paid beyond what was learned of the task before it was learned from; 0 where nothing was said."""
-        told = self.trainer.reward_model.evaluate(
-            real.start.layout,
-            real.start.vector[None],
-            np.asarray(real.action)[None],
-            _fitted(real.transition.after, real.start)[None],
+    def _review_task(self, own: LearnedRewardModel) -> None:
+        """The same for reward and end."""
+        seen = list(self._history)
+        count = min(len(self._task_wrong), len(seen) // 5)
+        least = sum(list(self._task_wrong)[-count:])
+        best = None
+        for _ in range(_ORDERS):
+            fresh = own.untaught()
+            for k in self._rng.permutation(len(seen) - count).tolist():
+                fresh.learn_step(seen[k].transition, seen[k].reward, terminated=seen[k].terminated)
+            fresh.model.finish()
+            wrong = [self._surplus(fresh, real)[1] for real in seen[-count:]]
+            if sum(wrong) < least:
+                best, least = (fresh, wrong), sum(wrong)
+        if best is not None:
+            fresh, wrong = best
+            for real in seen[-count:]:
+                fresh.learn_step(real.transition, real.reward, terminated=real.terminated)
+            self.trainer.reward_model = fresh
+            self._task_wrong = deque(wrong, maxlen=_LATEST)
+
+    def _surplus(self, task: RewardModel, real: Experience) -> tuple[float, bool]:
+        """What a step paid beyond what a reward model says, 0 where it says nothing; whether it was wrong."""
+        after = _fitted(real.transition.after, real.start)
+        told = task.evaluate(
+            real.start.layout, real.start.vector[None], np.asarray(real.action)[None], after[None]
         )
         surplus = real.reward - float(told.rewards[0])
-        return surplus if np.isfinite(surplus) else 0.0
+        wrong = not abs(surplus) <= 1e-6 or bool(told.terminated[0]) != real.terminated
+        return (surplus if np.isfinite(surplus) else 0.0), wrong
 
 
 def _fitted(after: Scene, like: Scene) -> Float1D:
