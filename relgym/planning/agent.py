@@ -318,7 +318,11 @@ class PlanningAgent:
         self._wrong.append(bool(self.trainer.wrong) or not self.model.targets)
         if after.layout == self._layout:
             self.coverage.add(
-                after.vector, before=real.start.vector, surprised=self._surprised(), surplus=surplus
+                after.vector,
+                before=real.start.vector,
+                surprised=self._surprised(),
+                surplus=surplus,
+                paid=real.reward,
             )
         if self.steps >= self._next_review:
             self._review()

@@ -72,7 +72,7 @@ class Coverage:
         if capacity < 1:
             raise ConfigError(f"capacity={capacity!r}: expected at least 1 step")
         self._capacity = capacity
-        self._seen: list[tuple[Float1D, bool, float]] = []
+        self._seen: list[tuple[Float1D, bool, float, float]] = []
         self._paid: dict[bytes, tuple[float, int]] = {}
         self._largest = np.zeros(len(pairs))
         self._varying = varying
@@ -91,6 +91,7 @@ class Coverage:
         before: Float1D | None = None,
         surprised: bool = False,
         surplus: float = 0.0,
+        paid: float = 0.0,
     ) -> None:
         """Take note of a state that a real step led to.
 
@@ -104,9 +105,11 @@ class Coverage:
             Whether the model had predicted something else, or nothing.
         surplus
             What was paid beyond what the model had predicted.
+        paid
+            What was paid in all: where the model is right about as much as the surplus was, it accounts for it.
         """
         row = self._values(state[None])[0]
-        self._seen.append((row, surprised, surplus))
+        self._seen.append((row, surprised, surplus, paid))
         sizes = np.exp2(np.ceil(np.log2(np.maximum(np.abs(row), 1e-300))))
         moved = np.zeros(len(row), dtype=np.bool_)
         if self._varying and before is not None:
@@ -120,7 +123,7 @@ class Coverage:
             for lesson in self._seen:
                 self._count(*lesson)
         else:
-            self._count(row, surprised, surplus)
+            self._count(row, surprised, surplus, paid)
 
     def novelty(self, states: Float2D) -> Float1D:
         """Share of the pairs of values that were never seen together or surprised, of n states; shape ``(n,)``."""
@@ -143,7 +146,7 @@ class Coverage:
     def surplus(self, states: Float2D) -> Float1D:
         """What is expected beyond what the model can account for, of n states; shape ``(n,)``.
 
-        The mean over the visits to the same values of all properties, if the model was surprised the last time.
+        The mean over the visits to the same values of all properties, until the model accounts for it.
         """
         found = np.zeros(len(states))
         if self._paid:
@@ -163,14 +166,15 @@ class Coverage:
         self._paid.clear()
         self._counts, self._open = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.bool_)
 
-    def _count(self, row: Float1D, surprised: bool, surplus: float) -> None:
+    def _count(self, row: Float1D, surprised: bool, surplus: float, paid: float) -> None:
         cells = self._cells(row[None])[0, self._active]
         at = np.arange(len(self._first)), cells[self._first], cells[self._second]
         self._counts[at] += 1
         self._open[at] = surprised & (self._counts[at] < _PATIENCE)
         key = cells.astype(np.int8).tobytes()
         total, visits = self._paid.pop(key, (0.0, 0))
-        if visits and not surprised:  # accounted for by now
+        # Cells are coarse: other visits may have nothing to do with what was paid.
+        if visits and not surprised and paid >= 0.5 * total / visits > 0.0:  # accounted for by now
             return
         if visits or surplus > 1e-6:
             self._paid[key] = total + surplus, visits + 1

@@ -119,7 +119,7 @@ def test_a_surplus_is_expected_again_until_the_model_accounts_for_it() -> None:
     coverage.add(here, surprised=True, surplus=0.0)  # it isn't paid every time
     assert coverage.surplus(both).tolist() == [1.0, 0.0]
     assert coverage.bonus(1.0)(both, None, both)[0] >= 1.0
-    coverage.add(here)
+    coverage.add(here, paid=2.0)  # as the model said
     assert coverage.surplus(both).tolist() == [0.0, 0.0]
 
 
