@@ -244,6 +244,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         text = told(name, found, steps=chosen.steps, episodes=chosen.episodes, others=others)
         print(text, flush=True)
         if chosen.page is not None:
+            chosen.page.parent.mkdir(parents=True, exist_ok=True)
             picture = draw(chosen.page.parent / f"plan-{name}.png", name, found).name
             sections[name] = picture, text
     if chosen.page is not None:
