@@ -15,7 +15,7 @@ DYNA := $(VENV)/.installed-dyna
 DOCS := $(VENV)/.installed-docs
 
 .DEFAULT_GOAL := help
-.PHONY: help demo dyna dyna-full reproduce test test-sb3 test-cluster slow slow-sb3 fuzz bench soak outliers coverage lint format types check
+.PHONY: help demo dyna dyna-full plan plan-full reproduce test test-sb3 test-cluster slow slow-sb3 fuzz bench soak outliers coverage lint format types check
 .PHONY: wheel docs docs-serve pages animations clean example-highway example-ocatari
 
 help:            ## show this list
@@ -29,6 +29,12 @@ dyna: $(DYNA)    ## agents that train in what they have learned, beside SAC (ins
 
 dyna-full: $(SB3) ## all that dreaming is worth, hours; resumes where it was stopped, writes docs/results/dream.md
 	$(BIN)/python -m relgym.experiments.dyna_benchmarks --jobs 2 --page docs/results/dream.md
+
+plan: $(VIZ)     ## an agent that explores, prints the laws it found, and plans ten episodes (two minutes)
+	$(BIN)/relgym plan
+
+plan-full: $(SB3) ## all that planning is worth, hours; resumes where it was stopped, writes docs/results/plan.md
+	$(BIN)/relgym benchmark plan --page docs/results/plan.md
 
 reproduce: $(DEV) ## the thesis' tables and figures again, the fast way; writes docs/results.md
 	$(BIN)/relgym reproduce all --batches 2 --fast --page docs/results.md

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.envs.arguments import takes
+from relgym.envs.tasks import RewardFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Float1D, Float2D, Scene, SceneLayout
@@ -148,6 +149,17 @@ def _functions(task: Any, *names: str) -> list[Any]:
     return [getattr(task, name) for name in names]
 
 
+def _at_once(task: Any) -> Any:
+    """A task's function that gives rewards and terminations together, unless it has others of its own; None: none."""
+    own = type(task)
+    if not isinstance(task, RewardFunctions) or (own.rewards, own.terminations) != (
+        RewardFunctions.rewards,
+        RewardFunctions.terminations,
+    ):
+        return None
+    return task.evaluate
+
+
 def _doubts(task: Any) -> bool:
     """Whether a task is learned, so that NaN means that it doesn't know."""
     return bool(getattr(task, "learned", False))
@@ -235,6 +247,8 @@ class BatchStepEvaluator:
     reward: BatchSceneFunction | Literal["learned"] | None
     terminated: BatchSceneFunction | Literal["learned"] | None
     doubts: bool = False
+    both: Any = None
+    """The task's function for both at once, where neither is anything else."""
 
     @classmethod
     def of(
@@ -252,6 +266,7 @@ class BatchStepEvaluator:
             _chosen(reward, own[0], model, "reward"),
             _chosen(terminated, own[1], model, "terminated"),
             reward is None and _doubts(task),
+            None if (reward, terminated) != (None, None) else _at_once(task),
         )
 
     @property
@@ -267,8 +282,12 @@ class BatchStepEvaluator:
         ConfigError
             A reward is not finite, or a function returns another shape.
         """
-        rewards = self._verdicts("reward", self.reward, before, actions, after, doubts=self.doubts)
-        return rewards, self._verdicts("terminated", self.terminated, before, actions, after) > _ENDED
+        told: tuple[Any, Any] = self.reward, self.terminated
+        if self.both is not None:
+            outcome = self.both(self.layout, before, actions, after)
+            told = (lambda *_: outcome.rewards), (lambda *_: outcome.terminated)
+        rewards = self._verdicts("reward", told[0], before, actions, after, doubts=self.doubts)
+        return rewards, self._verdicts("terminated", told[1], before, actions, after) > _ENDED
 
     def _verdicts(
         self,

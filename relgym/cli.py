@@ -326,6 +326,38 @@ def dyna(
 
 
 @app.command()
+def plan(
+    out: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("out/plan"),
+    steps: Annotated[int, typer.Option(help="Real steps of learning.", min=1)] = 300,
+    episodes: Annotated[int, typer.Option(help="Episodes to plan.", min=1)] = 10,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Let an agent explore a truck's world, print the laws and the task it found, and plan some episodes."""
+    from relgym.experiments.plan_demo import demonstrate
+
+    out.mkdir(parents=True, exist_ok=True)
+    with _working("exploring and learning"):
+        shown = demonstrate(out, steps=steps, episodes=episodes, seed=seed)
+    _echo_json(shown) if as_json else typer.echo(shown)
+
+
+@app.command(
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True}, add_help_option=False
+)
+def benchmark(
+    rest: typer.Context,
+    name: Annotated[str, typer.Argument(help="plan: real steps to success by planning in what was learned.")],
+) -> None:
+    """Run a benchmark, or go on with one, and report it beside its limits (`relgym benchmark plan --help`)."""
+    from relgym.experiments.plan_benchmark import main
+
+    if name != "plan":
+        raise ConfigError(f"benchmark {name!r}: expected plan")
+    main(rest.args)
+
+
+@app.command()
 def inspect(
     env_id: EnvId, arg: Arguments = None, view: ViewOption = None, names: Names = None, seed: Seed = 0
 ) -> None:

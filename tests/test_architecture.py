@@ -41,7 +41,7 @@ MAY_IMPORT = {
     "wrappers": CORE | {"envs"},
     "data": CORE | {"envs", "wrappers"},
     "planning": CORE | {"envs", "wrappers"},
-    "experiments": CORE | {"baselines", "data", "envs", "wrappers"},
+    "experiments": CORE | {"baselines", "data", "envs", "wrappers", "planning"},
     "console": CORE | {"data", "envs", "wrappers", "experiments"},
     "cli": CORE | {"baselines", "data", "envs", "wrappers", "experiments", "console"},
     "__main__": frozenset({"cli"}),

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from relgym.planning.actions import ActionCoder
     from relgym.planning.agent import PlanningAgent
-    from relgym.planning.exploration import Coverage
+    from relgym.planning.exploration import Coverage, Explore, Familiar
     from relgym.planning.planner import Planner
     from relgym.planning.rollouts import Objective, Plan
     from relgym.planning.sequences import CrossEntropy, PathIntegral, RandomShooting, Search
@@ -26,6 +26,8 @@ _HOMES = {
     "Coverage": "relgym.planning.exploration",
     "CrossEntropy": "relgym.planning.sequences",
     "EnvSimulator": "relgym.planning.simulators",
+    "Explore": "relgym.planning.exploration",
+    "Familiar": "relgym.planning.exploration",
     "ModelSimulator": "relgym.planning.simulators",
     "Objective": "relgym.planning.rollouts",
     "PathIntegral": "relgym.planning.sequences",
@@ -45,6 +47,8 @@ __all__ = [
     "Coverage",
     "CrossEntropy",
     "EnvSimulator",
+    "Explore",
+    "Familiar",
     "ModelSimulator",
     "Objective",
     "PathIntegral",

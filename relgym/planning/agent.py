@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
-from typing import Any, cast
+from dataclasses import replace
+from typing import Any, Final, cast
 
 import gymnasium as gym
 import numpy as np
@@ -14,21 +16,45 @@ from relgym.envs.arguments import checked_count, checked_least
 from relgym.envs.learned_model_rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.planning.exploration import Coverage
+from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
+from relgym.planning.review import learned_again, right
 from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
-from relgym.planning.simulators import ModelSimulator
+from relgym.planning.simulators import ModelSimulator, Simulator
 from relgym.planning.tree import TreeSearch
-from relgym.scene.objects import TASK, SceneLayout
+from relgym.scene.objects import Float1D, Scene
 from relgym.wrappers.action_repeat import ActionRepeat
+from relgym.wrappers.sb3.acceptance import Spread
 from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.recorder import TransitionRecorder
-from relgym.wrappers.sb3.stock import changing
+from relgym.wrappers.sb3.lens import Lens
+from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
+from relgym.wrappers.sb3.reward_models import LearnedRewardModel, RewardModel
+from relgym.wrappers.sb3.stock import DreamModel, changing
 from relgym.wrappers.sb3.trainer import ModelTrainer
 from relgym.wrappers.views import ViewLike
 
 __all__ = ["PlanningAgent"]
+
+_GROWTH: Final = 1.15
+"""Between two reviews the agent's experience grows by this factor: all of them together cost as much as to learn from
+everything fifteen times, but they only take place while the model is wrong."""
+
+_ORDERS: Final = 2
+"""Random orders that a review tries: of few steps one may miss what another finds."""
+
+_REMEMBERED: Final = 5_000
+"""Latest real steps that a review looks at."""
+
+_HOLDS: Final = (1, 2, 4, 8)
+"""Decisions that a random action may be held for: what is drawn anew each time tells the laws best, and what is held
+leads somewhere."""
+
+_SHARES: Final = tuple(1 / hold / sum(1 / each for each in _HOLDS) for hold in _HOLDS)
+"""How often: as many different actions of each."""
+
+_LATEST: Final = 50
+"""Latest real steps by which the agent doubts its model."""
 
 
 class PlanningAgent:
@@ -51,13 +77,20 @@ class PlanningAgent:
     repeat
         Env steps that a decision lasts.
     random_steps
-        Decisions at random at first, each action held for a while.
+        Steps at random at first; in each episode actions are held for another number of decisions.
     exploration
-        What a state that shows nothing but new pairs of values is worth while learning, in units of the largest reward
-        that one step has paid so far (in absolute terms); 0: it does what the model says pays. Steps of unknown outcome
-        count as entirely new.
+        What a state that shows nothing but new pairs of values is worth while learning, in units of what a step pays
+        (root mean square so far); 0: it does what the model says pays. Steps of unknown outcome count as entirely new.
+    discount
+        Of each decision: what comes sooner is surer, and episodes may be cut short.
+    safe
+        Whether `predict` stays where it has been: what no real step has shown counts as unknown (`Familiar`), and no
+        action of unknown outcome is taken while there is another. `learn` explores all the same.
     commit, tolerance, seed
         As for `Planner`.
+    simulator
+        Function from what has been learned to where plans are searched for; default: a `ModelSimulator`, of a
+        `WorldModel`. Other models need one.
 
     Attributes
     ----------
@@ -77,21 +110,27 @@ class PlanningAgent:
     8
     """
 
+    DISCOUNT: Final = 0.97
+    """Of each decision, unless the user says otherwise: some thirty decisions ahead count."""
+
     def __init__(
         self,
         env: gym.Env[Any, Any],
-        model: WorldModel | None = None,
+        model: DreamModel | None = None,
         *,
         config: ModelConfig | None = None,
         task: Any = "learned",
         view: ViewLike = None,
         search: Search | None = None,
         repeat: int = 1,
-        random_steps: int = 50,
-        exploration: float = 0.3,
+        random_steps: int = 150,
+        exploration: float = 0.5,
+        discount: float = DISCOUNT,
+        safe: bool = False,
         commit: int | None = None,
         tolerance: float = 1e-6,
         seed: int = 0,
+        simulator: Callable[[ModelTrainer], Simulator] | None = None,
     ) -> None:
         self._recorder = TransitionRecorder(env, view=view)
         self.repeat = checked_count("repeat", repeat, 1, 10**6)
@@ -99,30 +138,52 @@ class PlanningAgent:
             ActionRepeat(self._recorder, self.repeat) if repeat > 1 else self._recorder
         )
         self.exploration = checked_least("exploration", exploration, 0.0)
+        self.discount, self.safe = Objective(discount=discount).discount, safe
         if model is None:
             model = WorldModel(self._recorder.view.schema, config)
         self.trainer = ModelTrainer(
             model, _task(task, env), DynaConfig(shuffle=0, seed=checked_count("seed", seed, 0, 2**31))
         )
+        adopt = getattr(self.trainer.reward_model, "adopt", None)
+        if adopt is not None:  # it is asked about actions as the env understands them
+            adopt(Lens(self._recorder).acting)
         self.random_steps = checked_count("random_steps", random_steps, 0, 10**9)
         self.coverage: Coverage | None = None
         self.steps = 0
-        self._like = env
+        self._like, self._simulator = env, simulator
         self._search = TreeSearch() if search is None else search
         self._options = {"commit": commit, "tolerance": tolerance, "seed": seed}
         self._rng = np.random.default_rng([seed, 5])
-        self._largest = 0.0
+        self._history: deque[Experience] = deque(maxlen=_REMEMBERED)
+        self._wrong: deque[bool] = deque(maxlen=_LATEST)
+        self._task_wrong: deque[bool] = deque(maxlen=_LATEST)
+        self._at_random = True
+        self._next_review = max(self.random_steps, 50)
+        self._size = Spread()
+        self._limit: int | None = None
+        self._hold = 1
         self._held: tuple[int, Any] = (0, None)
         self._thread: PlannerState | None = None
         self._observation: Any = None
-        self._planner: Planner | None = None
+        self._planners: dict[bool, tuple[Any, Any, Planner]] = {}
 
     @property
-    def model(self) -> WorldModel:
-        """The model at work."""
-        model = self.trainer.model
-        assert isinstance(model, WorldModel), "made by the agent, or checked by the trainer"
-        return model
+    def model(self) -> Any:
+        """The model at work: a `WorldModel`, unless another one was passed."""
+        return self.trainer.model
+
+    @property
+    def ready(self) -> bool:
+        """Whether the steps at random are over and there is a model to plan in."""
+        return self.steps >= self.random_steps and bool(self.model.targets)
+
+    @property
+    def doubt(self) -> float:
+        """Share of the latest real steps of which the model predicted the next scene wrongly, or not at all.
+
+        So many episodes are spent on random actions: a plan in a model that is wrong is no better, and teaches less.
+        """
+        return sum(self._wrong) / len(self._wrong) if self._wrong else 1.0
 
     def planner(self, *, explores: bool = False) -> Planner:
         """A planner in what has been learned; it follows the model as that learns on.
@@ -137,17 +198,34 @@ class PlanningAgent:
         QueryError
             The model knows none of its targets yet.
         """
-        simulator = ModelSimulator(
-            self.model,
-            self._like,
-            task=cast(TaskFunctions, self.trainer.reward_model),
-            repeat=self.repeat,
-        )
-        objective = Objective()
+        if self._simulator is not None:
+            simulator: Simulator = self._simulator(self.trainer)
+        else:
+            task = cast(TaskFunctions, self.trainer.reward_model)
+            simulator = ModelSimulator(
+                self.model, self._like, view=self._recorder.view, task=task, repeat=self.repeat
+            )
+        safe = self.safe and not explores
+        if safe and self.coverage is not None:
+            simulator = Familiar(simulator, self.coverage)
+        objective, options = self._objective(explores=explores), {"safe": safe, "limit": self._limit}
+        return Planner(simulator, self._search, objective, **options, **self._options)  # type: ignore[arg-type]
+
+    def _objective(self, *, explores: bool) -> Objective:
+        objective = Objective(discount=self.discount)
         if explores and self.exploration > 0.0 and self.coverage is not None:
-            weight = self.exploration * (self._largest or 1.0)
-            objective = Objective(bonus=self.coverage.bonus(weight), curiosity=weight)
-        return Planner(simulator, self._search, objective, **self._options)  # type: ignore[arg-type]
+            weight = self.exploration * (self._size.scale or 1.0)
+            return replace(objective, bonus=self.coverage.bonus(weight), curiosity=weight)
+        return objective
+
+    def _at_work(self, *, explores: bool) -> Planner:
+        """The planner for what has been learned by now; made anew only when another model takes over."""
+        found, task = self._planners.get(explores), self.trainer.reward_model
+        if found is None or found[0] is not self.model or found[1] is not task:
+            found = self._planners[explores] = self.model, task, self.planner(explores=explores)
+        planner = found[2]
+        planner.objective, planner.limit = self._objective(explores=explores), self._limit
+        return planner
 
     def learn(
         self, total_steps: int, callback: Callable[[PlanningAgent], bool | None] | None = None
@@ -165,13 +243,17 @@ class PlanningAgent:
             if self._observation is None:
                 self._observation, _ = self.env.reset(seed=int(self._rng.integers(2**31)))
                 self._thread, self._held = PlannerState(), (0, None)
+                self._hold = int(self._rng.choice(_HOLDS, p=_SHARES))
+                self._at_random = self.steps < self.random_steps or self._rng.random() < self.doubt
             action = self._choose(self._observation)
             self._observation, _, terminated, truncated, _ = self.env.step(action)
             for real in self._recorder.take():
-                self.trainer.take_up(real)
-                self.steps += 1
-                self._largest = max(self._largest, abs(real.reward))
-                self._cover(real.transition.after.layout).add(real.transition.after.vector)
+                self._take_up(real)
+            assert self._thread is not None, "made with the episode"
+            if self._at_random:
+                self._thread.decisions += 1
+            if truncated:  # so long, then, an episode may last
+                self._limit = max(self._limit or 1, self._thread.decisions)
             if terminated or truncated:
                 self._observation = None
             if callback is not None and callback(self) is False:
@@ -186,22 +268,27 @@ class PlanningAgent:
         deterministic: bool = True,
     ) -> tuple[Any, States]:
         """Choose what pays; as `Planner.predict`."""
-        if self._planner is None or self._planner.simulator.model is not self.model:  # type: ignore[attr-defined]
-            self._planner = self.planner()
-        return self._planner.predict(observation, state, episode_start, deterministic)
+        return self._at_work(explores=False).predict(observation, state, episode_start, deterministic)
 
     def _choose(self, observation: Any) -> Any:
-        """A random action at first and while nothing is known; then the first of a plan."""
-        if self.steps >= self.random_steps:
-            try:
-                planner = self.planner(explores=True)
-                assert self._thread is not None, "made with the episode"
-                return planner.act(observation, self._thread)
-            except QueryError:  # no target known yet
-                pass
+        """A random action at first and while nothing is known; then the next of a plan."""
+        if self._at_random:
+            return self._random()
+        assert self._thread is not None, "made with the episode"
+        try:
+            action = self._at_work(explores=True).act(observation, self._thread)
+        except QueryError:  # no target known yet
+            return self._random()
+        plan = self._thread.plan
+        if plan is not None and not plan.known and len(plan) == 1:
+            # Whatever it does now, it doesn't know what will happen: as at first.
+            return self._random()
+        return action
+
+    def _random(self) -> Any:
         left, action = self._held
         if left == 0:
-            left, action = int(self._rng.integers(1, 9)), self._drawn()
+            left, action = self._hold, self._drawn()
         self._held = (left - 1, action)
         return action
 
@@ -212,19 +299,109 @@ class PlanningAgent:
         space.seed(int(self._rng.integers(2**31)))
         return space.sample()
 
-    def _cover(self, layout: SceneLayout) -> Coverage:
-        """What is covered: the properties that may change, of objects of the first layout."""
+    def _take_up(self, real: Experience) -> None:
+        """Learn from a real step."""
+        surplus, missed = self._surplus(self.trainer.reward_model, real)
+        self._task_wrong.append(missed)
+        self.trainer.take_up(real)
+        self.steps += 1
+        self._size.add(real.reward)
+        self._history.append(real)
+        after = real.transition.after
         if self.coverage is None:
-            moving = changing(self.model) if self.model.targets else None
-            columns = [
-                layout.column(index, prop)
-                for index, t in enumerate(layout.types)
-                if t.name != TASK
-                for prop in t.properties
-                if moving is None or (t.name, prop) in moving
-            ]
-            self.coverage = Coverage(columns)
-        return self.coverage
+            kinds = changing(self.model)
+            if not kinds:  # none found yet: any may be
+                kinds = {(t.name, prop) for t in after.layout.types for prop in t.properties}
+            self.coverage = Coverage(relative_columns(after.layout, kinds), varying=True)
+            self._layout = after.layout
+        # A model that has found no target yet names no part.
+        self._wrong.append(bool(self.trainer.wrong) or not self.model.targets)
+        if after.layout == self._layout:
+            self.coverage.add(
+                after.vector,
+                before=real.start.vector,
+                surprised=self._surprised(),
+                surplus=surplus,
+                paid=real.reward,
+            )
+        if self.steps >= self._next_review:
+            self._review()
+
+    def _surprised(self) -> bool:
+        """Whether the last step was not as predicted, its reward and end included."""
+        verdict, least = self.trainer.verdict, max(float(self._options["tolerance"] or 0.0), 1e-6)
+        assert verdict is not None, "of the step that was just taken up"
+        return not verdict.residuals or any(
+            not abs(off) <= least * max(1.0, abs(verdict.changes.get(key, 0.0)))
+            for key, off in verdict.residuals.items()
+        )
+
+    def _review(self) -> None:
+        """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often.
+
+        Both are tested on steps that they had not learned from: the model at work when they came, the new one on the
+        latest of them before it learns those, too.
+        """
+        self._next_review = int(self.steps * _GROWTH) + 1
+        if isinstance(self.model, WorldModel) and not self.model.frozen and any(self._wrong):
+            self._review_model()
+        if isinstance(self.trainer.reward_model, LearnedRewardModel) and any(self._task_wrong):
+            self._review_task(self.trainer.reward_model)
+
+    def _review_model(self) -> None:
+        seen = [real.transition for real in self._history]
+        count = min(len(self._wrong), len(seen) // 5)
+        least = sum(list(self._wrong)[-count:])
+        best = None
+        for _ in range(_ORDERS):
+            fresh = learned_again(self.model, seen[:-count], rng=self._rng)
+            wrong = ~right(fresh, seen[-count:])
+            if fresh.targets and wrong.sum() <= least:
+                best, least = (fresh, wrong), int(wrong.sum())
+            if not least:
+                break
+        if best is not None:
+            fresh, wrong = best
+            for transition in seen[-count:]:
+                fresh.learn_one(transition)
+            self.trainer.adopt(fresh)
+            self._wrong = deque(wrong.tolist(), maxlen=_LATEST)
+
+    def _review_task(self, own: LearnedRewardModel) -> None:
+        """The same for reward and end."""
+        seen = list(self._history)
+        count = min(len(self._task_wrong), len(seen) // 5)
+        least = sum(list(self._task_wrong)[-count:])
+        best = None
+        for _ in range(_ORDERS):
+            fresh = own.untaught()
+            for k in self._rng.permutation(len(seen) - count).tolist():
+                fresh.learn_step(seen[k].transition, seen[k].reward, terminated=seen[k].terminated)
+            fresh.model.finish()
+            wrong = [self._surplus(fresh, real)[1] for real in seen[-count:]]
+            if sum(wrong) < least:
+                best, least = (fresh, wrong), sum(wrong)
+        if best is not None:
+            fresh, wrong = best
+            for real in seen[-count:]:
+                fresh.learn_step(real.transition, real.reward, terminated=real.terminated)
+            self.trainer.reward_model = fresh
+            self._task_wrong = deque(wrong, maxlen=_LATEST)
+
+    def _surplus(self, task: RewardModel, real: Experience) -> tuple[float, bool]:
+        """What a step paid beyond what a reward model says, 0 where it says nothing; whether it was wrong."""
+        after = _fitted(real.transition.after, real.start)
+        told = task.evaluate(
+            real.start.layout, real.start.vector[None], np.asarray(real.action)[None], after[None]
+        )
+        surplus = real.reward - float(told.rewards[0])
+        wrong = not abs(surplus) <= 1e-6 or bool(told.terminated[0]) != real.terminated
+        return (surplus if np.isfinite(surplus) else 0.0), wrong
+
+
+def _fitted(after: Scene, like: Scene) -> Float1D:
+    """The next state vector with the objects of the last one; those that are gone stay as they were."""
+    return np.concatenate([(after if name in after else like)[name].values for name in like.layout.names])
 
 
 def _task(task: Any, env: gym.Env[Any, Any]) -> Any:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, is_dataclass, replace
 from time import perf_counter
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,10 @@ from relgym.scene.objects import Float1D
 __all__ = ["Planner", "PlannerState"]
 
 
+_TRIED: Final = 256
+"""Actions among which one of known outcome is looked for."""
+
+
 @dataclass
 class PlannerState:
     """How far one episode's plan has come; what `Planner.predict` returns beside the action.
@@ -32,12 +36,15 @@ class PlannerState:
         What is being followed; None before the first decision.
     taken
         Decisions taken of it.
+    decisions
+        Taken in this episode.
     searches, surprises
         How often the planner has searched, and how often because the world did something else than predicted.
     """
 
     plan: Plan | None = None
     taken: int = 0
+    decisions: int = 0
     searches: int = 0
     surprises: int = 0
 
@@ -63,8 +70,12 @@ class Planner:
         that ends the episode. A surprise is followed by a search at once.
     tolerance
         How far a property may be off its prediction without a surprise, relative to its size (absolute below 1).
+    limit
+        Decisions after which episodes are cut short, if that is known: no plan lasts longer.
     seconds
         Time for one search; None: all its rounds.
+    safe
+        Never to take an action whose outcome the simulator doesn't know while it knows that of another one.
     source
         Function from an observation to the scene (or observation of the model's env) that it shows; for agents whose
         wrappers hide part of it: ``lambda _: env.get_wrapper_attr("scene")``. Default: the observation itself.
@@ -93,7 +104,9 @@ class Planner:
     objective: Objective = field(default_factory=Objective)
     commit: int | None = None
     tolerance: float = 1e-6
+    limit: int | None = None
     seconds: float | None = None
+    safe: bool = False
     source: Callable[[Any], Any] | None = None
     seed: int = 0
 
@@ -103,8 +116,9 @@ class Planner:
                 f"simulator={self.simulator!r}: expected a ModelSimulator(model), an EnvSimulator(env), or an object "
                 "with action_space, observation_space, state, prepare and step"
             )
-        if self.commit is not None:
-            checked_count("commit", self.commit, 1, 10**9)
+        for name in ("commit", "limit"):
+            if getattr(self, name) is not None:
+                checked_count(name, getattr(self, name), 1, 10**9)
         for name in ("tolerance", "seconds"):
             value = getattr(self, name)
             if value is not None and not (isinstance(value, (int, float)) and 0.0 <= value < np.inf):
@@ -156,20 +170,39 @@ class Planner:
         now = self.simulator.state(shown)
         if (plan := thread.plan) is None or self._due(plan, thread, now):
             warm = None if plan is None else plan.latents[thread.taken :]
-            plan = self.plan(now, warm=warm)
+            left = None if self.limit is None else max(1, self.limit - thread.decisions)
+            plan = self.plan(now, warm=warm, left=left)
             thread.plan, thread.taken = plan, 0
             thread.searches += 1
         action = plan.actions[thread.taken]
+        if self.safe and thread.taken >= len(plan.rewards):
+            action = self._known(now, action)
         thread.taken += 1
+        thread.decisions += 1
         return action
 
-    def plan(self, now: Float1D, *, warm: NDArray[np.float64] | None = None) -> Plan:
-        """Search from a state vector; `warm`: latents to begin with."""
+    def plan(self, now: Float1D, *, warm: NDArray[np.float64] | None = None, left: int | None = None) -> Plan:
+        """Search from a state vector; `warm`: latents to begin with; `left`: decisions that the episode still has."""
         self.simulator.prepare()
+        given: Any = self.search  # of any class
+        search: Search = given
+        if left is not None and left < search.horizon and is_dataclass(given):
+            search = cast(Search, replace(cast(Any, given), horizon=left))
+            warm = None if warm is None else warm[:left]
         deadline = None if self.seconds is None else perf_counter() + self.seconds
-        return self.search.plan(
+        return search.plan(
             self.simulator, self.coder, now, self.objective, warm=warm, rng=self._rng, deadline=deadline
         )
+
+    def _known(self, now: Float1D, otherwise: Any) -> Any:
+        """The best of some random actions whose outcomes are known; if there is none, the one that was to be taken."""
+        drawn = self._rng.standard_normal((_TRIED, self.coder.size))
+        drawn[0] = 0.0  # the middle of the action space: to do nothing, in many a world
+        actions = self.coder.actions(drawn)
+        stepped = self.simulator.step(np.repeat(now[None], _TRIED, axis=0), actions)
+        if not stepped.known.any():
+            return otherwise
+        return actions[int(np.where(stepped.known, stepped.rewards, -np.inf).argmax())]
 
     def _due(self, plan: Plan, thread: PlannerState, now: Float1D) -> bool:
         """Whether to search: the plan is used up, or the world did something else."""

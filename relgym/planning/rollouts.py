@@ -59,9 +59,10 @@ class Plan:
     actions
         Shape ``(h, *action shape)``.
     states
-        Expected state vectors, the present one first, shape ``(h + 1, width)``.
+        Expected state vectors, the present one first, shape ``(h + 1, width)``; one fewer where the last outcome isn't
+        known.
     rewards
-        Expected rewards, shape ``(h,)``.
+        Expected rewards, shape ``(h,)``; one fewer where the last outcome isn't known.
     worth
         What the search maximised.
     terminates, known
@@ -98,6 +99,8 @@ class Rollouts:
         How they ended, shape ``(n,)``.
     worth
         What they are worth, shape ``(n,)``.
+    curious
+        Whether unknown outcomes are worth something: plans then lead into them.
     """
 
     states: NDArray[np.float64]
@@ -106,6 +109,7 @@ class Rollouts:
     terminated: NDArray[np.bool_]
     known: NDArray[np.bool_]
     worth: Float1D
+    curious: bool = False
 
     def plan(self, k: int, actions: NDArray[Any], latents: NDArray[np.float64]) -> Plan:
         """Roll-out k as a plan; its actions and latents are those of all, shape ``(n, h, …)``.
@@ -113,7 +117,8 @@ class Rollouts:
         A plan whose first outcome isn't known still has its first action.
         """
         length = int(self.lengths[k])
-        kept = max(length, 1)
+        leads = self.curious and not self.known[k]
+        kept = max(length + leads, 1)
         return Plan(
             actions[k, :kept],
             self.states[: length + 1, k].copy(),
@@ -172,7 +177,7 @@ def roll_out(simulator: Simulator, start: Float1D, actions: NDArray[Any], object
             total[rows[~stepped.known]] += factor * objective.curiosity
         factor *= objective.discount
     total += _beyond(objective, states[-1], rewards, lengths, ended, known)
-    return Rollouts(states, rewards, lengths, ended, known, total)
+    return Rollouts(states, rewards, lengths, ended, known, total, objective.curiosity is not None)
 
 
 def _beyond(

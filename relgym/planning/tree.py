@@ -27,8 +27,11 @@ class TreeSearch:
     Sequences of actions that are drawn about a mean stay this side of an obstacle when the way round it pays less at
     first. The tree goes wherever the world lets it: it keeps, of every cell of a coarse grid over the properties that
     change, the best branch, and grows again from cells that were seldom grown from (cells as in Go-Explore, Ecoffet et
-    al. 2021; kinodynamic trees, LaValle and Kuffner 2001, the RRT that the thesis wished for, §5.1). Branches of
-    different lengths are compared as if what remains of the horizon paid the mean reward of all steps of the tree.
+    al. 2021; kinodynamic trees, LaValle and Kuffner 2001, the RRT that the thesis wished for, §5.1). While it grows,
+    branches of different lengths are compared as if what remains of the horizon paid the mean reward of all steps of
+    the tree. The plan is a whole branch: one that ends the episode or lasts to the horizon, or, with curiosity, leads
+    to a step of unknown outcome. Of others nobody knows what they lead to: who races towards a goal does well until
+    he can't brake any more. Only while there is no whole branch the best part of one is the plan.
 
     Parameters
     ----------
@@ -53,7 +56,8 @@ class TreeSearch:
     -----
     Cost: for each of the ``expansions`` as many decisions of the simulator as the mean of the powers of two up to
     ``hold``; memory for as many states as there are decisions.
-    Branches of which an outcome isn't known end there, at no worth.
+    Branches of which an outcome isn't known end there: with what `Objective.curiosity` says it is worth, or, without
+    it, before the step of unknown outcome, which is then no part of any plan.
     """
 
     horizon: int = 50
@@ -83,7 +87,7 @@ class TreeSearch:
         deadline: float | None,
     ) -> Plan:
         """See `Search.plan`; the last plan is not needed."""
-        tree = _Tree(start, self.cells, self.horizon)
+        tree = _Tree(start, self.cells, self.horizon, objective)
         fresh, tried = 0, 0
         while tried < self.expansions and fresh < self.patience:
             if tried and deadline is not None and perf_counter() >= deadline:
@@ -91,9 +95,9 @@ class TreeSearch:
             improved = self._expand(tree, simulator, coder, objective, rng)
             tried += self.batch
             # While none that ends the episode is the best of all there is no reason to stop.
-            settled = tree.ended >= 0 and tree.best(objective) == tree.ended
+            settled = tree.ended >= 0 and tree.best() == tree.ended
             fresh = fresh + self.batch if settled and not improved else 0
-        plan = tree.branch(tree.best(objective), coder)
+        plan = tree.branch(tree.best(), coder)
         if self.refine is None:
             return plan
         return self._refined(plan, simulator, coder, start, objective, rng, deadline)
@@ -125,6 +129,10 @@ class TreeSearch:
                 worth = worth + objective.bonus(states, actions[alive], stepped.states)
             worth = objective.discount ** tree.depths[nodes[alive]] * worth
             known = stepped.known
+            if objective.curiosity is not None and not known.all():
+                off = nodes[alive[~known]]
+                curious = np.asarray(objective.discount ** tree.depths[off] * objective.curiosity, np.float64)
+                tree.leave(off, curious, latents[alive[~known]])
             grown = tree.grow(
                 nodes[alive[known]],
                 stepped.states[known],
@@ -164,6 +172,7 @@ class _Tree:
     start: Float1D
     cells: int
     horizon: int
+    objective: Objective
     states: Float2D = field(init=False)
     rewards: Float1D = field(init=False)
     worths: Float1D = field(init=False)
@@ -173,6 +182,10 @@ class _Tree:
     size: int = field(init=False, default=1)
     ended: int = field(init=False, default=-1)
     ended_worth: float = field(init=False, default=-np.inf)
+    whole: int = field(init=False, default=-1)
+    whole_worth: float = field(init=False, default=-np.inf)
+    left: int = field(init=False, default=-1)
+    left_worth: float = field(init=False, default=-np.inf)
     worths_gained: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
@@ -240,7 +253,33 @@ class _Tree:
             best = int(last[self.worths[last].argmax()])
             if self.worths[best] > self.ended_worth:
                 self.ended, self.ended_worth = best, float(self.worths[best])
+        self._finish(new[~ended & (self.depths[new] >= self.horizon)])
         return new
+
+    def _finish(self, nodes: NDArray[np.intp]) -> None:
+        """Keep the best of those that lasted to the horizon."""
+        if not len(nodes):
+            return
+        worth = self.worths[nodes].copy()
+        if self.objective.value is not None:
+            worth += self.objective.discount**self.horizon * self.objective.value(self.states[nodes])
+        k = int(worth.argmax())
+        if worth[k] > self.whole_worth:
+            self.whole, self.whole_worth = int(nodes[k]), float(worth[k])
+
+    def leave(self, parents: NDArray[np.intp], worths: Float1D, latents: Float2D) -> None:
+        """Take note of steps of unknown outcome that are worth something: the best of them is kept, as a leaf."""
+        total = self.worths[parents] + worths
+        k = int(total.argmax())
+        if total[k] <= self.left_worth:
+            return
+        self._make_room(self.size + 1, latents.shape[1])
+        new, self.size = self.size, self.size + 1
+        self.states[new], self.rewards[new], self.worths[new] = self.states[parents[k]], 0.0, total[k]
+        self.depths[new], self.parents[new] = self.depths[parents[k]] + 1, parents[k]
+        assert self.latents is not None, "made with room"
+        self.latents[new] = latents[k]
+        self.left, self.left_worth = new, float(total[k])
 
     def settle(self, nodes: NDArray[np.intp]) -> None:
         """Let new nodes take the cells that they are the best of."""
@@ -266,17 +305,22 @@ class _Tree:
                 self._members[key] = node
                 self._visits.setdefault(key, 0)
 
-    def best(self, objective: Objective) -> int:
-        """The branch that is worth most: one that ends the episode, or the best of all cells."""
+    def best(self) -> int:
+        """The branch that is worth most: of whole ones, if there are any."""
+        found, most = self.whole, self.whole_worth
+        # Life goes on after a step of unknown outcome, as after any other.
+        if self.left >= 0 and (worth := float(self.scores(np.array([self.left]))[0])) >= most:
+            found, most = self.left, worth
+        if self.ended >= 0 and self.ended_worth >= most:
+            found = self.ended
+        if found >= 0:
+            return found
         nodes = np.array(list(self._members.values()), dtype=np.intp)
-        worth = self.scores(nodes)
-        if objective.value is not None:
-            worth += objective.discount ** self.depths[nodes] * objective.value(self.states[nodes])
-        worth[nodes == 0] = -np.inf  # a plan has a first action
-        k = int(worth.argmax())
-        if self.ended >= 0 and self.ended_worth >= worth[k]:
-            return self.ended
-        return int(nodes[k])
+        scores = self.scores(nodes)
+        if (value := self.objective.value) is not None:
+            scores += self.objective.discount ** self.depths[nodes] * value(self.states[nodes])
+        scores[nodes == 0] = -np.inf  # a plan has a first action
+        return int(nodes[scores.argmax()])
 
     def branch(self, node: int, coder: ActionCoder) -> Plan:
         """The way from the root to a node, as a plan; of the root alone an action at the latents' middle."""
@@ -293,13 +337,14 @@ class _Tree:
         latents = self.latents[path].copy()
         states = np.concatenate([self.start[None], self.states[path]])
         last = path[-1]
+        known = last != self.left
         return Plan(
             coder.actions(latents),
-            states,
-            self.rewards[path].copy(),
+            states if known else states[:-1],
+            self.rewards[path if known else path[:-1]].copy(),
             float(self.worths[last]),
             last == self.ended,
-            True,
+            known,
             latents,
         )
 

@@ -14,6 +14,11 @@ RUNS = {
     "read_the_laws.py": (["--steps", "400"], "vy' = vy - 0.00098"),
     "live_in_a_dream.py": (["--episodes", "8", "--trials", "1"], "trial 0: the trucks were never more than"),
     "grandparents.py": ([], "grandparent(A, B) ← parent(A, C) ∧ parent(C, B)"),
+    "plan_mountain_car.py": (["--steps", "300", "--episodes", "0"], "0 of 0 reach the flag"),
+    "plan_truck.py": (
+        ["--steps", "62", "--random_steps", "60", "--episodes", "1"],
+        "of 1 episodes end on the goal after 62 real steps",
+    ),
     "plan_pendulum.py": (["--steps", "200", "--episodes", "0"], "angle_x0' = angle_x0 + 0.05 x2'"),
     "vector_envs.py": (["--transitions", "400"], "8 envs: "),
     "view_dict.py": (["--steps", "120"], "lower.x: x' = 0.85 x + 0.1 upper.x"),

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
+from pit import Pit
 
 from relgym.errors import ConfigError
 from relgym.planning import PlanningAgent, TreeSearch
@@ -60,3 +62,53 @@ def test_settings_out_of_range_are_refused(options: dict[str, Any]) -> None:
 def test_a_task_that_is_given_must_be_there() -> None:
     with pytest.raises(ConfigError, match="no task"):
         PlanningAgent(gym.make("CartPole-v1"), task="given")
+
+
+def falls(agent: PlanningAgent, episodes: int) -> int:
+    env, found = Pit(begin=8.0, steps=20), 0
+    for k in range(episodes):
+        seen, _ = env.reset(seed=k)
+        state, over = None, False
+        while not over:
+            action, state = agent.predict(seen, state)
+            seen, _, terminated, truncated, info = env.step(action)
+            over = terminated or truncated
+        found += info["fallen"]
+    return found
+
+
+def test_a_safe_agent_does_not_walk_into_a_pit_that_it_never_saw() -> None:
+    # While it learns, episodes are too short to reach the edge: each step forward pays, and that is all it knows.
+    search = TreeSearch(horizon=6, expansions=128, batch=64)
+    bold, careful = (
+        PlanningAgent(Pit(begin=8.0, steps=6), search=search, random_steps=150, safe=safe).learn(150)
+        for safe in (False, True)
+    )
+    assert falls(bold, 5) == 5
+    assert falls(careful, 20) == 0
+
+
+def test_in_doubt_it_acts_at_random_and_learns_again() -> None:
+    made = agent(random_steps=60).learn(100)
+    assert 0.0 <= made.doubt <= 1.0
+    assert made.model.seen == 100  # whichever model is at work has learned from all
+
+
+def test_where_more_was_paid_than_it_can_account_for_it_looks_again() -> None:
+    made = agent(task="learned").learn(60)
+    assert made.coverage is not None
+    weight = made.exploration * made._size.scale
+    objective = made._objective(explores=True)
+    assert objective.curiosity == weight > 0.0
+    assert made._objective(explores=False).bonus is None
+
+
+def test_episodes_that_were_cut_short_tell_how_long_they_may_last() -> None:
+    made = PlanningAgent(Pit(begin=60.0, steps=6), search=SEARCH, random_steps=20).learn(30)
+    assert made._limit == 6
+
+
+def test_an_agent_is_pickled_in_mid_life() -> None:
+    made = agent().learn(50)
+    again = pickle.loads(pickle.dumps(made))
+    assert again.learn(54).model.to_json() == made.learn(54).model.to_json()

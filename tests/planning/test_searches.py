@@ -136,3 +136,34 @@ def test_noise_is_held_and_standard_normal() -> None:
 def test_settings_out_of_range_are_refused(wrong: Any) -> None:
     with pytest.raises(ConfigError, match="expected"):
         wrong()
+
+
+class Brink(Line):
+    """Every step to the right pays 1; right of 3 the episode is over at a loss of 10."""
+
+    def step(self, states: Any, actions: Any) -> Any:
+        stepped = super().step(states, actions)
+        over = stepped.states[:, 0] > 3.0
+        moved = stepped.states[:, 0] - states[:, 0]
+        return replace(stepped, rewards=np.where(over, moved - 10.0, moved), terminated=over)
+
+
+def test_a_tree_does_not_take_the_road_to_the_brink_for_the_best_one() -> None:
+    plan = search(TreeSearch(horizon=6, expansions=1024, batch=64), Brink(), [0.0])
+    assert len(plan) == 6 and not plan.terminates
+    assert 2.0 < plan.worth <= 3.0
+
+
+def test_with_curiosity_a_plan_leads_into_what_is_not_known() -> None:
+    class Fog(Line):
+        def step(self, states: Any, actions: Any) -> Any:
+            stepped = super().step(states, actions)
+            return replace(stepped, known=stepped.states[:, 0] < 2.0)
+
+    for how in SEARCHES:
+        options: dict[str, Any] = {"warm": None, "rng": np.random.default_rng(0), "deadline": None}
+        coder = ActionCoder(Fog().action_space)
+        plan = how.plan(Fog(), coder, np.array([0.0]), Objective(curiosity=100.0), **options)
+        assert not plan.known
+        assert len(plan.states) == len(plan.actions) == len(plan.rewards) + 1
+        assert Fog().step(plan.states[-1][None], plan.actions[-1][None]).known.tolist() == [False]

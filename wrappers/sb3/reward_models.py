@@ -141,6 +141,10 @@ class LearnedRewardModel(RewardFunctions):
         """Put actions into scenes as an env does, unless that was said at construction."""
         self._acting = self._acting or acting
 
+    def untaught(self) -> LearnedRewardModel:
+        """A reward model of the same scenes and parameters that has learned nothing."""
+        return LearnedRewardModel(self.schema, set(self._changing), self.model.config, acting=self._acting)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the reward model to one file, atomically, with all that further learning needs; `load` reads it.
 

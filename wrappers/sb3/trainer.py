@@ -67,6 +67,10 @@ class ModelTrainer:
         Time spent on predicting and learning.
     renewals : int
         How often the model has been replaced.
+    verdict : Verdict or None
+        Of the last step: how far the prediction was off, that of reward and end included.
+    wrong : tuple of (object, property)
+        What the model said nothing or something wrong of in the last step.
     """
 
     def __init__(
@@ -84,6 +88,8 @@ class ModelTrainer:
         self.prequential = Prequential(self._config.window)
         self.seconds = 0.0
         self.renewals = 0
+        self.verdict: Verdict | None = None
+        self.wrong: tuple[Key, ...] = ()
 
     @property
     def model(self) -> DreamModel:
@@ -99,8 +105,10 @@ class ModelTrainer:
         """Predict a real step, compare, and learn from it or from an earlier one."""
         started = perf_counter()
         predicted = self.model.predict_one(real.transition.before)
-        self.acceptance.count(self._evaluated(self.model, predicted, real))
+        self.verdict = self._evaluated(self.model, predicted, real)
+        self.acceptance.count(self.verdict)
         residuals, wrong = compared(predicted, real.transition.after)
+        self.wrong = wrong
         self.prequential.count(residuals, wrong, Outcomes.of(predicted, real.transition.before, residuals))
         self.stock.add(real.start, first=real.first)
         replacement = self._challenge()
@@ -116,6 +124,11 @@ class ModelTrainer:
             if replacement.acceptance.accepted:
                 self._trainee, self._replacement, self.renewals = replacement, None, self.renewals + 1
         self.seconds += perf_counter() - started
+
+    def adopt(self, model: DreamModel) -> None:
+        """Go on with another model of the same world, which has learned from all steps so far."""
+        self._trainee.model, self._replacement = model, None
+        self.renewals += 1
 
     def catch_up(self) -> None:
         """Learn from the transitions that are still waiting; there may be no more steps to mix them with."""

@@ -24,7 +24,11 @@ from relgym.experiments.jobs.task import Task
 
 __all__ = ["Made", "compute", "make", "page", "section"]
 
-PAGES: Final = {"dream.md": "What dreaming is worth", "any-env.md": "Other people's envs"}
+PAGES: Final = {
+    "dream.md": "What dreaming is worth",
+    "plan.md": "What planning is worth",
+    "any-env.md": "Other people's envs",
+}
 """Pages of results beside this one, and their titles."""
 
 

@@ -1,0 +1,273 @@
+"""One planning agent's course of learning, tested again and again: what it learns, and what it plans in."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from time import process_time
+from typing import Any, Final, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.experiments.dyna import EPISODES, solved_at
+from relgym.planning import EnvSimulator, Objective, Planner, PlanningAgent, Steps, TreeSearch
+from relgym.scene.objects import Float1D, Float2D, Scene
+from relgym.wrappers.action_repeat import ActionRepeat
+from relgym.wrappers.sb3.acting import acting_all
+from relgym.wrappers.sb3.trainer import ModelTrainer
+
+__all__ = ["ARMS", "COURSES", "Arm", "Course", "Tests", "ceiling", "learning"]
+
+_FIRST_EPISODE: Final = 50_000
+"""Seed of the first test episode: those of the agents that dream, far from those of training."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """An env and how agents plan in it.
+
+    Attributes
+    ----------
+    name, title
+        For files, and for people.
+    env_id, arguments
+        What `gymnasium.make` is asked for.
+    repeat
+        Env steps that a decision lasts.
+    limit
+        Decisions that an episode lasts at most; agents that learn find out by themselves.
+    every
+        Decisions between two tests.
+    agent
+        Parameters of `PlanningAgent` that aren't the default.
+    search
+        How to plan.
+    """
+
+    name: str
+    title: str
+    env_id: str
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    repeat: int = 1
+    limit: int | None = None
+    every: int = 50
+    agent: Mapping[str, Any] = field(default_factory=dict)
+    search: TreeSearch = field(default_factory=TreeSearch)
+
+
+COURSES: Final = {
+    course.name: course
+    for course in (
+        Course(
+            "truck", "TruckPush", "relgym/TruckPush-v0", limit=20, search=TreeSearch(horizon=20, batch=512)
+        ),
+        Course(
+            "ball",
+            "BallGoal",
+            "relgym/BallGoal-v0",
+            repeat=5,
+            limit=100,
+            search=TreeSearch(horizon=60, batch=512, expansions=8_192),
+        ),
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """What is planned in.
+
+    Attributes
+    ----------
+    name, title
+        For files, and for people.
+    model
+        Learned by relgym, or by an ensemble of nets.
+    task
+        Whether reward and termination are learned or given.
+    explores
+        Whether it looks for what is new, or acts at random until it has learned.
+    """
+
+    name: str
+    title: str
+    model: Literal["relational", "neural"] = "relational"
+    task: Literal["learned", "given"] = "learned"
+    explores: bool = True
+
+
+ARMS: Final = {
+    arm.name: arm
+    for arm in (
+        Arm("relgym", "planner, relgym"),
+        Arm("relgym-given", "planner, relgym, reward given", task="given"),
+        Arm("greedy", "planner, relgym, without exploration", explores=False),
+        Arm("ensemble", "planner, MLP ensemble", model="neural"),
+    )
+}
+
+
+class Tests:
+    """Fixed episodes, one after the other.
+
+    Parameters
+    ----------
+    course
+        Where.
+    episodes
+        How many, of `EPISODES`.
+    """
+
+    def __init__(self, course: Course, episodes: int = EPISODES) -> None:
+        env = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
+        self._env: gym.Env[Any, Any] = ActionRepeat(env, course.repeat) if course.repeat > 1 else env
+        self._episodes = episodes
+        self.decisions, self.seconds = 0, 0.0
+
+    def successes(self, agent: Any) -> int:
+        """How many episodes the agent ends well; ``info["is_success"]`` at the end counts."""
+        good = 0
+        for k in range(self._episodes):
+            seen, _ = self._env.reset(seed=_FIRST_EPISODE + k)
+            state, over = None, False
+            info: dict[str, Any] = {}
+            while not over:
+                started = process_time()
+                action, state = agent.predict(seen, state)
+                self.seconds += process_time() - started
+                self.decisions += 1
+                seen, _, terminated, truncated, info = self._env.step(action)
+                over = terminated or truncated
+            good += bool(info["is_success"])
+        return good
+
+
+class NeuralSimulator:
+    """A `NeuralWorldModel`, its rewards and ends included, as a simulator.
+
+    Parameters
+    ----------
+    model
+        The model.
+    like
+        An env whose observations are scenes.
+    repeat
+        Env steps that a decision lasts.
+    """
+
+    def __init__(self, model: Any, like: gym.Env[Any, Any], repeat: int) -> None:
+        self.model, self._repeat = model, repeat
+        self.action_space, self.observation_space = like.action_space, like.observation_space
+        self._layout = model.schema.layout(name for name, kind in model.schema.objects if kind != "action")
+
+    def state(self, observation: Any) -> Float1D:
+        """State vector that an observation shows."""
+        scene = observation if isinstance(observation, Scene) else self.model.schema.scene(observation)
+        self._layout = scene.layout
+        return scene.vector
+
+    def prepare(self) -> None:
+        """Nothing to do."""
+
+    def step(self, states: Float2D, actions: NDArray[Any]) -> Steps:
+        """Follow n actions from n states."""
+        found, rewards = states.copy(), np.zeros(len(states))
+        ended = np.zeros(len(states), dtype=np.bool_)
+        for _ in range(self._repeat):
+            going = np.flatnonzero(~ended)
+            if not len(going):
+                break
+            whole, joined = acting_all(self.model.schema, self._layout, found[going], actions[going])
+            paid, over = self.model.predict_rewards(whole, joined)
+            told = self.model.predict_batch(whole, joined)
+            found[going] = np.delete(told.vectors, whole.slice(whole.index("action")), axis=1)
+            rewards[going] += paid
+            ended[going] = over
+        return Steps(found, rewards, ended, np.full(len(states), bool(self.model.ensemble.ready)))
+
+
+def make_agent(course: Course, arm: Arm, *, seed: int) -> PlanningAgent:
+    """An agent that has seen nothing yet."""
+    env = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
+    options: dict[str, Any] = {"search": course.search, "repeat": course.repeat, "seed": seed, **course.agent}
+    if not arm.explores:
+        options["exploration"] = 0.0
+    if arm.model == "neural":
+        from relgym.baselines.ensemble import MLPEnsemble
+        from relgym.baselines.neural_world import NeuralWorldModel
+        from relgym.wrappers.flat import FlatView
+
+        # The nets see the scene as a policy does: relative and scaled, which is to their advantage.
+        schema: Any = env.get_wrapper_attr("schema")
+        features = FlatView(env).get_wrapper_attr("flattener")
+        model = NeuralWorldModel(schema, features=features, ensemble=MLPEnsemble(seed=seed))
+
+        def simulated(trainer: ModelTrainer) -> NeuralSimulator:
+            return NeuralSimulator(trainer.model, env, course.repeat)
+
+        options |= {"model": model, "simulator": simulated}
+    return PlanningAgent(env, task=arm.task, **options)
+
+
+def learning(*, course: str, arm: str, seed: int, steps: int, episodes: int = EPISODES) -> dict[str, Any]:
+    """One agent's course of learning.
+
+    Parameters
+    ----------
+    course, arm
+        Names in `COURSES` and `ARMS`.
+    seed
+        Of everything random.
+    steps
+        Real decisions at most; the run ends sooner with two tests in a row of which 90 % succeed.
+    episodes
+        Of a test.
+
+    Returns
+    -------
+    ``curve``, (real decisions, successes of 100) at each test; ``solved_at``, decisions at the second good test in a
+    row or None; ``seconds`` of processor time without tests, ``decision``, mean processor time of a decision in the
+    last test, in seconds; ``laws``, what was learned.
+    """
+    place = COURSES[course]
+    agent = make_agent(place, ARMS[arm], seed=seed)
+    curve: list[tuple[int, int]] = []
+    spent, decision = 0.0, 0.0
+    for at in range(place.every, steps + 1, place.every):
+        started = process_time()
+        agent.learn(at * place.repeat)
+        spent += process_time() - started
+        tests = Tests(place, episodes)
+        # Who has only acted at random so far has nothing to show: at most what random actions reach.
+        good = tests.successes(agent) if agent.ready else 0
+        decision = tests.seconds / max(1, tests.decisions)
+        curve.append((at, round(good * 100 / episodes)))
+        print(f"{course}, {arm}, seed {seed}: {good} of {episodes} after {at:,}", file=sys.stderr, flush=True)
+        if solved_at(curve) is not None:
+            break
+    describe = getattr(agent.model, "describe", None)
+    return {
+        "curve": curve,
+        "solved_at": solved_at(curve),
+        "seconds": spent,
+        "decision": decision,
+        "laws": describe() if describe is not None else "",
+    }
+
+
+def ceiling(*, course: str, episodes: int = EPISODES) -> dict[str, Any]:
+    """The same search in the exact engine: nothing is learned."""
+    place = COURSES[course]
+    env = gym.make(place.env_id, disable_env_checker=True, **place.arguments)
+    objective = Objective(discount=PlanningAgent.DISCOUNT)
+    tests = Tests(place, episodes)
+    simulator = EnvSimulator(env, repeat=place.repeat)
+    good = tests.successes(Planner(simulator, place.search, objective, limit=place.limit))
+    return {
+        "successes": round(good * 100 / episodes),
+        "decision": tests.seconds / max(1, tests.decisions),
+        "episodes": episodes,
+    }

@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+
+from relgym import WorldModel
+from relgym.planning.review import learned_again, right
+from relgym.scene.objects import Transition
+from relgym.wrappers.sb3.recorder import TransitionRecorder
+
+
+def cart_steps(count: int) -> tuple[TransitionRecorder, list[Transition]]:
+    env = TransitionRecorder(gym.make("relgym/TruckPush-v0", n_boxes=1))
+    env.action_space.seed(0)
+    env.reset(seed=0)
+    found: list[Transition] = []
+    while len(found) < count:
+        *_, terminated, truncated, _ = env.step(env.action_space.sample())
+        if terminated or truncated:
+            env.reset()
+        found += [real.transition for real in env.take()]
+    return env, found
+
+
+def test_a_model_that_learned_again_is_right_of_what_it_saw_and_the_old_one_is_left_alone() -> None:
+    env, seen = cart_steps(60)
+    old = WorldModel(env.schema)
+    fresh = learned_again(old, seen, rng=np.random.default_rng(0))
+    assert old.seen == 0 and fresh.seen == 60
+    assert right(fresh, seen).mean() > 0.9
+
+
+def test_each_transition_is_told_from_the_others() -> None:
+    env, seen = cart_steps(60)
+    model = learned_again(WorldModel(env.schema), seen, rng=np.random.default_rng(0))
+    good = np.flatnonzero(right(model, seen))[:3]
+    told = [seen[k] for k in good]
+    moved = told[1].after.replace({("truck", "vx"): told[1].after["truck"]["vx"] + 0.5})
+    assert right(model, [told[0], replace(told[1], after=moved), told[2]]).tolist() == [True, False, True]
+
+
+def test_nothing_is_right_of_nothing() -> None:
+    env, _ = cart_steps(1)
+    assert right(WorldModel(env.schema), []).tolist() == []
