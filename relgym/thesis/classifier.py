@@ -180,7 +180,9 @@ def _rest(left: Rows, here: Rows, tree: DecisionTree, sample: Sample) -> Rows:
     return left[~np.isin(left, taken)]
 
 
-def _stage(clause: Clause | None, tree: DecisionTree | None, rows: Rows, positive: Bools, sample: Sample) -> Stage:
+def _stage(
+    clause: Clause | None, tree: DecisionTree | None, rows: Rows, positive: Bools, sample: Sample
+) -> Stage:
     """Count what is decided at a stage."""
     truth = positive[rows]
     if tree is None:
@@ -212,9 +214,7 @@ def _tree(
         if min(int(part.sum()), int((~part).sum())) < settings.tree_least:
             return None, success
     x = sample.numbers[rows]
-    tree = learn_tree(
-        x[grow], truth[grow], columns=sample.names, min_leaf=2, max_depth=_DEEP, prune=False
-    )
+    tree = learn_tree(x[grow], truth[grow], columns=sample.names, min_leaf=2, max_depth=_DEEP, prune=False)
     reached = float((tree.predict_batch(x[judge]) == truth[judge]).mean())
     return (tree, reached) if reached > success else (None, success)
 

@@ -211,9 +211,7 @@ class Clusterer:
             lost, gained = self._assign()
             stale = gained | (lost if self.settings.refit_after_loss else set())
             refitted = [self._refit(c) for c in list(self.clusters) if c.number in stale]
-            gone = [
-                c for c in self.clusters if len(self.members(c.number)) < self.settings.least_members
-            ]
+            gone = [c for c in self.clusters if len(self.members(c.number)) < self.settings.least_members]
             for cluster in gone:
                 self._move(self.members(cluster.number), NOISE)
                 self._drop(cluster)
@@ -312,9 +310,7 @@ def _occam(general: Cluster, old: Cluster, new: Cluster) -> bool:
 
 def _shared(arrangements: list[Arrangement]) -> list[list[range]]:
     """For each arrangement the columns of the target and of the types that are alone in all of them, in one order."""
-    alone = [
-        {a.layout.types[i].name: i for i in a.alone() if i != a.target} for a in arrangements
-    ]
+    alone = [{a.layout.types[i].name: i for i in a.alone() if i != a.target} for a in arrangements]
     names = sorted(set.intersection(*(set(found) for found in alone)))
     return [
         [a.columns(a.target), *(a.columns(found[name]) for name in names)]

@@ -98,7 +98,9 @@ class Observer:
         order = np.argsort(~present, axis=1, kind="stable")[:, :width]
         seen = np.take_along_axis(present, order, axis=1)
         every = np.arange(len(order))[:, None, None, None]
-        binary = table[every, np.arange(table.shape[1])[:, None, None], order[:, None, :, None], order[:, None, None, :]]
+        binary = table[
+            every, np.arange(table.shape[1])[:, None, None], order[:, None, :, None], order[:, None, None, :]
+        ]
         small = np.take_along_axis(unary, np.repeat(order[:, None], unary.shape[1], axis=1), axis=2)
         own = (order == body).argmax(axis=1)[:, None]
         bodies = np.array(layout.bodies, dtype=np.intp)

@@ -245,9 +245,7 @@ def learn_clauses(
     return found
 
 
-def _parted(
-    counts: Weights, settings: ThesisSettings, rng: np.random.Generator
-) -> tuple[Weights, Weights]:
+def _parted(counts: Weights, settings: ThesisSettings, rng: np.random.Generator) -> tuple[Weights, Weights]:
     """Examples to grow clauses on and examples to judge them by."""
     if settings.grow_share == 1.0:
         return counts, counts
@@ -257,9 +255,7 @@ def _parted(
     return grow, counts - grow
 
 
-def _grown(
-    facts: Facts, positive: Weights, negative: Weights, settings: ThesisSettings
-) -> list[Literal]:
+def _grown(facts: Facts, positive: Weights, negative: Weights, settings: ThesisSettings) -> list[Literal]:
     bindings: Bools = np.ones(len(facts), dtype=np.bool_)
     literals: list[Literal] = []
     gains: list[float] = []

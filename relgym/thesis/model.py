@@ -17,8 +17,8 @@ from relgym.scene.relations import Extractor
 from relgym.scene.schema import SceneSchema
 from relgym.thesis.classifier import Pair, Sample, learn_pair, ranking
 from relgym.thesis.clusterer import Clusterer
-from relgym.thesis.facts import Facts, Observer, joined
 from relgym.thesis.examples import Arrangement
+from relgym.thesis.facts import Facts, Observer, joined
 from relgym.thesis.modes import Casting, Cluster
 from relgym.thesis.roles import RoleRule, assign, learn_role
 from relgym.thesis.settings import ThesisSettings
@@ -100,7 +100,9 @@ class ThesisModel:
         self.targets = schema.targets
         self.seen = 0
         self._models = {
-            (t.type, t.property): TargetModel(t, Clusterer(replace(self.settings, seed=self.settings.seed + k)))
+            (t.type, t.property): TargetModel(
+                t, Clusterer(replace(self.settings, seed=self.settings.seed + k))
+            )
             for k, t in enumerate(schema.targets)
         }
         self._extractor = Extractor(schema)
@@ -167,7 +169,11 @@ class ThesisModel:
             numbers[rows] = x[:, [arrangement.layout.column(arrangement.target, n) for n in names]]
             parts.append(facts)
             at += len(facts)
-        return Sample(joined(parts), state, numbers, names) if parts else Sample(_nothing(self._close), state, numbers, names)
+        return (
+            Sample(joined(parts), state, numbers, names)
+            if parts
+            else Sample(_nothing(self._close), state, numbers, names)
+        )
 
     def _own(self, target: Target) -> tuple[str, ...]:
         """Properties of the target that trees test: all but where it is (§3.4.4)."""

@@ -49,9 +49,7 @@ def fit(x: Floats, y: Floats, variance: float) -> Line:
     Cost: O(n d) per chosen column.
     """
     columns, weights, intercept = fit_samples(x[None], y[None], variance)
-    chosen = [
-        (int(c), float(w)) for c, w in zip(columns[0], weights[0], strict=True) if c >= 0 and w != 0.0
-    ]
+    chosen = [(int(c), float(w)) for c, w in zip(columns[0], weights[0], strict=True) if c >= 0 and w != 0.0]
     chosen.sort()
     return Line(tuple(c for c, _ in chosen), tuple(w for _, w in chosen), float(intercept[0]))
 

@@ -57,7 +57,9 @@ def learn_role(
     settings, rng
         As for mode classifiers.
     """
-    situations, which = np.unique(np.array([p[:3] for p in played], dtype=np.intp), axis=0, return_inverse=True)
+    situations, which = np.unique(
+        np.array([p[:3] for p in played], dtype=np.intp), axis=0, return_inverse=True
+    )
     yes = np.array([p[3] for p in played], dtype=np.bool_)
     counts = [np.bincount(which.reshape(-1)[part], minlength=len(situations)) for part in (yes, ~yes)]
     if not counts[1].any():
