@@ -1,4 +1,4 @@
-"""Mode classifiers (§3.4.2-§3.4.5): clauses with decision trees behind them, for each pair of modes, and their votes."""
+"""Mode classifiers (§3.4.2-§3.4.5): clauses with decision trees behind them, for each pair of modes, and votes."""
 
 from __future__ import annotations
 

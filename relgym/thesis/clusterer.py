@@ -301,8 +301,8 @@ class Clusterer:
 def _occam(general: Cluster, old: Cluster, new: Cluster) -> bool:
     """Whether one function is simpler than two, and no more special than either.
 
-    ``-0.9 v`` covers what doesn't move, but ``v' = 0`` says it with less; and of two scenes anything that differs between
-    them tells left from right.
+    ``-0.9 v`` covers what doesn't move, but ``v' = 0`` says it with less; and of two scenes anything that differs
+    between them tells left from right.
     """
     parameters = old.parameters, new.parameters
     return general.parameters <= max(parameters) and general.parameters < sum(parameters)

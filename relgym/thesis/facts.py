@@ -1,4 +1,4 @@
-"""Relational states as FOIL sees them: which relations hold between a target and the objects close to it (§3.3, §3.4)."""
+"""Relational states as FOIL sees them: which relations hold between a target and what is close to it (§3.3, §3.4)."""
 
 from __future__ import annotations
 

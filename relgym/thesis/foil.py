@@ -292,7 +292,7 @@ def _loose(facts: Facts, literals: Sequence[Literal], named: int) -> Bools:
 
 
 def _starred(literals: Sequence[Literal], named: int) -> tuple[Literal, ...]:
-    """Number variables anew, in the order in which positive literals bring them up; one left only in negations is ``*``."""
+    """Number variables anew, as positive literals bring them up; one that is left in negations only is ``*``."""
     numbers = {v: v for v in range(named)}
     for literal in literals:
         if literal.positive:

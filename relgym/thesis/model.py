@@ -184,6 +184,8 @@ class ThesisModel:
         examples = part.clusterer.examples
         members = part.clusterer.members(cluster.number)
         played: list[list[tuple[int, int, int, bool]]] = [[] for _ in cluster.roles[1:]]
+        kinds = [role.kind for role in cluster.roles]
+        alike = [[j for j, other in enumerate(kinds) if j and other == kind] for kind in kinds]
         parts: list[Facts] = []
         at = 0
         for group in np.unique(examples.groups[members]).tolist():
@@ -200,7 +202,8 @@ class ThesisModel:
                         continue
                     for i in layout.of_type(role.type):
                         if i != target:
-                            does = casts[number].objects[k + 1] == i
+                            # Whoever plays one of several equal roles plays all of them (§3.5.1).
+                            does = i in {casts[number].objects[j] for j in alike[k + 1]}
                             played[k].append((at + int(which[row]), place[target], place[i], does))
             parts.append(facts)
             at += len(facts)

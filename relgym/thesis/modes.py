@@ -111,7 +111,8 @@ class Cluster:
     def cast(self, arrangement: Arrangement, x: Floats, y: Floats) -> NDArray[np.intp]:
         """Number of the casting with the least error of each example."""
         errors = [np.abs(casting.values(x) - y) for casting in self.castings(arrangement)]
-        return np.argmin(np.stack(errors), axis=0)
+        chosen: NDArray[np.intp] = np.argmin(np.stack(errors), axis=0)
+        return chosen
 
     def mode(self, target: Target, examples: int) -> Mode:
         """The mode as a record."""
@@ -122,7 +123,7 @@ class Cluster:
 def castings(roles: Sequence[Role], intercept: float, arrangement: Arrangement) -> Iterator[Casting]:
     """All assignments of different objects to the roles; the target's is played by the target."""
     layout = arrangement.layout
-    offers = [(arrangement.target,)]
+    offers: list[tuple[int, ...]] = [(arrangement.target,)]
     for role in roles[1:]:
         offers.append(tuple(i for i in layout.of_type(role.type) if i != arrangement.target))
     for objects in product(*offers):

@@ -244,8 +244,8 @@ DEVIATIONS: Final = (
         "whatever function covers two modes replaces them",
         "one that has fewer parameters than both together, and no more than the larger one",
         "-0.9 vy covers the examples of vy' = 0, where vy is 0: tables 4.2 and 4.9 could never hold both; and whatever "
-        "differs between two scenes tells left from right in them. Late versions of the program did unite these; those of "
-        "the experiments only united modes of one scene",
+        "differs between two scenes tells left from right in them. Late versions of the program did unite these; those "
+        "of the experiments only united modes of one scene",
     ),
     Deviation(
         "both",

@@ -24,8 +24,8 @@ from relgym.experiments.chapter4.weight import weight_of
 from relgym.experiments.data import THESIS_EXPERIMENTS, BallExperiment, ball_episodes
 from relgym.experiments.episodes import Episode
 from relgym.model.text import plain
-from relgym.thesis.model import ThesisModel
 from relgym.scene.schema import SceneSchema
+from relgym.thesis.model import ThesisModel
 
 __all__ = ["fresh_episodes", "lesson", "taught_episodes"]
 

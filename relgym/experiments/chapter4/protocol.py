@@ -28,7 +28,7 @@ LEARNERS: Final[Mapping[str, str]] = {
 ABLATIONS: Final[Mapping[str, str]] = {
     "original": "as it is",
     "original, all examples judge": "clauses are judged by all negatives, not by a quarter of them: grow_share=1",
-    "original, trees for rare modes": "a tree also for fewer than 60 examples of a mode: tree_least=3, tree_success=0.95",
+    "original, trees for rare modes": "a tree also for few examples of a mode: tree_least=3, tree_success=0.95",
     "original, either class positive or not": "the older mode of a pair is always the positive class: polarities=False",
 }
 """The thesis' program, and what becomes of it with one cause of its errors taken away."""
@@ -135,6 +135,10 @@ class Protocol:
     def tests(self) -> dict[str, Any]:
         """Arguments that say which examples to test on."""
         return {"seeds": list(TEST_SEEDS), "episodes": self.test_episodes}
+
+    def __str__(self) -> str:
+        size = "whole" if self.checkpoints is None else "fast"
+        return f"{size} protocol, {self.batches} of 50 batches, {self.test_episodes} of {WHOLE_TEST} test episodes"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

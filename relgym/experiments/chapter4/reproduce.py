@@ -18,6 +18,7 @@ from relgym.experiments.chapter4.catalogue import JOBS
 from relgym.experiments.chapter4.job import Job, Shown
 from relgym.experiments.chapter4.protocol import LEARNERS, Protocol
 from relgym.experiments.chapter4.published import REMARKS
+from relgym.experiments.chapter4.staleness import declared, digest_of, outdated
 from relgym.experiments.jobs.run import Progress, results, run
 from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
@@ -44,6 +45,10 @@ class Made:
         When and how it was made.
     seconds
         Of computing, all tasks together.
+    code
+        Digest of the code behind it (`relgym.experiments.chapter4.staleness`).
+    protocol
+        How thoroughly, for people.
     """
 
     name: str
@@ -54,6 +59,8 @@ class Made:
     day: str
     command: str
     seconds: float
+    code: str = ""
+    protocol: str = ""
 
 
 def compute(
@@ -95,11 +102,15 @@ def make(job: Job, protocol: Protocol, store: ResultStore, out: Path, command: s
         date.today().isoformat(),
         command,
         _seconds(plan, store),
+        digest_of(job.name),
+        str(protocol),
     )
     write_atomically(out / f"{job.name}.txt", f"{text}\n".encode())
     write_atomically(out / f"{job.name}.csv", _csv(shown).encode())
     if shown.draw is not None:
         write_atomically(out / figure, _drawn(shown))
+    else:
+        (out / f"{job.name}.png").unlink(missing_ok=True)
     write_atomically(
         out / f"{job.name}.json", json.dumps(asdict(made), indent=1, ensure_ascii=False).encode()
     )
@@ -152,8 +163,11 @@ def page(out: Path, target: Path) -> list[str]:
     for each in made:
         if each.figure:
             write_atomically(folder / each.figure, (out / each.figure).read_bytes())
+        else:  # one of an earlier run shows what is no longer so
+            (folder / f"{each.name}.png").unlink(missing_ok=True)
     sections = [section(each, folder.name) for each in made]
-    write_atomically(target, "\n\n".join([_head(made, folder), *sections, ""]).encode())
+    text = "\n\n".join([_head(made, folder), *sections, ""])
+    write_atomically(target, declared(text, outdated(text)).encode())
     return [each.name for each in made]
 
 
@@ -197,5 +211,7 @@ def _anchor(made: Made) -> str:
 def section(made: Made, folder: str) -> str:
     """A part of a page of results: its heading, how it was made, its figure in `folder`, its text."""
     figure = f"\n\n![{made.title}]({folder}/{made.figure})" if made.figure else ""
-    how = f"`{made.command}`, {made.day}; {made.seconds:.0f} s of computing."
+    code = f"; code `{made.code}`" if made.code else ""
+    protocol = f"; {made.protocol}" if made.protocol else ""
+    how = f"`{made.command}`, {made.day}{code}{protocol}; {made.seconds:.0f} s of computing."
     return f"## {made.name}: {made.title} ({made.source})\n\n{how}{figure}\n\n```text\n{made.text}\n```"
