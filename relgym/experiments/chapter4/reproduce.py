@@ -140,6 +140,8 @@ def _drawn(shown: Shown) -> bytes:
 def page(out: Path, target: Path) -> list[str]:
     """Write the page of results (Markdown) from what jobs have written, and copy their figures beside it.
 
+    Sections of the page that the folder holds no results of stay as they are.
+
     Parameters
     ----------
     out
@@ -165,10 +167,19 @@ def page(out: Path, target: Path) -> list[str]:
             write_atomically(folder / each.figure, (out / each.figure).read_bytes())
         else:  # one of an earlier run shows what is no longer so
             (folder / f"{each.name}.png").unlink(missing_ok=True)
-    sections = [section(each, folder.name) for each in made]
-    text = "\n\n".join([_head(made, folder), *sections, ""])
+    known = _kept(target) | {each.name: section(each, folder.name) for each in made}
+    sections = [known[name] for name in JOBS if name in known]
+    text = "\n\n".join([_head(sections, folder), *sections, ""])
     write_atomically(target, declared(text, outdated(text)).encode())
     return [each.name for each in made]
+
+
+def _kept(target: Path) -> dict[str, str]:
+    """Sections of a page as it is, by job."""
+    if not target.is_file():
+        return {}
+    parts = target.read_text(encoding="utf-8").split("\n## ")[1:]
+    return {part.partition(":")[0]: f"## {part.rstrip()}" for part in parts}
 
 
 def _made(out: Path) -> Iterator[Made]:
@@ -184,10 +195,11 @@ def _made(out: Path) -> Iterator[Made]:
                 ) from error
 
 
-def _head(made: Sequence[Made], folder: Path) -> str:
+def _head(sections: Sequence[str], folder: Path) -> str:
+    titles = [each.partition("\n")[0].removeprefix("## ") for each in sections]
     learners = "\n".join(f"- **{TITLES[name]}**: {words}" for name, words in LEARNERS.items())
-    contents = "\n".join(f"- [{each.name}: {each.title}](#{_anchor(each)})" for each in made)
-    missing = [name for name in JOBS if name not in {each.name for each in made}]
+    contents = "\n".join(f"- [{title.rpartition(' (')[0]}](#{_anchor(title)})" for title in titles)
+    missing = [name for name in JOBS if name not in {title.partition(":")[0] for title in titles}]
     rest = f"\nNot made yet: {', '.join(missing)}.\n" if missing else ""
     pages = [
         f"- [{title}]({folder.name}/{name})" for name, title in PAGES.items() if (folder / name).is_file()
@@ -203,9 +215,8 @@ def _head(made: Sequence[Made], folder: Path) -> str:
     )
 
 
-def _anchor(made: Made) -> str:
-    words = f"{made.name}: {made.title} ({made.source})".lower()
-    return "".join(c for c in words.replace(" ", "-") if c.isalnum() or c in "-_")
+def _anchor(title: str) -> str:
+    return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c in "-_")
 
 
 def section(made: Made, folder: str) -> str:

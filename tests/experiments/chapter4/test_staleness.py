@@ -81,6 +81,16 @@ def test_no_figure_without_its_section_and_none_left_over(tmp_path: Path) -> Non
     assert not (folder / "table-4.1.png").exists() and replace(made[0], figure="") == made[0]
 
 
+def test_sections_that_were_not_made_anew_stay(tmp_path: Path) -> None:
+    target = tmp_path / "results.md"
+    for name, folder in (("table-4.1", "one"), ("figure-4.8", "two")):
+        list(reproduce(Request((name,), tmp_path / folder, fast=True)))
+        page(tmp_path / folder, target)
+    text = target.read_text()
+    assert list(stamped(text)) == ["table-4.1", "figure-4.8"] and OLDER not in text
+    assert "](#table-41-configuration-parameters-42)" in text and "Not made yet: figure-1.3" in text
+
+
 def test_every_figure_of_the_page_exists_and_is_shown() -> None:
     text = RESULTS.read_text(encoding="utf-8")
     shown = {line.split("(results/")[1][:-1] for line in text.splitlines() if line.startswith("![")}
