@@ -107,13 +107,13 @@ def _extended(facts: Facts, bindings: Bools, literal: Literal, variables: int) -
         truth, _ = _placed(facts, literal, variables + new)
         return bindings.reshape(*bindings.shape, *[1] * new) & truth
     truth, star = _placed(facts, literal, variables)
-    for _ in range(star):
-        truth = truth.any(axis=-1)
+    if star:
+        truth = np.asarray(truth.any(axis=tuple(range(-star, 0))))
     return bindings & (truth if literal.positive else ~truth)
 
 
 def _covered(bindings: Bools) -> Bools:
-    return bindings.reshape(len(bindings), -1).any(axis=1)
+    return np.asarray(bindings.reshape(len(bindings), -1).any(axis=1))
 
 
 def _bindings(facts: Facts, literals: Sequence[Literal]) -> Bools:

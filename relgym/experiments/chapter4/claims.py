@@ -93,7 +93,7 @@ def _mode_rate(group: str, target: str, *names: str) -> Measure:
         modes = [
             m for run in values[group] for m in _score(run, target)["modes"] if m["name"].startswith(names)
         ]
-        return 100.0 * sum(m["wrong"] for m in modes) / max(1, sum(m["examples"] for m in modes))
+        return 100.0 * float(sum(m["wrong"] for m in modes)) / max(1, sum(m["examples"] for m in modes))
 
     return measure
 
@@ -216,7 +216,7 @@ def _share(experiment: int, axis: str, *rows: int) -> Measure:
 
     def measure(values: Values) -> float:
         runs = [run[axis] for run in values[f"{experiment}/thesis"]]
-        return 100.0 * sum(run[r] for run in runs for r in rows) / sum(sum(run) for run in runs)
+        return 100.0 * float(sum(run[r] for run in runs for r in rows)) / sum(sum(run) for run in runs)
 
     return measure
 
