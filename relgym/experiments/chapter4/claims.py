@@ -93,7 +93,9 @@ def _mode_rate(group: str, target: str, *names: str) -> Measure:
         modes = [
             m for run in values[group] for m in _score(run, target)["modes"] if m["name"].startswith(names)
         ]
-        return 100.0 * float(sum(m["wrong"] for m in modes)) / max(1, sum(m["examples"] for m in modes))
+        return (
+            100.0 * float(sum(m["wrong"] for m in modes)) / float(max(1, sum(m["examples"] for m in modes)))
+        )
 
     return measure
 
