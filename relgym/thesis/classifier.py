@@ -153,19 +153,19 @@ def _learn(
     clauses = learn_clauses(sample.facts, counts[0], counts[1], settings, rng)
     left, right, total = np.concatenate([yes, no]), 0.0, 0.0
     stages: list[Stage] = []
-    judged = 0
+    evaluated = 0
     for clause, true, false in clauses:
         here = left[holds(clause, sample.facts)[sample.state[left]]]
         success = true / max(true + false, 1)
         tree, success = _tree(here, labels == positive, sample, success, settings, rng)
         right += success * (true + false)
         total += true + false
-        judged += false
+        evaluated += false
         stages.append(_stage(clause, tree, here, labels == positive, sample))
         left = left[~np.isin(left, here)] if tree is None else _rest(left, here, tree, sample)
     missed = int((labels[left] == positive).sum())
     # What the program takes for true negatives: all but those that it saw covered.
-    rest = len(no) - judged if settings.grow_share < 1.0 else int((labels[left] == negative).sum())
+    rest = len(no) - evaluated if settings.grow_share < 1.0 else int((labels[left] == negative).sum())
     success = rest / max(rest + missed, 1)
     tree, success = _tree(left, labels == positive, sample, success, settings, rng)
     right += success * (rest + missed)
@@ -209,13 +209,13 @@ def _tree(
     grow = np.ones(len(rows), dtype=np.bool_)
     if settings.tree_share < 1.0:
         grow = rng.permutation(len(rows)) < round(settings.tree_share * len(rows))
-    judge = ~grow if settings.tree_share < 1.0 else grow
-    for part in (truth[grow], truth[judge]):
+    test = ~grow if settings.tree_share < 1.0 else grow
+    for part in (truth[grow], truth[test]):
         if min(int(part.sum()), int((~part).sum())) < settings.tree_least:
             return None, success
     x = sample.numbers[rows]
     tree = learn_tree(x[grow], truth[grow], columns=sample.names, min_leaf=2, max_depth=_DEEP, prune=False)
-    reached = float((tree.predict_batch(x[judge]) == truth[judge]).mean())
+    reached = float((tree.predict_batch(x[test]) == truth[test]).mean())
     return (tree, reached) if reached > success else (None, success)
 
 

@@ -218,7 +218,7 @@ def learn_clauses(
     Returns
     -------
     Clauses with the positive and the negative examples that each was seen to cover: of the positives those that no
-    clause before covers; of the negatives those that judged it.
+    clause before covers; of the negatives those that evaluated it.
     """
     found: list[tuple[Clause, int, int]] = []
     left = positive.copy()
@@ -246,7 +246,7 @@ def learn_clauses(
 
 
 def _parted(counts: Weights, settings: ThesisSettings, rng: np.random.Generator) -> tuple[Weights, Weights]:
-    """Examples to grow clauses on and examples to judge them by."""
+    """Examples to grow clauses on and examples to test them by."""
     if settings.grow_share == 1.0:
         return counts, counts
     total = int(counts.sum())
@@ -275,7 +275,7 @@ def _grown(facts: Facts, positive: Weights, negative: Weights, settings: ThesisS
 
 
 def _pruned(facts: Facts, literals: list[Literal], negative: Weights) -> list[Literal]:
-    """From the last to the first, literals without which no more judging negatives are covered are dropped."""
+    """From the last to the first, literals without which no more testing negatives are covered are dropped."""
     named = facts.fixed.shape[1]
     kept = list(literals)
     for literal in reversed(literals):

@@ -21,7 +21,7 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class RoleRule:
-    """What must hold of an object B that plays a role beside the target A; no clauses: any object of the type does."""
+    """What must hold of an object B that is bound to a role beside the target A; no clauses: any object of the type does."""
 
     role: Role
     clauses: tuple[Clause, ...]
@@ -44,7 +44,7 @@ def learn_role(
     settings: ThesisSettings,
     rng: np.random.Generator,
 ) -> RoleRule:
-    """Learn what objects that play a role have in common, and others of their type have not.
+    """Learn what objects that are bound to a role have in common, and others of their type have not.
 
     Parameters
     ----------

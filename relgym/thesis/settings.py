@@ -58,18 +58,18 @@ class ThesisSettings:
     max_variables
         Most new variables in a clause.
     grow_share
-        Share of the examples that clauses are grown on; the others judge them. 1: all do both.
+        Share of the examples that clauses are grown on; the others test them. 1: all do both.
     prune
-        Whether literals are dropped that exclude nothing on the judging examples.
+        Whether literals are dropped that exclude nothing on the testing examples.
     max_false
-        Largest share of false positives of a clause on the judging examples; one above it ends learning.
+        Largest share of false positives of a clause on the testing examples; one above it ends learning.
     tree_success
         Clauses and fall-throughs that are right in a smaller share of their examples get a decision tree (§3.4.4).
         Hand-tuned in the thesis, which doesn't print it: 72 of 196 wrong have a tree, 18 of 201 have none.
     tree_least
-        Fewest examples of each class for a tree, among those that judge it and those that it is grown on.
+        Fewest examples of each class for a tree, among those that test it and those that it is grown on.
     tree_share
-        Share of the examples that a tree is grown on; the others judge it. 1: all do both.
+        Share of the examples that a tree is grown on; the others test it. 1: all do both.
     polarities
         Whether either mode of a pair may be the positive class (§3.4.5).
     context

@@ -39,7 +39,7 @@ Learner: TypeAlias = WorldModel | ThesisModel
 
 _ORIGINAL: Final[Mapping[str, Mapping[str, Any]]] = {
     "original": {},
-    "original, all examples judge": {"grow_share": 1.0},
+    "original, all examples test": {"grow_share": 1.0},
     "original, trees for rare modes": {"tree_least": 3, "tree_success": 0.95},
     "original, either class positive or not": {"polarities": False},
 }

@@ -27,7 +27,7 @@ LEARNERS: Final[Mapping[str, str]] = {
 
 ABLATIONS: Final[Mapping[str, str]] = {
     "original": "as it is",
-    "original, all examples judge": "clauses are judged by all negatives, not by a quarter of them: grow_share=1",
+    "original, all examples test": "clauses are evaluated by all negatives, not by a quarter of them: grow_share=1",
     "original, trees for rare modes": "a tree also for few examples of a mode: tree_least=3, tree_success=0.95",
     "original, either class positive or not": "the older mode of a pair is always the positive class: polarities=False",
 }

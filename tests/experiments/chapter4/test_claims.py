@@ -6,7 +6,7 @@ from relgym.experiments.chapter4.claims import CLAIMS, NOT_MEASURED, Claim, plan
 from relgym.experiments.chapter4.protocol import Protocol
 
 
-def test_there_are_at_least_forty_and_each_can_be_judged() -> None:
+def test_there_are_at_least_forty_and_each_can_be_evaluated() -> None:
     assert len(CLAIMS) >= 40
     assert len({(c.section, c.text) for c in CLAIMS}) == len(CLAIMS)
     for claim in CLAIMS:
