@@ -238,7 +238,8 @@ def _pushed_pairs(learner: str) -> Measure:
     """Least training accuracy of a pair of modes, in percent."""
 
     def measure(values: Values) -> float:
-        (target,) = values[f"pushing/{learner}"][0]["report"]["targets"]
+        targets = values[f"pushing/{learner}"][0]["report"]["targets"]
+        target = next(t for t in targets if t["target"] == "truck.vx")
         least = 100.0
         for pair in target["pairs"]:
             good, bad = (sum(r[k] for r in pair["rows"]) for k in ("correct", "incorrect"))
@@ -371,7 +372,7 @@ CLAIMS: Final = (
         "4.3.3",
         "x: vertical bounces, median error after 80",
         "low",
-        _mode_quantile("1/original", _X, "bounce, left", 0.5),
+        _mode_quantile("1/original", _X, "left face", 0.5),
         (0, 1e-9),
         (0, 1e-3),
     ),
@@ -379,7 +380,7 @@ CLAIMS: Final = (
         "4.3.3",
         "x: ramp, median error after 80",
         "low",
-        _mode_quantile("1/original", _X, "bounce, slope", 0.5),
+        _mode_quantile("1/original", _X, "slope", 0.5),
         (0, 1e-9),
         (0, 1e-3),
     ),
@@ -387,7 +388,7 @@ CLAIMS: Final = (
         "4.3.3",
         "y: ramp, median error after 80",
         "low",
-        _mode_quantile("1/original", _Y, "bounce, slope", 0.5),
+        _mode_quantile("1/original", _Y, "slope", 0.5),
         (0, 1e-9),
         (0, 1e-3),
     ),
@@ -395,7 +396,7 @@ CLAIMS: Final = (
         "4.3.3",
         "y: floor bounces, median error after 80",
         "near 0",
-        _mode_quantile("1/original", _Y, "bounce, floor", 0.5),
+        _mode_quantile("1/original", _Y, "floor", 0.5),
         (0, 1e-9),
         (0, 1e-3),
     ),
@@ -419,7 +420,7 @@ CLAIMS: Final = (
         "4.3.4",
         "y: floor bounces wrong, %",
         "17.9",
-        _mode_rate("1/original", _Y, "bounce, floor"),
+        _mode_rate("1/original", _Y, "floor"),
         (11.9, 26.9),
         (6, 36),
     ),
@@ -427,7 +428,7 @@ CLAIMS: Final = (
         "4.3.4",
         "x: vertical bounces wrong, %",
         "4.1",
-        _mode_rate("1/original", _X, "bounce, left"),
+        _mode_rate("1/original", _X, "left face"),
         (2.7, 6.2),
         (1, 12),
     ),
@@ -435,7 +436,7 @@ CLAIMS: Final = (
         "4.3.4",
         "x: ramp wrong, %",
         "9.6",
-        _mode_rate("1/original", _X, "bounce, slope"),
+        _mode_rate("1/original", _X, "slope"),
         (6.4, 14.4),
         (2, 30),
     ),
@@ -451,7 +452,7 @@ CLAIMS: Final = (
         "4.3.4",
         "y: floor bounces, third quartile if the right mode is chosen",
         "0",
-        _mode_quantile("1/original", _Y, "bounce, floor", 0.75, "best"),
+        _mode_quantile("1/original", _Y, "floor", 0.75, "best"),
         (0, 1e-12),
         (0, 1e-9),
     ),
@@ -565,7 +566,7 @@ CLAIMS: Final = (
         "4.4.3",
         "y: floor bounces, errors stay high: third quartile",
         "high",
-        _mode_quantile("2/original", _Y, "bounce, floor", 0.75),
+        _mode_quantile("2/original", _Y, "floor", 0.75),
         (1e-4, 10),
         (1e-9, 10),
     ),
@@ -573,7 +574,7 @@ CLAIMS: Final = (
         "4.4.3",
         "x: halts, errors stay high: third quartile",
         "high",
-        _mode_quantile("2/original", _X, "bounce, floor, halt", 0.75),
+        _mode_quantile("2/original", _X, "floor (halt", 0.75),
         (1e-6, 10),
         (1e-9, 10),
     ),
@@ -595,7 +596,7 @@ CLAIMS: Final = (
         "4.4.4",
         "y: floor bounces wrong, %",
         "65.7",
-        _mode_rate("2/original", _Y, "bounce, floor"),
+        _mode_rate("2/original", _Y, "floor"),
         (43.8, 98.6),
         (25, 100),
     ),
@@ -603,7 +604,7 @@ CLAIMS: Final = (
         "4.4.4",
         "y: vertical bounces wrong, %",
         "22.6",
-        _mode_rate("2/original", _Y, "bounce, left"),
+        _mode_rate("2/original", _Y, "left face"),
         (15, 34),
         (5, 60),
         _LITTLE,
@@ -675,7 +676,7 @@ def claims_shown(_: Protocol, values: Values) -> Shown:
     lines: list[list[Cell]] = []
     counts: dict[str, int] = {}
     for claim in CLAIMS:
-        ours = None if claim.measure is None else claim.measure(_scenes(seen) if _of_scenes(claim) else seen)
+        ours = _ours(claim, seen)
         verdict = verdict_of(claim, ours)
         counts[verdict] = counts.get(verdict, 0) + 1
         band = "" if ours is None else f"{claim.same[0]:g} to {claim.same[1]:g}"
@@ -691,6 +692,16 @@ def claims_shown(_: Protocol, values: Values) -> Shown:
         "no spread; rates\nare called the same within 30 %, those of single modes within a factor 1.5."
     )
     return Shown(f"{table([str(h) for h in heading], lines)}\n\n{note}", [heading, *lines])
+
+
+def _ours(claim: Claim, values: Mapping[str, Any]) -> float | None:
+    """Our number; none where nothing measures it, or what does has no results."""
+    if claim.measure is None:
+        return None
+    try:
+        return claim.measure(_scenes(values) if _of_scenes(claim) else values)
+    except KeyError:
+        return None
 
 
 def _of_scenes(claim: Claim) -> bool:
