@@ -6,6 +6,7 @@ bands are ours: the thesis prints no spread. What nothing here measures says so.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
@@ -71,8 +72,9 @@ def verdict_of(claim: Claim, ours: float | None) -> str:
 # ------------------------------------------------------------------ what is measured
 def _score(run: Mapping[str, Any], target: str, episodes: int | None = None) -> Mapping[str, Any]:
     """A run's scores of a target: of the last test, or of the first one after so many episodes."""
-    tests = run["scores"] if episodes is None else [t for t in run["scores"] if t["episodes"] >= episodes]
-    found: Mapping[str, Any] = tests[-1 if episodes is None else 0]["targets"][target]
+    tests = run["scores"][-1:] if episodes is None else run["scores"]
+    late = [test for test in tests if test["episodes"] >= (episodes or 0)] or tests[-1:]
+    found: Mapping[str, Any] = late[0]["targets"][target]
     return found
 
 
@@ -699,9 +701,10 @@ def _ours(claim: Claim, values: Mapping[str, Any]) -> float | None:
     if claim.measure is None:
         return None
     try:
-        return claim.measure(_scenes(values) if _of_scenes(claim) else values)
+        found = claim.measure(_scenes(values) if _of_scenes(claim) else values)
     except KeyError:
         return None
+    return None if math.isnan(found) else found  # no test example of what it speaks of
 
 
 def _of_scenes(claim: Claim) -> bool:

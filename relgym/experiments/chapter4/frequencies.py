@@ -33,7 +33,7 @@ def plan(protocol: Protocol) -> Plan:
     """Ten seeds of each experiment, in both kinds of scenes."""
     return {
         f"{experiment}/{scenes}": [
-            Task(f"{__name__}:count", {"experiment": experiment, "seed": seed, "scenes": scenes})
+            Task(f"{__name__}:count", {"experiment": experiment, "seed": seed, "scenes": scenes}, "scenes")
             for seed in FREQUENCY_SEEDS
         ]
         for experiment in (1, 2)
