@@ -79,7 +79,8 @@ class BallBoxRampEnv(BallEnv):
     "above-left", "between", "above-right", "rightmost"), ``direction`` ("left", "right"), and every other
     draw: ``room_width``, ``room_height``, ``left_share``, ``gap`` (in ball radii), ``shift_x``,
     ``shift_y``, ``box_width``, ``box_height``, ``ramp_base``, ``ball_radius``, ``ball_floor`` (bool),
-    ``ball_x`` (0–1 along the place), ``ball_sink``, ``ball_drop``, ``ball_speed``. `reset_options` lists
+    ``ball_x`` (0–1 along the place), ``ball_sink``, ``ball_drop`` (below 0: lower than that), ``ball_speed``;
+    ``ramp_highest``, which isn't drawn. `reset_options` lists
     those of an instance: objects beyond the first of their kind have options of their own (``box2_width``,
     ``ball2``, ``ball2_direction``), and ``order`` replaces ``ramp`` when the standing objects aren't a box
     and a ramp. ``info["configuration"]`` holds what was drawn: passed as options, it gives the same scene

@@ -35,7 +35,7 @@ _SIZES = {
     "box": {"width": Range(0.6, 1.0, 0.05, 20.0), "height": Range(0.4, 0.9, 0.05, 20.0)},
     "ramp": {"base": Range(1.0, 1.5, 0.05, 20.0)},
 }
-_RAMP_HIGHEST = 1.0
+_RAMP_HIGHEST = Range(1.0, 1.0, 0.05, 20.0)
 RADIUS = Range(0.08, 0.15, 0.01, 1.0)
 """Of a ball."""
 
@@ -84,6 +84,8 @@ def room_options(standing: Mapping[str, str]) -> list[str]:
     names += [_gap_option(i) for i in range(len(standing) - 1)]
     for name, kind in standing.items():
         names += [f"{name}_{quantity}" for quantity in _SIZES[kind]]
+    if "ramp" in standing.values():
+        names.append("ramp_highest")
     return names
 
 
@@ -160,7 +162,8 @@ def _size(name: str, kind: str, inclines: Mapping[str, float], draws: Draws) -> 
     if kind == "box":
         return size[0], size[1]
     base, slope = size[0], math.tan(inclines[name])
-    scale = min(1.0, _RAMP_HIGHEST / (base * slope))
+    highest = draws.given("ramp_highest", _RAMP_HIGHEST.high, _RAMP_HIGHEST)
+    scale = min(1.0, highest / (base * slope))
     return base * scale, base * scale * slope
 
 

@@ -38,8 +38,8 @@ _SHARE = Range(0.0, 1.0, 0.0, 1.0)
 _SINK = Range(0.001, 0.010, 0.0, 0.5)
 _FLOOR_SPEED = Range(3.0, 6.0, 0.0, 20.0)
 _AIR_SPEED = Range(0.5, 4.0, 0.0, 20.0)
-_DROP_ABOVE = Range(0.1, 0.8, 0.0, 100.0)
-_DROP_BETWEEN = Range(0.05, 0.6, 0.0, 100.0)
+_DROP_ABOVE = Range(0.1, 0.8, -20.0, 100.0)
+_DROP_BETWEEN = Range(0.05, 0.6, -20.0, 100.0)
 
 
 @dataclass(frozen=True, slots=True)

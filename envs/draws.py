@@ -44,13 +44,19 @@ class Draws:
 
     def number(self, name: str, span: Range) -> float:
         """Draw uniformly from `span`; `ConfigError` when the option isn't a number it accepts."""
-        value = self.options.get(name, self.rng.uniform(span.low, span.high))
+        return self._checked(name, self.options.get(name, self.rng.uniform(span.low, span.high)), span)
+
+    def _checked(self, name: str, value: object, span: Range) -> float:
         if not isinstance(value, (int, float, np.integer, np.floating)) or not math.isfinite(value):
             raise ConfigError(f"option {name!r}: expected a finite number, got {value!r}")
         if not span.least <= value <= span.most:
             raise ConfigError(f"option {name!r}: expected {span.least} to {span.most}, got {value}")
         self.taken[name] = float(value)
         return float(value)
+
+    def given(self, name: str, usual: float, span: Range) -> float:
+        """What an option says, or `usual`: nothing is drawn."""
+        return self._checked(name, self.options.get(name, usual), span)
 
     def choice(self, name: str, values: Sequence[T]) -> T:
         """Draw one of `values`; `ConfigError` when the option is none of them."""

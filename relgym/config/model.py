@@ -158,7 +158,10 @@ class ModelConfig:
 
     @classmethod
     def thesis(cls, **changes: Any) -> ModelConfig:
-        """Chapter III as published: T=40, N=2000, 2σ, R_unify=0.9, hard votes, no contact facts; always an answer.
+        """Relgym's learner with chapter III's constants: T=40, N=2000, 2σ, R_unify=0.9, hard votes, no contact facts.
+
+        Chapter III itself is `relgym.thesis`, with `ThesisSettings.thesis`: rules of its own, not settings of these.
+        This one shares relgym's searches for modes and clauses, and always answers.
 
         Mends, each because the text doesn't work as printed: the noise variance in Mallows's Cp is the given one, not
         the full model's (0/0 on exact data); a chosen regressor leaves the candidates; a removed mode's examples
@@ -176,7 +179,9 @@ class ModelConfig:
 
     @classmethod
     def original(cls, **changes: Any) -> ModelConfig:
-        """The constants of the thesis' own program: 3σ with σ² = 1e-15, N=1000, T=40, FOIL gain, trees above 25 %.
+        """Relgym's learner with the constants of the thesis' program: 3σ, σ² = 1e-15, N=1000, T=40, trees above 25 %.
+
+        The program's own rules are `relgym.thesis`, with `ThesisSettings.original`.
 
         Not copied are its defects: errors of clauses counted on a quarter of the negatives only, examples of deleted
         modes lost, unification samples that hold no new example, variables leaking between roles. Nor is its test of

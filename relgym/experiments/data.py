@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -30,15 +30,39 @@ from relgym.experiments.analytic import (
     truck_modes,
 )
 from relgym.experiments.episodes import Episode, Truth
+from relgym.experiments.scenes import ThesisScenes
 from relgym.scene.objects import Float1D, Float2D, SceneLayout
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["BALL_EXPERIMENTS", "BallExperiment", "Episode", "Truth", "ball_episodes", "truck_episodes"]
+__all__ = [
+    "BALL_EXPERIMENTS",
+    "THESIS_EXPERIMENTS",
+    "BallExperiment",
+    "Episode",
+    "Truth",
+    "ball_episodes",
+    "truck_episodes",
+]
 
 
 @dataclass(frozen=True, slots=True)
 class BallExperiment:
-    """Parameters of one of the ball experiments (§4.3–§4.5); `objects` are the kinds that stand in the room."""
+    """Parameters of one of the ball experiments (§4.3–§4.5).
+
+    Attributes
+    ----------
+    incline, elasticity, frictions
+        Of ramps, in degrees, and of contacts.
+    episodes
+        Of the training.
+    type_names
+        As of the env.
+    objects
+        Kinds that stand in the room.
+    scenes
+        From where sizes, places and speeds are drawn: as in the env (``"env"``), or so that modes are as frequent as in
+        the thesis' tables (``"thesis"``, `relgym.experiments.scenes`).
+    """
 
     incline: float
     elasticity: float
@@ -46,6 +70,7 @@ class BallExperiment:
     episodes: int
     type_names: str = "shape"
     objects: tuple[str, ...] = ("box", "ramp")
+    scenes: Literal["env", "thesis"] = "env"
 
     def modes(self) -> AnalyticModes:
         """The analytic modes of its rooms."""
@@ -57,12 +82,20 @@ BALL_EXPERIMENTS: Mapping[int, BallExperiment] = {
     2: BallExperiment(45.0, 0.95, (0.2,), 160),
     3: BallExperiment(45.0, 0.95, (0.1, 0.2), 480, "thesis"),
 }
-"""The thesis' three experiments: 16,000, 32,000 and 96,000 examples."""
+"""The thesis' three experiments, in the env's scenes: 16,000, 32,000 and 96,000 examples."""
+
+THESIS_EXPERIMENTS: Mapping[int, BallExperiment] = {
+    number: replace(setting, scenes="thesis") for number, setting in BALL_EXPERIMENTS.items()
+}
+"""The same in scenes with the thesis' frequencies."""
 
 TEST_EPISODES = 120
 """Episodes of a test set: 24,000 examples (§4.2)."""
 
 EPISODE_STEPS = 200
+
+_ATTEMPTS = 100
+"""How often a scene is drawn anew that doesn't fit its room."""
 
 
 def ball_episodes(
@@ -172,7 +205,7 @@ def _ball_episode(
     world: _World, options: Mapping[str, Any], seed: int, setting: BallExperiment, modes: AnalyticModes
 ) -> Episode:
     env = world.env
-    _, info = env.reset(seed=seed, options=dict(options))
+    info = _begun(env, options, seed, setting)
     configuration = info["configuration"]
     rows, log = [env.vector], [info["contacts"]]
     for _ in range(EPISODE_STEPS):
@@ -185,6 +218,26 @@ def _ball_episode(
     columns = [env.schema.layout().column(ball, prop) for prop in ("vx", "vy")]
     truth = _ball_truth(log[:-1], vectors[:-1, columns], world.friction, setting, modes)
     return Episode(world.schema, world.layout, vectors, truth, configuration)
+
+
+def _begun(
+    env: BallBoxRampEnv, case: Mapping[str, Any], seed: int, setting: BallExperiment
+) -> dict[str, Any]:
+    """Reset the env to a scene of a case; what it says of it."""
+    if setting.scenes == "env":
+        _, info = env.reset(seed=seed, options=dict(case))
+        return info
+    rng = np.random.default_rng(seed)
+    names = set(env.reset_options)
+    alone = {"only": setting.objects[0]} if len(setting.objects) == 1 else {}
+    for _ in range(_ATTEMPTS):
+        options = ThesisScenes().options({**case, **alone}, setting.incline, rng)
+        try:
+            _, info = env.reset(seed=seed, options={k: v for k, v in options.items() if k in names})
+        except ConfigError:
+            continue  # too wide, or too low for the ball
+        return info
+    raise ConfigError(f"{dict(case)}: none of {_ATTEMPTS} draws of a scene fits its room")
 
 
 def _ball_truth(

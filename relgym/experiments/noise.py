@@ -23,6 +23,7 @@ from relgym.experiments.online import learned
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout
 from relgym.scene.schema import SceneSchema
+from relgym.thesis.model import ThesisModel
 
 __all__ = [
     "SIGMAS",
@@ -82,7 +83,7 @@ def corrupted(episode: Episode, variance: float, *, rng: np.random.Generator) ->
     return replace(episode, vectors=vectors)
 
 
-def shortfall(model: WorldModel, episodes: Iterable[Episode], target: str) -> float:
+def shortfall(model: WorldModel | ThesisModel, episodes: Iterable[Episode], target: str) -> float:
     """Mode-averaged median error (§4.6): the median error of each true mode, averaged.
 
     All modes count the same, however rare. Where the model says nothing, the error is that of the present value.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["TEST_SEEDS", "TRAINING_SEEDS", "TUNING_SEEDS", "TUNING_TEST_SEED"]
+__all__ = ["FREQUENCY_SEEDS", "TEST_SEEDS", "TRAINING_SEEDS", "TUNING_SEEDS", "TUNING_TEST_SEED"]
 
 TRAINING_SEEDS: Final = (0, 1, 2, 3, 4)
 """Seeds of the training sets that results are reported of."""
@@ -17,3 +17,6 @@ TUNING_SEEDS: Final = (100, 101, 102, 103, 104)
 
 TUNING_TEST_SEED: Final = 110
 """Seed of the test set that goes with `TUNING_SEEDS`."""
+
+FREQUENCY_SEEDS: Final = tuple(range(300, 310))
+"""Seeds of scenes whose modes are counted; `relgym.experiments.scenes` was fitted on 900 to 959."""

@@ -8,11 +8,13 @@ from typing import Final, TypeAlias
 
 from relgym.errors import ConfigError
 from relgym.experiments.chapter4 import (
+    claims,
     figures_accuracy,
     figures_comparison,
     figures_drawn,
     figures_rollouts,
     figures_trees,
+    frequencies,
     plans,
     tables_ablation,
     tables_baselines,
@@ -116,6 +118,9 @@ _ALL: Final = (
         "table-4.1": ("Configuration parameters", figures_drawn.parameters_shown),
         "figure-4.1": ("Initial configurations", figures_drawn.configurations_shown),
     }),
+    *_of("4.2", "scenes", frequencies.plan, {
+        "scenes": ("Transitions by mode in our scenes", frequencies.counts_shown),
+    }),
     # experiment 1
     *_of("4.3.1", "experiment-1", _lessons(1), {
         "table-4.2": ("Modes, experiment 1", partial(tables_modes.modes_shown, experiment=1)),
@@ -218,6 +223,9 @@ _ALL: Final = (
         })
     ),
     # beyond the thesis
+    *_of("4.3-§4.9", "beyond", claims.plan, {
+        "claims": ("A verdict on each of the thesis' claims", claims.claims_shown),
+    }),
     *_of("4.3.4, §4.4.4", "beyond", _rates, {
         "rates": ("All learners beside the thesis' rates", tables_errors.rates_shown),
     }),
@@ -235,7 +243,7 @@ def _place(job: Job) -> tuple[list[int], list[int]]:
     """Sorting key: by section of the thesis, then by number; what is beyond it comes last."""
     if job.groups == ("beyond",):
         return [9], []
-    section, number = job.source[1:], job.name.partition("-")[2]
+    section, number = job.source[1:], job.name.partition("-")[2] or "0"
     return [int(n) for n in section.split(".")], [int(n) for n in number.split(".")]
 
 

@@ -14,7 +14,7 @@ from relgym.experiments.chapter4.canvas import canvas, save
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.tables_modes import best_run
-from relgym.experiments.data import ball_episodes, truck_episodes
+from relgym.experiments.data import THESIS_EXPERIMENTS, ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.seeds import TRAINING_SEEDS
 from relgym.model.text import Cell, table
@@ -89,7 +89,9 @@ def parameters_shown(_: Protocol, __: Values) -> Shown:
 
 def configurations_shown(_: Protocol, __: Values) -> Shown:
     """Some initial configurations, with the paths that follow."""
-    episodes = list(ball_episodes(1, seed=TRAINING_SEEDS[0], episodes=40, order=None))[::7]
+    episodes = list(ball_episodes(THESIS_EXPERIMENTS[1], seed=TRAINING_SEEDS[0], episodes=40, order=None))[
+        ::7
+    ]
     heading = ["ramp", "touching", "ball", "direction"]
     lines: list[list[Cell]] = [[str(b.configuration[name]) for name in heading] for b in episodes]
 

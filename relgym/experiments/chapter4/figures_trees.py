@@ -50,7 +50,10 @@ def trees_shown(_: Protocol, values: Values, number: str) -> Shown:
         )
         data += [[learner, chosen["stage"], *rule.split(" -> ")] for rule in tree.rules()]
     note = f"Modes {first} and {second} of Table {modes}, {axis} velocity."
-    return Shown("\n\n".join([note, *texts]), data, lambda path: _draw(path, trees, note))
+    text = "\n\n".join([note, *texts])
+    if not trees:  # an empty picture would say less than the text does
+        return Shown(text, data)
+    return Shown(text, data, lambda path: _draw(path, trees))
 
 
 def _without(rows: Mapping[int, int], first: int, second: int) -> str:
@@ -61,15 +64,12 @@ def _without(rows: Mapping[int, int], first: int, second: int) -> str:
     return "has not learned both modes"
 
 
-def _draw(path: Path, trees: Mapping[str, Mapping[str, Any]], note: str) -> None:
-    sizes = [_size(DecisionTree.from_dict(about["tree"])) for about in trees.values()] or [(2.0, 0.0)]
+def _draw(path: Path, trees: Mapping[str, Mapping[str, Any]]) -> None:
+    sizes = [_size(DecisionTree.from_dict(about["tree"])) for about in trees.values()]
     width, depth = (max(each) for each in zip(*sizes, strict=True))
     figure, panels = canvas((1.0 + 1.2 * width) * len(sizes), 0.8 + 0.9 * depth, 1, len(sizes))
     for panel in panels[0]:
         panel.set_axis_off()
-    if not trees:
-        words = f"{note}\nNo learner tells them apart by a tree."
-        panels[0][0].text(0.5, 0.5, words, ha="center", va="center")
     for panel, (learner, about) in zip(panels[0], trees.items(), strict=False):
         tree = DecisionTree.from_dict(about["tree"])
         names = {True: f"mode {about['yes']}", False: f"mode {about['no']}"}

@@ -10,48 +10,27 @@ from typing import Any, Final
 
 import numpy as np
 
-from relgym.config import ModelConfig
-from relgym.errors import ConfigError
+from relgym.experiments.chapter4.learners import (
+    Learner,
+    governed,
+    learner_of,
+    modes_of,
+    report_of,
+    settings_of,
+    trees_of,
+)
 from relgym.experiments.chapter4.testing import TARGETS, confusions, scores_of
 from relgym.experiments.chapter4.weight import weight_of
-from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_episodes
+from relgym.experiments.data import THESIS_EXPERIMENTS, BallExperiment, ball_episodes
 from relgym.experiments.episodes import Episode
-from relgym.model.report import report
 from relgym.model.text import plain
-from relgym.model.world_model import WorldModel
 from relgym.scene.schema import SceneSchema
+from relgym.thesis.model import ThesisModel
 
-__all__ = ["config_of", "fresh_episodes", "lesson", "taught_episodes"]
+__all__ = ["fresh_episodes", "lesson", "taught_episodes"]
 
 _EPISODES_PER_SEED: Final = 40
 """Every configuration once (Table 4.1)."""
-
-
-def config_of(learner: str) -> ModelConfig:
-    """Configuration of a learner by name (`relgym.experiments.chapter4.protocol`: `LEARNERS`, `ABLATIONS`).
-
-    ``"one-polarity"`` is the thesis' learner without §3.4.5: the first mode of a pair is always the positive class.
-    """
-    thesis, original = ModelConfig.thesis(), ModelConfig.original()
-    known = {
-        "original": original,
-        "original, trees for rare modes": _with_rules(original, tree_errors="class"),
-        "original, simplest of equals": replace(
-            original, clustering=replace(original.clustering, stickiness="simple")
-        ),
-        "original, contact facts": _with_rules(original, contact_facts=True),
-        "thesis": thesis,
-        "one-polarity": _with_rules(thesis, both_polarities=False),
-        "world": ModelConfig(frames="world"),
-        "default": ModelConfig(),
-    }
-    if learner not in known:
-        raise ConfigError(f"learner {learner!r}: expected one of {sorted(known)}")
-    return known[learner]
-
-
-def _with_rules(config: ModelConfig, **changes: Any) -> ModelConfig:
-    return replace(config, classification=replace(config.classification, **changes))
 
 
 def lesson(
@@ -86,10 +65,10 @@ def lesson(
     Plain data: scores by checkpoint and target, the learned model's report, confusions of its modes, its trees, seconds
     spent on learning, bytes that it keeps.
     """
-    laws = BALL_EXPERIMENTS[experiment].modes()
+    laws = THESIS_EXPERIMENTS[experiment].modes()
     episodes = list(taught_episodes(experiment, seed, order, checkpoints[-1], stages))
     fresh = fresh_episodes(experiment, tests)
-    model = WorldModel(episodes[0].schema, config_of(learner))
+    model = learner_of(settings_of(learner), episodes[0].schema)
     scores, seconds = [], 0.0
     for number, episode in enumerate(episodes, start=1):
         start = perf_counter()
@@ -102,9 +81,9 @@ def lesson(
             scores.append({"episodes": number, "targets": scores_of(model, fresh, laws)})
     return {
         "scores": scores,
-        "report": plain(report(model)),
+        "report": plain(report_of(model)),
         "modes": _modes(model),
-        "text": _text(model, BALL_EXPERIMENTS[experiment].incline),
+        "text": _text(model, THESIS_EXPERIMENTS[experiment].incline),
         "trees": _trees(model),
         "confusions": confusions(model, fresh, laws),
         "training": _mode_examples(episodes),
@@ -119,10 +98,10 @@ def taught_episodes(
 ) -> Iterator[Episode]:
     """Training episodes; with stages, those of each kind of room, in the schema of the whole room."""
     if not stages:
-        yield from ball_episodes(experiment, seed=seed, episodes=count, order=order)
+        yield from ball_episodes(THESIS_EXPERIMENTS[experiment], seed=seed, episodes=count, order=order)
         return
-    setting = BALL_EXPERIMENTS[experiment]
-    whole = next(ball_episodes(experiment, seed=seed, episodes=1)).schema
+    setting = THESIS_EXPERIMENTS[experiment]
+    whole = next(ball_episodes(setting, seed=seed, episodes=1)).schema
     for k, kind in enumerate(stages):
         each = count // len(stages) + (k < count % len(stages))
         yield from _only(setting, kind, seed, order, each, whole)
@@ -138,23 +117,22 @@ def _only(
 
 def fresh_episodes(experiment: int, tests: Mapping[str, Any]) -> list[Episode]:
     """Test episodes: from every seed equally many of the configurations, all 40 when there are enough (§4.3.3)."""
-    seeds = tests["seeds"]
+    setting, seeds = THESIS_EXPERIMENTS[experiment], tests["seeds"]
     each = -(-int(tests["episodes"]) // len(seeds))
     cycle = max(each, _EPISODES_PER_SEED)
     return [
         episode
         for seed in seeds
-        for episode in islice(ball_episodes(experiment, seed=seed, episodes=cycle, test=True), each)
+        for episode in islice(ball_episodes(setting, seed=seed, episodes=cycle, test=True), each)
     ]
 
 
-def _modes(model: WorldModel) -> dict[str, list[dict[str, Any]]]:
+def _modes(model: Learner) -> dict[str, list[dict[str, Any]]]:
     """Learned modes as numbers, by target that modes predict; the first ones have most examples."""
     found = {}
     for target in TARGETS:
-        part = model.property_model(*target.split("."))
-        if not model.governs(part.target):
-            ordered = sorted(part.modes, key=lambda mode: -mode.examples)
+        if not governed(model, target):
+            ordered = sorted(modes_of(model, target), key=lambda mode: -mode.examples)
             found[target] = [
                 {
                     "id": mode.id,
@@ -169,29 +147,25 @@ def _modes(model: WorldModel) -> dict[str, list[dict[str, Any]]]:
     return found
 
 
-def _text(model: WorldModel, incline: float) -> str:
+def _text(model: Learner, incline: float) -> str:
     """The model for people; laws of contacts also along the world's axes, on level ground, on ramps and on walls."""
+    if isinstance(model, ThesisModel):
+        return model.describe()
     if not model.governed:
         return model.describe(details=True)
     return model.describe(details=True, frame="world", incline=(0.0, incline, 90.0))
 
 
-def _trees(model: WorldModel) -> list[dict[str, Any]]:
+def _trees(model: Learner) -> list[dict[str, Any]]:
     """Decision trees behind clauses (figures 4.2, 4.10 and 4.11)."""
     found = []
     for target in TARGETS:
-        part = model.property_model(*target.split("."))
-        if model.governs(part.target):
+        if governed(model, target):
             continue
-        functions = {mode.id: mode.formula(3) for mode in part.modes}
-        for pair in part.classifier.classifiers:
-            other = pair.i if pair.positive == pair.j else pair.j
-            stages = [*map(str, pair.definition.clauses), "else"]
-            for stage, tree in zip(stages, (*pair.clause_trees, pair.fall_through_tree), strict=True):
-                if tree is not None:
-                    about = {"target": target, "mode": pair.positive, "other": other, "stage": stage}
-                    sides = {"yes": functions.get(pair.positive, ""), "no": functions.get(other, "")}
-                    found.append({**about, **sides, "tree": tree.to_dict()})
+        functions = {mode.id: mode.formula(3) for mode in modes_of(model, target)}
+        for about in trees_of(model, target):
+            sides = {"yes": functions.get(about["mode"], ""), "no": functions.get(about["other"], "")}
+            found.append({"target": target, **about, **sides})
     return found
 
 

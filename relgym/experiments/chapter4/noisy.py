@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from relgym.config import ModelConfig
-from relgym.experiments.chapter4.lesson import config_of, fresh_episodes, taught_episodes
+from relgym.experiments.chapter4.learners import modes_of, settings_of, taught
+from relgym.experiments.chapter4.lesson import fresh_episodes, taught_episodes
 from relgym.experiments.noise import corrupted, shortfall
-from relgym.experiments.online import learned
+from relgym.thesis.settings import ThesisSettings
 
 __all__ = ["lesson"]
 
@@ -42,17 +42,16 @@ def lesson(
     Plain data: by target the mode-averaged median error, and the number of modes.
     """
     rng = np.random.default_rng([seed, order])
-    taught = [corrupted(b, true, rng=rng) for b in taught_episodes(1, seed, order, episodes)]
-    model = learned(taught, config=_config(expected))
+    shown = [corrupted(b, true, rng=rng) for b in taught_episodes(1, seed, order, episodes)]
+    model = taught(shown, _settings(expected))
     fresh = [corrupted(b, true, rng=rng) for b in fresh_episodes(1, tests)]
     return {
         "errors": {str(t): shortfall(model, fresh, str(t)) for t in model.targets},
-        "modes": {str(t): len(model.modes(t.type, t.property)) for t in model.targets},
+        "modes": {str(t): len(modes_of(model, str(t))) for t in model.targets},
     }
 
 
-def _config(expected: float | str) -> ModelConfig:
+def _settings(expected: float | str) -> ThesisSettings | ModelConfig:
     if isinstance(expected, str):
-        return config_of({"auto": "world"}.get(expected, expected))
-    config = config_of("thesis")
-    return replace(config, clustering=replace(config.clustering, noise_std=expected**0.5))
+        return settings_of({"auto": "world"}.get(expected, expected))
+    return ThesisSettings.thesis(noise_variance=expected)

@@ -107,7 +107,7 @@ def rollouts(protocol: Protocol) -> Plan:
     }
     return {
         learner: [Task(f"{_ROOM}.rolled:imagine", {"learner": learner, **arguments}, learner)]
-        for learner in ("thesis", "world", "default")
+        for learner in LEARNERS
     }
 
 

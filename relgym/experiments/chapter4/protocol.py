@@ -18,8 +18,8 @@ WHOLE_TEST: Final = 120
 """Episodes of the thesis' test set: 24,000 examples (§4.3.3)."""
 
 LEARNERS: Final[Mapping[str, str]] = {
-    "original": "the thesis' program: ModelConfig.original()",
-    "thesis": "chapter III as published: ModelConfig.thesis()",
+    "original": "the thesis' program, its rules and slips of counting included: ThesisSettings.original()",
+    "thesis": "chapter III as published: ThesisSettings.thesis()",
     "world": 'relgym with modes along the world\'s axes: ModelConfig(frames="world")',
     "default": "relgym as it comes, with contact laws: ModelConfig()",
 }
@@ -27,9 +27,9 @@ LEARNERS: Final[Mapping[str, str]] = {
 
 ABLATIONS: Final[Mapping[str, str]] = {
     "original": "as it is",
-    "original, trees for rare modes": 'a tree also where most of a rare mode is wrong: tree_errors="class"',
-    "original, simplest of equals": 'examples that several modes explain go to the simplest: stickiness="simple"',
-    "original, contact facts": "clauses may say which contact is approached: contact_facts=True",
+    "original, all examples test": "clauses are evaluated by all negatives, not by a quarter of them: grow_share=1",
+    "original, trees for rare modes": "a tree also for few examples of a mode: tree_least=3, tree_success=0.95",
+    "original, either class positive or not": "the older mode of a pair is always the positive class: polarities=False",
 }
 """The thesis' program, and what becomes of it with one cause of its errors taken away."""
 
@@ -135,6 +135,10 @@ class Protocol:
     def tests(self) -> dict[str, Any]:
         """Arguments that say which examples to test on."""
         return {"seeds": list(TEST_SEEDS), "episodes": self.test_episodes}
+
+    def __str__(self) -> str:
+        size = "whole" if self.checkpoints is None else "fast"
+        return f"{size} protocol, {self.batches} of 50 batches, {self.test_episodes} of {WHOLE_TEST} test episodes"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -7,12 +7,11 @@ from typing import Any
 
 from relgym.config import ModelConfig
 from relgym.experiments.analytic import truck_modes
-from relgym.experiments.chapter4.lesson import config_of
+from relgym.experiments.chapter4.learners import modes_of, noise_of, report_of, settings_of, taught
 from relgym.experiments.data import truck_episodes
-from relgym.experiments.online import learned
 from relgym.experiments.truck_check import truck_mode_of
-from relgym.model.report import report
 from relgym.model.text import plain
+from relgym.thesis.settings import ThesisSettings
 
 __all__ = ["lesson"]
 
@@ -33,29 +32,26 @@ def lesson(*, learner: str, seed: int, repeats: int = 2) -> dict[str, Any]:
     -------
     Plain data: the model's report, and which row of Table 3.1 each mode states (-1: none).
     """
-    model = learned(truck_episodes(seed=seed, repeats=repeats), config=_config(learner))
+    model = taught(truck_episodes(seed=seed, repeats=repeats), _settings(learner))
     laws = truck_modes(3)
-    part = model.property_model("truck", "vx")
     known = {law: row for row, law in enumerate(laws)}
     stated = {}
-    for mode in part.modes:
+    for mode in modes_of(model, "truck.vx"):
         law = truck_mode_of(mode, laws)
         stated[str(mode.id)] = -1 if law is None else known[law]
     return {
-        "report": plain(report(model)),
-        "text": model.describe(details=True),
+        "report": plain(report_of(model)),
+        "text": str(report_of(model)),
         "stated": stated,
         "laws": [law.name for law in laws],
-        "noise": part.clusterer.noise_examples,
+        "noise": noise_of(model, "truck.vx"),
     }
 
 
-def _config(learner: str) -> ModelConfig:
+def _settings(learner: str) -> ThesisSettings | ModelConfig:
     """The learner's, but clauses may mention every object.
 
     Table 3.2 tells stacks of three by a box on one that the truck doesn't touch: no clause about what it touches can.
     """
-    config = config_of(learner)
-    if config.classification.context != "touching":
-        return config
-    return replace(config, classification=replace(config.classification, context="all"))
+    settings = settings_of(learner)
+    return replace(settings, context="all") if isinstance(settings, ThesisSettings) else settings

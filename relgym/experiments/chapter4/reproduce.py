@@ -18,6 +18,7 @@ from relgym.experiments.chapter4.catalogue import JOBS
 from relgym.experiments.chapter4.job import Job, Shown
 from relgym.experiments.chapter4.protocol import LEARNERS, Protocol
 from relgym.experiments.chapter4.published import REMARKS
+from relgym.experiments.chapter4.staleness import declared, digest_of, outdated
 from relgym.experiments.jobs.run import Progress, results, run
 from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
@@ -48,6 +49,10 @@ class Made:
         When and how it was made.
     seconds
         Of computing, all tasks together.
+    code
+        Digest of the code behind it (`relgym.experiments.chapter4.staleness`).
+    protocol
+        How thoroughly, for people.
     """
 
     name: str
@@ -58,6 +63,8 @@ class Made:
     day: str
     command: str
     seconds: float
+    code: str = ""
+    protocol: str = ""
 
 
 def compute(
@@ -99,11 +106,15 @@ def make(job: Job, protocol: Protocol, store: ResultStore, out: Path, command: s
         date.today().isoformat(),
         command,
         _seconds(plan, store),
+        digest_of(job.name),
+        str(protocol),
     )
     write_atomically(out / f"{job.name}.txt", f"{text}\n".encode())
     write_atomically(out / f"{job.name}.csv", _csv(shown).encode())
     if shown.draw is not None:
         write_atomically(out / figure, _drawn(shown))
+    else:
+        (out / f"{job.name}.png").unlink(missing_ok=True)
     write_atomically(
         out / f"{job.name}.json", json.dumps(asdict(made), indent=1, ensure_ascii=False).encode()
     )
@@ -133,6 +144,8 @@ def _drawn(shown: Shown) -> bytes:
 def page(out: Path, target: Path) -> list[str]:
     """Write the page of results (Markdown) from what jobs have written, and copy their figures beside it.
 
+    Sections of the page that the folder holds no results of stay as they are.
+
     Parameters
     ----------
     out
@@ -156,9 +169,21 @@ def page(out: Path, target: Path) -> list[str]:
     for each in made:
         if each.figure:
             write_atomically(folder / each.figure, (out / each.figure).read_bytes())
-    sections = [section(each, folder.name) for each in made]
-    write_atomically(target, "\n\n".join([_head(made, folder), *sections, ""]).encode())
+        else:  # one of an earlier run shows what is no longer so
+            (folder / f"{each.name}.png").unlink(missing_ok=True)
+    known = _kept(target) | {each.name: section(each, folder.name) for each in made}
+    sections = [known[name] for name in JOBS if name in known]
+    text = "\n\n".join([_head(sections, folder), *sections, ""])
+    write_atomically(target, declared(text, outdated(text)).encode())
     return [each.name for each in made]
+
+
+def _kept(target: Path) -> dict[str, str]:
+    """Sections of a page as it is, by job."""
+    if not target.is_file():
+        return {}
+    parts = target.read_text(encoding="utf-8").split("\n## ")[1:]
+    return {part.partition(":")[0]: f"## {part.rstrip()}" for part in parts}
 
 
 def _made(out: Path) -> Iterator[Made]:
@@ -174,10 +199,11 @@ def _made(out: Path) -> Iterator[Made]:
                 ) from error
 
 
-def _head(made: Sequence[Made], folder: Path) -> str:
+def _head(sections: Sequence[str], folder: Path) -> str:
+    titles = [each.partition("\n")[0].removeprefix("## ") for each in sections]
     learners = "\n".join(f"- **{TITLES[name]}**: {words}" for name, words in LEARNERS.items())
-    contents = "\n".join(f"- [{each.name}: {each.title}](#{_anchor(each)})" for each in made)
-    missing = [name for name in JOBS if name not in {each.name for each in made}]
+    contents = "\n".join(f"- [{title.rpartition(' (')[0]}](#{_anchor(title)})" for title in titles)
+    missing = [name for name in JOBS if name not in {title.partition(":")[0] for title in titles}]
     rest = f"\nNot made yet: {', '.join(missing)}.\n" if missing else ""
     pages = [
         f"- [{title}]({folder.name}/{name})" for name, title in PAGES.items() if (folder / name).is_file()
@@ -193,13 +219,14 @@ def _head(made: Sequence[Made], folder: Path) -> str:
     )
 
 
-def _anchor(made: Made) -> str:
-    words = f"{made.name}: {made.title} ({made.source})".lower()
-    return "".join(c for c in words.replace(" ", "-") if c.isalnum() or c in "-_")
+def _anchor(title: str) -> str:
+    return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c in "-_")
 
 
 def section(made: Made, folder: str) -> str:
     """A part of a page of results: its heading, how it was made, its figure in `folder`, its text."""
     figure = f"\n\n![{made.title}]({folder}/{made.figure})" if made.figure else ""
-    how = f"`{made.command}`, {made.day}; {made.seconds:.0f} s of computing."
+    code = f"; code `{made.code}`" if made.code else ""
+    protocol = f"; {made.protocol}" if made.protocol else ""
+    how = f"`{made.command}`, {made.day}{code}{protocol}; {made.seconds:.0f} s of computing."
     return f"## {made.name}: {made.title} ({made.source})\n\n{how}{figure}\n\n```text\n{made.text}\n```"

@@ -10,12 +10,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.experiments.chapter4.lesson import config_of
-from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
+from relgym.experiments.chapter4.learners import Learner, settings_of, taught
+from relgym.experiments.data import THESIS_EXPERIMENTS, ball_episodes
 from relgym.experiments.episodes import Episode
-from relgym.experiments.online import learned
 from relgym.experiments.rollouts import STRAY
-from relgym.model.world_model import WorldModel
 
 __all__ = ["CAUSES", "cause_of", "imagine", "trial_episodes"]
 
@@ -67,9 +65,8 @@ def imagine(
     -------
     Plain data: errors of both coordinates by trial and step, paths, cause of every failure, counts of the bounces.
     """
-    model = learned(
-        ball_episodes(experiment, seed=seed, order=order, episodes=episodes), config=config_of(learner)
-    )
+    setting = THESIS_EXPERIMENTS[experiment]
+    model = taught(ball_episodes(setting, seed=seed, order=order, episodes=episodes), settings_of(learner))
     real = trial_episodes(experiment, tests, trials)
     dreamed, steps = _dreams(model, real)
     bounces = Counter[str]()
@@ -84,12 +81,13 @@ def trial_episodes(experiment: int, tests: Sequence[int], trials: int) -> list[E
     found: list[Episode] = []
     for seed in tests:
         count = min(_CONFIGURATIONS, trials - len(found))
-        rooms = ball_episodes(experiment, seed=seed, episodes=_CONFIGURATIONS, order=None, test=True)
+        setting = THESIS_EXPERIMENTS[experiment]
+        rooms = ball_episodes(setting, seed=seed, episodes=_CONFIGURATIONS, order=None, test=True)
         found += islice(rooms, count)
     return found
 
 
-def _dreams(model: WorldModel, real: Sequence[Episode]) -> tuple[NDArray[np.float64], list[int]]:
+def _dreams(model: Learner, real: Sequence[Episode]) -> tuple[NDArray[np.float64], list[int]]:
     """All roll-outs side by side, shape ``(trials, steps + 1, width)``, and how many steps of each were predicted.
 
     One that stopped repeats its last scene.
@@ -169,7 +167,7 @@ def _surfaces(episode: Episode, experiment: int) -> Mapping[str, int]:
 
 def _surface_names(episode: Episode, experiment: int) -> list[str]:
     """Per transition: what the ball was pushed by; ``none``, ``slide``, ``level``, ``vertical``, ``slope``, ``?``."""
-    modes = BALL_EXPERIMENTS[experiment].modes()
+    modes = THESIS_EXPERIMENTS[experiment].modes()
     kinds = []
     for listed, axis in ((modes.x, "ball.vx"), (modes.y, "ball.vy")):
         options = [{_kind(case.surface, case.sliding) for case in mode.cases} for mode in listed]

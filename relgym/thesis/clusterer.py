@@ -1,0 +1,318 @@
+"""Clustering (§3.2, Figure 3.2): new modes by RANSAC, unification, expectation maximisation."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.mode import NOISE, Role
+from relgym.scene.objects import SceneLayout
+from relgym.thesis.examples import Arrangement, Examples
+from relgym.thesis.modes import Cluster, roles_of
+from relgym.thesis.ransac import search
+from relgym.thesis.regression import fit
+from relgym.thesis.settings import ThesisSettings
+
+__all__ = ["Clusterer"]
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_TIE = 1e-3
+"""The program's: errors that differ by a smaller share are equal."""
+
+_FIRST = 256
+
+
+class Clusterer:
+    """Modes of one target, and which of them each example belongs to.
+
+    Parameters
+    ----------
+    settings
+        Constants and rules.
+
+    Attributes
+    ----------
+    examples
+        All examples so far.
+    clusters
+        The modes, in the order in which they were found.
+    changed
+        Modes whose members or functions changed since somebody asked.
+    """
+
+    def __init__(self, settings: ThesisSettings) -> None:
+        self.settings = settings
+        self.examples = Examples()
+        self.clusters: list[Cluster] = []
+        self._rng = np.random.default_rng(settings.seed)
+        self._tolerance = settings.inlier_stds * settings.noise_variance**0.5
+        self._labels = np.zeros(_FIRST, dtype=np.int64)
+        self._next = NOISE + 1
+        self._noise: set[int] = set()
+        self._wait = settings.min_examples
+        self._errors: dict[int, Floats] = {}
+
+    @property
+    def labels(self) -> NDArray[np.int64]:
+        """Mode of each example; `NOISE` if none, shape ``(count,)``."""
+        return self._labels[: self.examples.count]
+
+    @property
+    def noise(self) -> int:
+        """How many examples no mode explains."""
+        return len(self._noise)
+
+    def members(self, number: int) -> Rows:
+        """Numbers of a mode's examples."""
+        return np.flatnonzero(self.labels == number)
+
+    # ------------------------------------------------------------------ Figure 3.2
+    def learn_one(self, layout: SceneLayout, target: int, x: Floats, y: float) -> int:
+        """Take up an example.
+
+        Parameters
+        ----------
+        layout, target
+            The scene's layout and the object whose property is predicted.
+        x, y
+            State vector, and the property's next value.
+
+        Returns
+        -------
+        The mode it belongs to.
+        """
+        group = self.examples.number_of(layout, target)
+        number = self.examples.add(group, x, y)
+        arrangement, row = self.examples.arrangements[group], x.tolist()
+        if number == len(self._labels):
+            self._labels = np.concatenate([self._labels, np.zeros_like(self._labels)])
+            self._errors = {k: np.concatenate([e, np.empty_like(e)]) for k, e in self._errors.items()}
+        errors = []
+        for cluster in self.clusters:
+            errors.append(cluster.error(arrangement, row, y))
+            self._errors[cluster.number][number] = errors[-1]
+        self._labels[number] = self._nearest_one(errors)
+        if self._labels[number] == NOISE:
+            self._noise.add(number)
+            for _ in range(self.settings.em_iterations):
+                if not self._discover():
+                    break
+        return int(self._labels[number])
+
+    def _nearest_one(self, errors: list[float]) -> int:
+        if not errors:
+            return NOISE
+        best = min(errors)
+        if best > self._tolerance:
+            return NOISE
+        if not self.settings.sparse_ties:
+            return self.clusters[errors.index(best)].number
+        tied = [c for c, e in zip(self.clusters, errors, strict=True) if e - best <= _TIE * best]
+        return min(tied, key=lambda c: c.weights).number
+
+    # ------------------------------------------------------------------ §3.2.2
+    def _discover(self) -> bool:
+        """Look for a mode in the noise, unify it with another one, and let EM converge; whether there was one."""
+        if len(self._noise) < self._wait:
+            return False
+        noise = np.array(sorted(self._noise), dtype=np.intp)
+        found = self._constant(noise) if self.settings.constants else None
+        largest = 0
+        if found is None:
+            found, largest = self._line(noise)
+        if found is None:
+            self._wait = len(self._noise) + max(1, self.settings.min_examples - largest)
+            return False
+        self._wait = self.settings.min_examples
+        cluster, members = found
+        if not self._unify(cluster, members):
+            self._add(cluster)
+            self._move(members, cluster.number)
+            self._refit(cluster)
+        self._converge()
+        return True
+
+    def _constant(self, noise: Rows) -> tuple[Cluster, Rows] | None:
+        """The program's first step: the most examples with exactly the same value."""
+        values, counts = np.unique(self.examples.y[noise], return_counts=True)
+        best = int(counts.argmax())
+        if counts[best] < self.settings.min_examples:
+            return None
+        group = int(self.examples.groups[noise[0]])
+        arrangement = self.examples.arrangements[group]
+        own = Role(arrangement.layout.types[arrangement.target].name, ())
+        members = noise[self.examples.y[noise] == values[best]]
+        return Cluster(self._next, (own,), float(values[best])), members
+
+    def _line(self, noise: Rows) -> tuple[tuple[Cluster, Rows] | None, int]:
+        """A line through at least T examples of an arrangement, or the size of the largest set that lies on one."""
+        largest = 0
+        for group, arrangement in enumerate(self.examples.arrangements):
+            rows = noise[self.examples.groups[noise] == group]
+            if len(rows) < self.settings.min_examples:
+                continue
+            x, y = self.examples.x(group, rows), self.examples.y[rows]
+            found = search(x, y, self.settings, self._rng)
+            largest = max(largest, found.size)
+            if found.line is not None and found.size >= self.settings.min_examples:
+                roles = roles_of(found.line, arrangement)
+                return (Cluster(self._next, roles, found.line.intercept), rows[found.inliers]), largest
+        return None, largest
+
+    # ------------------------------------------------------------------ §3.2.5
+    def _unify(self, new: Cluster, members: Rows) -> bool:
+        """Look for one function for the new mode's examples and those of an existing one, which it replaces."""
+        best: tuple[int, Cluster, Cluster] | None = None
+        for old in self.clusters:
+            general = self._general(self.members(old.number), members)
+            if general is None or not _occam(general, old, new):
+                continue
+            if best is None or general.weights < best[0]:
+                best = general.weights, old, general
+                if not self.settings.sparse_ties:
+                    break
+        if best is None:
+            return False
+        _, old, general = best
+        both = np.concatenate([self.members(old.number), members])
+        self._drop(old)
+        self._add(general)
+        self._move(both, general.number)
+        self._refit(general)
+        return True
+
+    def _general(self, old: Rows, new: Rows) -> Cluster | None:
+        """A function for most of both, of the target and of objects that are alone of their type."""
+        rows = np.concatenate([old, new])
+        groups = np.unique(self.examples.groups[rows]).tolist()
+        arrangements = [self.examples.arrangements[g] for g in groups]
+        shared = _shared(arrangements)
+        x = np.empty((len(rows), sum(len(a) for a in shared[0])))
+        for group, columns in zip(groups, shared, strict=True):
+            here = self.examples.groups[rows] == group
+            flat = [c for part in columns for c in part]
+            x[here] = self.examples.x(group, rows[here])[:, flat]
+        ratio = self.settings.unify_ratio
+        least_old = len(old) if self.settings.sparse_ties else int(np.ceil(ratio * len(old)))
+        wanted = (least_old, int(np.ceil(ratio * len(new))))
+        found = search(x, self.examples.y[rows], self.settings, self._rng, wanted=wanted, old=len(old))
+        if found.line is None:
+            return None
+        flat = [c for part in shared[0] for c in part]
+        roles = roles_of(found.line, arrangements[0], flat)
+        return Cluster(self._next, roles, found.line.intercept)
+
+    # ------------------------------------------------------------------ §3.2.4
+    def _converge(self) -> None:
+        """E-steps and M-steps until no example changes its mode."""
+        for _ in range(self.settings.em_iterations):
+            lost, gained = self._assign()
+            stale = gained | (lost if self.settings.refit_after_loss else set())
+            refitted = [self._refit(c) for c in list(self.clusters) if c.number in stale]
+            gone = [c for c in self.clusters if len(self.members(c.number)) < self.settings.least_members]
+            for cluster in gone:
+                self._move(self.members(cluster.number), NOISE)
+                self._drop(cluster)
+            if not any(refitted) and not gone:
+                return
+
+    def _assign(self) -> tuple[set[int], set[int]]:
+        """E-step. Modes that lost an example, and modes that took one whose error is beyond the tolerance."""
+        n = self.examples.count
+        if not self.clusters:
+            return set(), set()
+        errors = np.stack([self._errors[c.number][:n] for c in self.clusters], axis=1)
+        best = errors.min(axis=1)
+        if self.settings.sparse_ties:
+            weights = np.array([c.weights for c in self.clusters])
+            order = np.argsort(weights, kind="stable")
+            tied = errors[:, order] - best[:, None] <= _TIE * best[:, None]
+            choice = order[tied.argmax(axis=1)]
+            # The program decides an example again only where its own mode got worse or another one better.
+            own = np.full(n, np.inf)
+            for k, cluster in enumerate(self.clusters):
+                mine = self.labels == cluster.number
+                own[mine] = errors[mine, k]
+            keep = (own <= self._tolerance) & (own <= best * (1.0 + _TIE))
+        else:
+            choice, keep = errors.argmin(axis=1), np.zeros(n, dtype=np.bool_)
+        numbers = np.array([c.number for c in self.clusters])
+        after = np.where(best <= self._tolerance, numbers[choice], NOISE)
+        after = np.where(keep, self.labels, after)
+        moved = np.flatnonzero(after != self.labels)
+        lost = set(self.labels[moved].tolist()) - {NOISE}
+        for number in np.unique(after[moved]).tolist():
+            self._move(moved[after[moved] == number], number)
+        return lost, set()
+
+    def _refit(self, cluster: Cluster) -> bool:
+        """M-step: fit the function to all its examples, each under its best casting; whether it changed."""
+        members = self.members(cluster.number)
+        if len(members) < self.settings.sample:
+            return False
+        parts_x, parts_y = [], []
+        first: tuple[Arrangement, list[int]] | None = None
+        for group in np.unique(self.examples.groups[members]).tolist():
+            arrangement = self.examples.arrangements[group]
+            rows = members[self.examples.groups[members] == group]
+            x, y = self.examples.x(group, rows), self.examples.y[rows]
+            number = cluster.cast(arrangement, x, y)
+            for k, casting in enumerate(cluster.castings(arrangement)):
+                columns = [c for i in casting.objects for c in arrangement.columns(i)]
+                here = number == k
+                if here.any():
+                    parts_x.append(x[here][:, columns])
+                    parts_y.append(y[here])
+                    first = first or (arrangement, columns)
+        assert first is not None, "a mode with examples has castings"
+        line = fit(np.concatenate(parts_x), np.concatenate(parts_y), self.settings.noise_variance)
+        if not cluster.become(roles_of(line, first[0], first[1]), line.intercept):
+            return False
+        self._measure(cluster)
+        return True
+
+    # ------------------------------------------------------------------ bookkeeping
+    def _add(self, cluster: Cluster) -> None:
+        self.clusters.append(cluster)
+        self._next = cluster.number + 1
+        self._errors[cluster.number] = np.empty(len(self._labels))
+        self._measure(cluster)
+
+    def _measure(self, cluster: Cluster) -> None:
+        """Errors of all examples under a mode's function."""
+        for group, arrangement in enumerate(self.examples.arrangements):
+            numbers, x = self.examples.rows(group)
+            self._errors[cluster.number][numbers] = cluster.errors(arrangement, x, self.examples.y[numbers])
+
+    def _drop(self, cluster: Cluster) -> None:
+        self.clusters.remove(cluster)
+        del self._errors[cluster.number]
+
+    def _move(self, rows: Rows, number: int) -> None:
+        self._labels[rows] = number
+        if number == NOISE:
+            self._noise.update(rows.tolist())
+        else:
+            self._noise.difference_update(rows.tolist())
+
+
+def _occam(general: Cluster, old: Cluster, new: Cluster) -> bool:
+    """Whether one function is simpler than two, and no more special than either.
+
+    ``-0.9 v`` covers what doesn't move, but ``v' = 0`` says it with less; and of two scenes anything that differs
+    between them tells left from right.
+    """
+    parameters = old.parameters, new.parameters
+    return general.parameters <= max(parameters) and general.parameters < sum(parameters)
+
+
+def _shared(arrangements: list[Arrangement]) -> list[list[range]]:
+    """For each arrangement the columns of the target and of the types that are alone in all of them, in one order."""
+    alone = [{a.layout.types[i].name: i for i in a.alone() if i != a.target} for a in arrangements]
+    names = sorted(set.intersection(*(set(found) for found in alone)))
+    return [
+        [a.columns(a.target), *(a.columns(found[name]) for name in names)]
+        for a, found in zip(arrangements, alone, strict=True)
+    ]

@@ -1,0 +1,231 @@
+"""Random sample consensus: a line that many of some examples fit, the others notwithstanding (§3.2.2)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.thesis.regression import Line, fit, fit_samples
+from relgym.thesis.settings import ThesisSettings
+
+__all__ = ["Consensus", "search"]
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_AT_ONCE = 125
+"""Samples that are fitted together."""
+
+_ALARM = 0.05
+"""Chance to miss a line of as many inliers as the best known one has, where draws adapt to it."""
+
+_MANY = 500
+"""Rows of which so few are drawn that none is looked for twice."""
+
+_VERIFYING = 2
+"""How many more values than weights a line's seldom changing columns must have taken together."""
+
+_LEFT_OUT = 0.3
+"""Share of the inliers that `_holds` leaves out at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Consensus:
+    """The best line of a search.
+
+    Attributes
+    ----------
+    line
+        None if no sample gave one.
+    inliers
+        Which rows fit it, shape ``(n,)``.
+    """
+
+    line: Line | None
+    inliers: NDArray[np.bool_]
+
+    @property
+    def size(self) -> int:
+        """How many rows fit."""
+        return int(self.inliers.sum())
+
+
+def search(
+    x: Floats,
+    y: Floats,
+    settings: ThesisSettings,
+    rng: np.random.Generator,
+    *,
+    wanted: tuple[int, int] | None = None,
+    old: int = 0,
+) -> Consensus:
+    """Draw samples until the line through one fits enough rows, or N were drawn.
+
+    Parameters
+    ----------
+    x, y
+        Rows and responses, shapes ``(n, d)`` and ``(n,)``.
+    settings
+        T, N, σ and how samples are drawn.
+    wanted
+        For unification: least inliers among the first `old` rows, and among the others, from each of which a sample
+        takes half. Default: T of all.
+    old
+        How many rows come first.
+
+    Notes
+    -----
+    Cost: N fits of six rows, and N·n products for each regressor.
+    """
+    n = len(x)
+    none = Consensus(None, np.zeros(n, dtype=np.bool_))
+    width = settings.sample
+    if n < width:
+        return none
+    varying = np.flatnonzero(np.ptp(x, axis=0) > 1e-15 * np.maximum(np.abs(x).max(axis=0), 1.0))
+    if not len(varying):
+        varying = np.array([0])
+    shown = x[:, varying]
+    tolerance = settings.inlier_stds * settings.noise_variance**0.5
+    best, draws, done = none, settings.draws, 0
+    while done < draws:
+        count = min(_AT_ONCE, draws - done)
+        done += count
+        samples = _samples(shown, count, old, settings, rng)
+        columns, weights, intercepts = fit_samples(shown[samples], y[samples], settings.noise_variance)
+        fits = _inliers(shown, y, columns, weights, intercepts, tolerance)
+        sizes = fits.sum(axis=0)
+        for k in _promising(sizes, fits, wanted, old, best.size, settings):
+            line = _line(varying, columns[k], weights[k], float(intercepts[k]))
+            found = Consensus(line, fits[:, k])
+            if found.size <= best.size:
+                continue
+            if not _verified(x, found):
+                continue
+            if wanted is None and settings.cross_check and not _holds(x, y, found, settings):
+                continue
+            best = found
+            if _enough(best.inliers, wanted, old, settings):
+                return best
+        if settings.adaptive_draws and wanted is None:
+            draws = min(settings.draws, _draws(best.size, n, width))
+    return best if wanted is None else none
+
+
+def _promising(
+    sizes: NDArray[np.int64],
+    fits: NDArray[np.bool_],
+    wanted: tuple[int, int] | None,
+    old: int,
+    best: int,
+    settings: ThesisSettings,
+) -> list[int]:
+    """Samples, in their order, whose line may be better than the best one."""
+    if wanted is not None:
+        enough = (fits[:old].sum(axis=0) >= wanted[0]) & (fits[old:].sum(axis=0) >= wanted[1])
+        return [int(k) for k in np.flatnonzero(enough)]
+    found = []
+    for k in np.flatnonzero(sizes > max(best, 2)).tolist():
+        if sizes[k] > best or sizes[k] >= settings.min_examples:
+            found.append(int(k))
+    return found
+
+
+def _enough(
+    inliers: NDArray[np.bool_], wanted: tuple[int, int] | None, old: int, settings: ThesisSettings
+) -> bool:
+    if wanted is None:
+        return int(inliers.sum()) >= settings.min_examples
+    return int(inliers[:old].sum()) >= wanted[0] and int(inliers[old:].sum()) >= wanted[1]
+
+
+def _draws(size: int, n: int, width: int) -> int:
+    share = (size / n) ** width
+    if share >= 1.0:
+        return 1
+    return 1 + math.ceil(math.log(_ALARM) / math.log1p(-share)) if share > 0.0 else 10**9
+
+
+def _line(varying: Rows, columns: Rows, weights: Floats, intercept: float) -> Line:
+    chosen = sorted(
+        (int(varying[c]), float(w)) for c, w in zip(columns, weights, strict=True) if c >= 0 and w != 0.0
+    )
+    return Line(tuple(c for c, _ in chosen), tuple(w for _, w in chosen), intercept)
+
+
+def _inliers(
+    x: Floats, y: Floats, columns: Rows, weights: Floats, intercepts: Floats, tolerance: float
+) -> NDArray[np.bool_]:
+    """Which rows fit which lines, shape ``(n, lines)``."""
+    dense = np.zeros((x.shape[1], len(intercepts)))
+    every = np.arange(len(intercepts))
+    for k in range(columns.shape[1]):
+        used = columns[:, k] >= 0
+        dense[columns[used, k], every[used]] = weights[used, k]
+    found: NDArray[np.bool_] = np.abs(x @ dense + intercepts - y[:, None]) <= tolerance
+    return found
+
+
+def _samples(x: Floats, count: int, old: int, settings: ThesisSettings, rng: np.random.Generator) -> Rows:
+    """Numbers of the rows in each sample, shape ``(count, width)``."""
+    n, width = len(x), settings.sample
+    if old:
+        half = min(width // 2, n - old)
+        first = _drawn(old, min(width - half, old), count, rng)
+        return np.concatenate([first, old + _drawn(n - old, half, count, rng)], axis=1)
+    if not settings.spread_samples:
+        return _drawn(n, width, count, rng)
+    return _spread(x, width, count, rng)
+
+
+def _drawn(n: int, width: int, count: int, rng: np.random.Generator) -> Rows:
+    """`count` times `width` of `n` numbers; of very many, one comes twice at times."""
+    if n > _MANY:
+        return rng.integers(0, n, (count, width))
+    return rng.random((count, n)).argsort(axis=1)[:, :width]
+
+
+def _spread(x: Floats, width: int, count: int, rng: np.random.Generator) -> Rows:
+    """The program's samples: column by column a row whose value differs from that of the row before."""
+    n, d = x.shape
+    every = np.arange(count)
+    columns = rng.random((count, d)).argsort(axis=1)
+    chosen = np.empty((count, width), dtype=np.intp)
+    chosen[:, 0] = rng.integers(0, n, count)
+    free = np.ones((count, n), dtype=np.bool_)
+    free[every, chosen[:, 0]] = False
+    for k in range(1, width):
+        keys = np.where(free, rng.random((count, n)), 0.0)
+        if k <= d:
+            values = x[:, columns[:, k - 1]].T
+            keys += free & (values != values[every, chosen[:, k - 1]][:, None])  # 1 more where they differ
+        chosen[:, k] = keys.argmax(axis=1)
+        free[every, chosen[:, k]] = False
+    return chosen
+
+
+def _verified(x: Floats, found: Consensus) -> bool:
+    """Whether columns that seldom change took more values together than their weights alone could fit."""
+    assert found.line is not None, "only lines are tested"
+    rows = x[found.inliers][:, list(found.line.columns)]
+    seldom = [k for k in range(rows.shape[1]) if len(np.unique(rows[:, k])) < len(rows) / 2]
+    if not seldom:
+        return True
+    return len(np.unique(rows[:, seldom], axis=0)) >= len(seldom) + 1 + _VERIFYING
+
+
+def _holds(x: Floats, y: Floats, found: Consensus, settings: ThesisSettings) -> bool:
+    """The program's test for spurious regressors: no part of the inliers may need more of them than the sample did."""
+    assert found.line is not None, "only lines are tested"
+    inliers = np.flatnonzero(found.inliers)
+    step = max(2, math.ceil(_LEFT_OUT * len(inliers)))
+    for start in range(0, len(inliers), step):
+        kept = np.delete(inliers, np.s_[start : start + step])
+        if len(kept) < 2:
+            continue
+        if len(fit(x[kept], y[kept], settings.noise_variance).columns) > len(found.line.columns):
+            return False
+    return True
