@@ -40,7 +40,7 @@ from relgym.scene.schema import SceneSchema
 if TYPE_CHECKING:
     from relgym.model.world_model import WorldModel
 
-__all__ = ["agreement", "doubted", "functions_of", "rule_list", "tested"]
+__all__ = ["agreement", "doubted", "functions_of", "of_laws", "rule_list", "tested"]
 
 _PREDICTED: Final = OUTCOMES.index(Outcome.PREDICTED)
 
@@ -66,10 +66,15 @@ def rule_list(model: WorldModel) -> RuleList:
         if not model.governs(target)
     ]
     properties = tuple(replace(_property(part), advice=advice.get(str(part.target), "")) for part in parts)
+    return of_laws(model, RuleList(model.seen, _scope(model), properties))
+
+
+def of_laws(model: WorldModel, rules: RuleList) -> RuleList:
+    """The same rules, with those that no history is needed for: laws of motion, and kinematics."""
     laws = tuple(
         Derivation(k.type, k.property, k.rate, k.step, k.uses_next) for k in model.schema.derivations
     )
-    return RuleList(model.seen, _scope(model), properties, _motion(model), laws)
+    return replace(rules, motion=_motion(model), kinematics=laws)
 
 
 def agreement(model: WorldModel, rules: RuleList, scenes: Iterable[Scene]) -> tuple[RuleList, float]:

@@ -40,7 +40,7 @@ from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
-from relgym.model.rules import doubted, rule_list
+from relgym.model.rules import doubted, of_laws, rule_list
 from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
 from relgym.model.storage import read_model, write_model
@@ -762,7 +762,7 @@ class WorldModel:
             advice = tuple(
                 Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
             )
-            rules = parse_rules(data.get("rules", ""))
+            rules = of_laws(self, parse_rules(data.get("rules", "")))
             told, spoken = (
                 [part.target for part in rules.properties],
                 [str(target) for target in self.targets if not self.governs(target)],
