@@ -6,7 +6,7 @@ import copy
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -759,6 +759,9 @@ class WorldModel:
 
     def _restore_report(self, data: Mapping[str, Any]) -> None:
         if data:
+            known = {field.name for field in fields(Advice)}
+            if odd := {name for each in data.get("advice", ()) for name in each} - known:
+                raise ModelFileError(f"report.advice: unknown fields {sorted(odd)}; save the model again")
             advice = tuple(
                 Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
             )
