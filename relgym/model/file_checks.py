@@ -105,7 +105,9 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
     for name, hindsight in body.hindsight.items():
         _require(name in known, "hindsight", f"{name!r} is no target")
         _require(all(wrong <= said for said, wrong in hindsight.steps), "hindsight", "more wrong than said")
+    _check_calibration(body, known)
     pairs = {(t.type, t.property) for t in targets}
+    _check_regressions(body, parts, pairs)
     _require(all((name, prop) in pairs for name, prop, _ in body.looks), "looks", "expected targets")
     if body.screen is not None:
         _check_screen(body.screen, parts)
@@ -116,6 +118,47 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
         _check_history(body, parts, targets, arrays)
     if parts.laws is not None and body.laws is not None:
         _check_laws(body.laws, parts.laws.learner, arrays)
+
+
+def _check_calibration(body: Body, known: set[str]) -> None:
+    for name, calibration in body.calibration.items():
+        _require(name in known, "calibration", f"{name!r} is no target")
+        _distinct([cell.key for cell in calibration.cells], "calibration")
+        _require(calibration.slips[1] <= calibration.slips[0], "calibration", "more slips than predictions")
+        records = [record for cell in calibration.cells for record in cell.records]
+        for cell in calibration.cells:
+            _distinct([who for who, *_ in cell.records], "calibration")
+        _require(
+            all(hits <= trials for _, trials, hits, _, _ in records), "calibration", "more hits than trials"
+        )
+        for bins in (calibration.changes, *(record[-1] for record in records)):
+            _distinct([place for place, _ in bins], "calibration")
+            _require(all(-(1 << 14) <= place < 1 << 12 for place, _ in bins), "calibration", "no such size")
+
+
+def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) -> None:
+    for name, regression in body.regressions.items():
+        where = f"regressions[{name!r}]"
+        _require(name in parts.regressions, where, "nothing of this type is predicted")
+        _require(all((name, prop) in pairs for prop in regression.targets), where, "expected targets")
+        _distinct(regression.targets, where)
+        _require(regression.seen > 0, where, "nothing was seen")
+        d, count = len(regression.names), len(regression.targets)
+        _require(d <= parts.config.regression_columns, where, "more columns than are regressed on")
+        widths = {len(regression.centre), len(regression.scale)}
+        _require(widths == {d} or (widths == {0} and not regression.ridges), where, "expected one a column")
+        _require(all(each > 0.0 for each in regression.scale), where, "expected scales above 0")
+        least, most = regression.range
+        _require(len(least) == len(most) == count, where, "expected a range for each target")
+        _require(
+            all(a <= b for a, b in zip(least, most, strict=True)), where, "the smaller change comes first"
+        )
+        _require(all(len(x) == d and len(y) <= count for x, y in regression.waiting), where, "another width")
+        for (_, _, weights), width in zip(regression.ridges, (d, d + d * (d + 1) // 2), strict=False):
+            _require(len(weights) <= count, where, "more weights than targets")
+            _require(
+                all(len(row) == width + 1 for row in weights), where, "expected a weight for each column"
+            )
 
 
 def _target(record: TargetRecord) -> Target:
@@ -604,6 +647,7 @@ def _check_history(body: Body, parts: Parts, targets: Sequence[Target], arrays: 
     if body.laws is not None:
         stores = ["contacts", *(f"free{k}" for k in range(len(body.laws.laws.learners or ())))]
         expected |= {f"laws.{store}.{name}" for store in stores for name in ("rows", "cells")}
+    expected |= _check_regression_shapes(body, arrays)
     _require(
         set(arrays) == expected,
         "history",
@@ -623,6 +667,22 @@ def _check_history(body: Body, parts: Parts, targets: Sequence[Target], arrays: 
     for k, (part, target) in enumerate(zip(body.targets, targets, strict=True)):
         table_at = f"table{types.index(target.type)}"
         _check_examples(part.model, target, signatures[target.type], arrays, table_at, f"target{k}")
+
+
+def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
+    """Names of the arrays of regressions, whose shapes and numbers are such as they must be."""
+    names: set[str] = set()
+    for k, (_, regression) in enumerate(sorted(body.regressions.items())):
+        for number, (_, _, weights) in enumerate(regression.ridges):
+            _require(weights, f"regression{k}", "expected weights")
+            width = len(weights[0])
+            shapes = {f"gram{number}": (width, width), f"moments{number}": (len(weights), width)}
+            for part, shape in shapes.items():
+                name = f"regression{k}.{part}"
+                _rows(arrays, name, "float64", shape)
+                _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
+                names.add(name)
+    return names
 
 
 _TABLE: Final = ("x", "signature", "stratum", "bodies", "serial")

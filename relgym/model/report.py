@@ -12,6 +12,7 @@ from relgym.clustering.mode import Mode
 from relgym.errors import ConfigError
 from relgym.laws.text import LawRow, WorldRow, law_rows, world_rows
 from relgym.model.advice import Advice
+from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.report_tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
 from relgym.model.rules import agreement
 from relgym.model.spread import ROUNDING
@@ -39,6 +40,8 @@ __all__ = [
 ]
 
 _ELSE = "else"
+
+_PREDICTED = OUTCOMES.index(Outcome.PREDICTED)
 
 
 def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
@@ -159,6 +162,22 @@ def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> T
         _role_rows(part),
         advice,
         tuple(as_relations(tests, part.flags) for tests in part.scope.beyond()),
+        _record(part),
+    )
+
+
+def _record(part: PropertyModel) -> str:
+    """How a target's predictions came out; empty if nobody looked back at them."""
+    known = part.calibration
+    if not known.trials or not part.config.abstain:
+        return ""
+    kinds = list(known.kinds(_PREDICTED))
+    trials = sum(count for count, _ in kinds)
+    sure = sum(count for count, told in kinds if part.claims(told))
+    share = 100.0 * sure / trials if trials else 0.0
+    return (
+        f"{share:.3g} % of what modes predicted lately is of a kind that is claimed; "
+        f"{100.0 * known.slips:.2g} % of all was claimed and off by more than a claim may be"
     )
 
 

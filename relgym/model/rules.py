@@ -212,7 +212,11 @@ def _doubt(part: PropertyModel) -> str:
         return "no law of the form that is looked for describes it"
     if not part.modes:
         return "no mode learned yet"
-    return "nothing tells yet which of these holds" if part.undecided else ""
+    if part.doubtful:
+        share = 100.0 * part.calibration.share(_PREDICTED)
+        return f"such predictions were right in {share:.2g} % of the latest cases, too few to claim any"
+    known = part.calibration.trials and part.config.abstain
+    return "nothing tells yet which of these holds" if part.undecided and not known else ""
 
 
 # ------------------------------------------------------------------ functions and roles
