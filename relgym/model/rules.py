@@ -8,6 +8,7 @@ rests, and doesn't bounce with no velocity.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
@@ -40,7 +41,7 @@ from relgym.scene.schema import SceneSchema
 if TYPE_CHECKING:
     from relgym.model.world_model import WorldModel
 
-__all__ = ["agreement", "doubted", "functions_of", "rule_list", "tested"]
+__all__ = ["agreement", "doubted", "functions_of", "of_laws", "rule_list", "tested"]
 
 _PREDICTED: Final = OUTCOMES.index(Outcome.PREDICTED)
 
@@ -66,10 +67,15 @@ def rule_list(model: WorldModel) -> RuleList:
         if not model.governs(target)
     ]
     properties = tuple(replace(_property(part), advice=advice.get(str(part.target), "")) for part in parts)
+    return of_laws(model, RuleList(model.seen, _scope(model), properties))
+
+
+def of_laws(model: WorldModel, rules: RuleList) -> RuleList:
+    """The same rules, with those that no history is needed for: laws of motion, and kinematics."""
     laws = tuple(
         Derivation(k.type, k.property, k.rate, k.step, k.uses_next) for k in model.schema.derivations
     )
-    return RuleList(model.seen, _scope(model), properties, _motion(model), laws)
+    return replace(rules, motion=_motion(model), kinematics=laws)
 
 
 def agreement(model: WorldModel, rules: RuleList, scenes: Iterable[Scene]) -> tuple[RuleList, float]:
@@ -417,7 +423,7 @@ def _simplified(text: str, literal: Literal) -> Literal:
     """A comparison of a sum; a single term stands alone."""
     threshold, op = float(f"{literal.threshold:.{_EXACT}g}"), literal.op
     found = None if text.startswith("(") else parse_sum(text)
-    if found is not None and len(found.terms) == 1 and op is not None:
+    if found is not None and len(found.terms) == 1 and op is not None and found.terms[0][0] != 0.0:
         weight, name = found.terms[0]
         threshold = float(f"{(threshold - found.constant) / weight:.{_EXACT}g}") + 0.0
         if weight > 0.0:
@@ -470,8 +476,12 @@ def _at_rest(part: PropertyModel, view: View) -> Iterator[_Atom]:
             if len(terms) != 1 or terms[0][1] not in own or part.mode(mode).roles[0].terms == ():
                 continue
             weight, name = terms[0]
+            if weight == 0.0:  # what a refit left of a term
+                continue
             value = (part.mode(constant).intercept - part.mode(mode).intercept) / weight
             value = 0.0 if abs(value) <= part.clusterer.scale.tolerance else value
+            if not math.isfinite(value):
+                continue
             test = Test(Clause((equal_to(name, value + 0.0),)), "all")
             yield _Atom(test, view.own[:, own.index(name)] == value)
 

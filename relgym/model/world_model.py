@@ -6,7 +6,7 @@ import copy
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -46,7 +46,7 @@ from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
-from relgym.model.rules import doubted, rule_list
+from relgym.model.rules import doubted, of_laws, rule_list
 from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
 from relgym.model.storage import read_model, write_model
@@ -797,10 +797,13 @@ class WorldModel:
 
     def _restore_report(self, data: Mapping[str, Any]) -> None:
         if data:
+            known = {field.name for field in fields(Advice)}
+            if odd := {name for each in data.get("advice", ()) for name in each} - known:
+                raise ModelFileError(f"report.advice: unknown fields {sorted(odd)}; save the model again")
             advice = tuple(
                 Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
             )
-            rules = parse_rules(data.get("rules", ""))
+            rules = of_laws(self, parse_rules(data.get("rules", "")))
             told, spoken = (
                 [part.target for part in rules.properties],
                 [str(target) for target in self.targets if not self.governs(target)],

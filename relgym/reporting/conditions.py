@@ -15,7 +15,7 @@ from typing import Final
 
 from relgym.errors import ConfigError
 from relgym.logic.clause import ANY, Clause, Literal
-from relgym.reporting.functions import Sum, parse_sum, split_outside
+from relgym.reporting.functions import Sum, parse_sum, split_outside, whole_of
 
 __all__ = [
     "CONTEXTS",
@@ -228,11 +228,19 @@ def _parse_test(text: str, arity: int) -> Test:
     if bare.startswith("[") and bare.endswith("]"):
         words = {m["word"] or "" for m in map(_QUANTIFIER.fullmatch, split_outside(bare[1:-1], " and ")) if m}
         context = _BY_WORD[words.pop()] if len(words) == 1 else "all"
-        return Test(Clause(tuple(_literals(bare[1:-1], context, text)), arity), context, negated)
+        return Test(_closed(_literals(bare[1:-1], context, text), arity, text), context, negated)
     if " != " in bare:
         name, value = bare.rsplit(" != ", 1)
         return Test(Clause((equal_to(name, _number(value, text)),), arity), "all", True)
-    return as_tests(Clause((_parse_literal(bare, text),), arity), "all", negated=negated)[0]
+    return as_tests(_closed([_parse_literal(bare, text)], arity, text), "all", negated=negated)[0]
+
+
+def _closed(literals: Iterable[Literal], arity: int, whole: str) -> Clause:
+    """A clause of nothing but the objects that are given."""
+    clause = Clause(tuple(literals), arity)
+    if clause.variables > arity:
+        raise ConfigError(f"condition {whole!r}: it speaks of an object that no 'some' or 'no' introduces")
+    return clause
 
 
 def _literals(body: str, context: str, whole: str) -> list[Literal]:
@@ -280,7 +288,7 @@ def _called(text: str) -> tuple[str, tuple[int, ...]]:
     if match is None:
         return text, ()
     names = match["args"].split(", ")
-    return match["name"], tuple(int(n[1:]) if len(n) > 1 else ord(n) - ord("A") for n in names)
+    return match["name"], tuple(whole_of(n[1:]) if len(n) > 1 else ord(n) - ord("A") for n in names)
 
 
 def _number(text: str, whole: str) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 
-__all__ = ["Column", "Sum", "evaluated", "parse_sum", "split_outside", "sum_text"]
+__all__ = ["Column", "Sum", "evaluated", "number_of", "parse_sum", "split_outside", "sum_text", "whole_of"]
 
 Column: TypeAlias = Callable[[str], NDArray[np.float64]]
 """Values of a property by name, shape ``(n,)``; NaN where there is none."""
@@ -95,6 +95,22 @@ def parse_sum(text: str) -> Sum:
     return Sum(tuple(terms), constant)
 
 
+def number_of(text: str) -> float:
+    """The number that a text is; `ConfigError` if it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        raise ConfigError(f"rules: expected a number, got {text!r:.60}") from None
+
+
+def whole_of(text: str) -> int:
+    """The whole number that a text is, with or without commas between thousands; `ConfigError` if it is none."""
+    digits = text.replace(",", "")
+    if not digits.isascii() or not digits.isdigit() or len(digits) > 18:
+        raise ConfigError(f"rules: expected a whole number of at most 18 digits, got {text!r:.60}")
+    return int(digits)
+
+
 def _pieces(text: str) -> list[tuple[float, str]]:
     text = text.strip()
     first = -1.0 if text.startswith("-") else 1.0
@@ -119,14 +135,14 @@ def factor(name: str, column: Column) -> NDArray[np.float64]:
 def _atom(text: str, column: Column) -> NDArray[np.float64]:
     base, _, power = text.partition("^")
     if power:
-        return _atom(base, column) ** int(power)
+        return _atom(base, column) ** whole_of(power)
     match = _CALL.fullmatch(text)
     if match is None:
         return column(text)
     inside = column(match["name"])
     if match["function"] in ("sin", "cos"):
         function = np.sin if match["function"] == "sin" else np.cos
-        return np.asarray(function(int(match["frequency"] or 1) * inside))
+        return np.asarray(function(whole_of(match["frequency"] or "1") * inside))
     return np.asarray(registered(match["function"])(inside), dtype=np.float64)
 
 

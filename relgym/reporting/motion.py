@@ -12,10 +12,10 @@ from relgym.errors import ConfigError
 from relgym.laws.account import happens
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
-from relgym.laws.frames import POINT
+from relgym.laws.frames import FRAMES, POINT
 from relgym.laws.records import ONE, AxisLaw, FreeLaw, Kind, Operator, PairLaw, Piece, Share
 from relgym.laws.text import DIRECTIONS
-from relgym.reporting.functions import parse_sum
+from relgym.reporting.functions import number_of, parse_sum, whole_of
 from relgym.scene.objects import Target
 from relgym.scene.schema import SceneSchema
 
@@ -182,7 +182,7 @@ class _Draft:
         """Take up a line; whether it says something."""
         if line.startswith("  frame: "):
             self.frame = line.removeprefix("  frame: ")
-            return True
+            return self.frame in FRAMES
         return self._of_axis(line) or self._between(line) or self._of_free(line)
 
     def _of_axis(self, line: str) -> bool:
@@ -190,9 +190,12 @@ class _Draft:
             letter = next((c for c, text in DIRECTIONS.items() if text == match["where"]), match["where"][-1])
             kinds = tuple(_kind(k) for k in match["kinds"].split(", ")) if match["kinds"] else ()
             self.law = {"pieces": [], "operator": "max", "kinds": kinds, "others": [], "signs": [True, True]}
-            self.law |= {"examples": _int(match["n"]), "unexplained": _int(match["bad"])}
+            self.law |= {
+                "examples": whole_of(match["n"] or "0"),
+                "unexplained": whole_of(match["bad"] or "0"),
+            }
             self.axes.setdefault(letter, []).append(self.law)
-            self.tolerance = float(match["tol"] or self.tolerance)
+            self.tolerance = number_of(match["tol"] or f"{self.tolerance!r}")
         elif self.law and (match := _PIECE.fullmatch(line)):
             self.law["pieces"].append(_piece(match["piece"]))
             self.law["operator"] = "min" if " < " in match["tests"] else self.law["operator"]
@@ -209,7 +212,7 @@ class _Draft:
         if match := _SHARE.fullmatch(line):
             self.shares.append(((match[1], match[2]), _share(match[3])))
         elif match := _GRIP.fullmatch(line):
-            self.grips.append(((match[1], match[2]), float(match[3])))
+            self.grips.append(((match[1], match[2]), number_of(match[3])))
         return match is not None
 
     def _of_free(self, line: str) -> bool:
@@ -217,8 +220,8 @@ class _Draft:
             self.kind = match["type"] or self.kind
             self.free.setdefault(self.kind, []).append((match["name"], _piece(match["piece"])))
             if match["n"]:
-                self.counts[self.kind] = _int(match["n"]), _int(match["bad"])
-                self.tolerance = float(match["tol"])
+                self.counts[self.kind] = whole_of(match["n"] or "0"), whole_of(match["bad"] or "0")
+                self.tolerance = number_of(match["tol"])
         return match is not None
 
 
@@ -246,6 +249,10 @@ def parse_motion(lines: list[str]) -> MotionRules:
 
 
 def _axis_law(data: Mapping[str, Any]) -> AxisLaw:
+    if not data["pieces"]:
+        raise ConfigError(
+            "laws of motion: expected a piece, such as 'always: v'_n = u_n', after each contact"
+        )
     return AxisLaw(
         tuple(data["pieces"]),
         data["operator"],
@@ -271,9 +278,5 @@ def _piece(text: str) -> Piece:
 def _share(text: str) -> Share:
     match = _POWER.fullmatch(text)
     if match is None:
-        return Share(constant=float(text))
+        return Share(constant=number_of(text))
     return Share(match["name"], int(match["power"] or 1))
-
-
-def _int(text: str | None) -> int:
-    return int((text or "0").replace(",", ""))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from relgym.errors import ConfigError
 from relgym.reporting.conditions import CONTEXTS, Condition, parse_condition
-from relgym.reporting.functions import Sum, parse_sum, split_outside
+from relgym.reporting.functions import Sum, number_of, parse_sum, split_outside, whole_of
 from relgym.reporting.motion import HEADING, parse_motion
 from relgym.reporting.rules import (
     SEEN,
@@ -101,7 +101,7 @@ def parse_rules(text: str) -> RuleList:
         elif first == SEEN:
             found = replace(found, properties=_experienced(found.properties, section[1:]))
         elif (match := _TARGET.fullmatch(first)) is not None:
-            draft = _Draft(match["type"], match["property"], _int(match["steps"]))
+            draft = _Draft(match["type"], match["property"], whole_of(match["steps"]))
             _read(draft, section[1:])
             found = replace(found, properties=(*found.properties, draft.rules()))
         else:
@@ -137,7 +137,7 @@ def _sections(text: str) -> Iterator[list[str]]:
 def _head(lines: list[str]) -> tuple[int, tuple[tuple[str, int, int], ...], str]:
     text, _, agreement = " ".join(lines).partition(" Agreement: ")
     if nothing := _NOTHING.match(text):
-        return _int(nothing[1]), (), ""
+        return whole_of(nothing[1]), (), ""
     learned = _LEARNED.match(text)
     if learned is None:
         raise ConfigError(
@@ -145,7 +145,11 @@ def _head(lines: list[str]) -> tuple[int, tuple[tuple[str, int, int], ...], str]
         )
     scope = _SCOPE.search(text)
     counts = [] if scope is None else [_COUNT.fullmatch(part) for part in scope[1].split(", ")]
-    return _int(learned[1]), tuple((c[1], int(c[2]), int(c[3] or c[2])) for c in counts if c), agreement
+    return (
+        whole_of(learned[1]),
+        tuple((c[1], whole_of(c[2]), whole_of(c[3] or c[2])) for c in counts if c),
+        agreement,
+    )
 
 
 def _experienced(properties: tuple[PropertyRules, ...], lines: list[str]) -> tuple[PropertyRules, ...]:
@@ -217,9 +221,9 @@ def _branch(draft: _Draft, head: str, fields: list[str]) -> None:
     said, *stats = fields
     condition = re.sub(r"^(if|elif) |^(else|always)$", "", head[:-1])
     numbers = [match for stat in stats if (match := _STEPS.fullmatch(stat))]
-    spreads = [float(stat[2:]) for stat in stats if stat.startswith("± ")]
+    spreads = [number_of(stat[2:]) for stat in stats if stat.startswith("± ")]
     branch = Branch(
-        (), None, steps=_int(numbers[0][1]) if numbers else 0, spread=spreads[0] if spreads else 0.0
+        (), None, steps=whole_of(numbers[0][1]) if numbers else 0, spread=spreads[0] if spreads else 0.0
     )
     if said.startswith("no prediction"):
         branch = replace(branch, reason=said.removeprefix("no prediction").strip(" ()"))
@@ -236,12 +240,12 @@ def _branch(draft: _Draft, head: str, fields: list[str]) -> None:
 
 def _bound(draft: _Draft, text: str) -> bool:
     if match := _BOUND.fullmatch(text):
-        draft.bounds.append(Bound(match[1], float(match[2]), steps=_int(match[3] or "0")))
+        draft.bounds.append(Bound(match[1], number_of(match[2]), steps=whole_of(match[3] or "0")))
     elif match := _IF.fullmatch(text):
         tests = parse_condition(match[1])
-        draft.bounds.append(Bound("if", float(match[2]), tests=tests, steps=_int(match[3] or "0")))
+        draft.bounds.append(Bound("if", number_of(match[2]), tests=tests, steps=whole_of(match[3] or "0")))
     elif match := _WITHIN.fullmatch(text):
-        draft.bounds.append(Bound("change within", float(match[1]), float(match[2])))
+        draft.bounds.append(Bound("change within", number_of(match[1]), number_of(match[2])))
     return match is not None
 
 
@@ -251,7 +255,7 @@ def _rest(draft: _Draft, text: str) -> bool:
     elif text.startswith("advice: "):
         draft.advice = text.removeprefix("advice: ")
     elif match := _UNEXPLAINED.fullmatch(text):
-        draft.unexplained = _int(match[1])
+        draft.unexplained = whole_of(match[1])
     elif " := " in text:
         name, said = (part.strip() for part in text.split(" := ", 1))
         if said.startswith("any "):
@@ -273,7 +277,3 @@ def _list(text: str) -> tuple[str, ...]:
 
 def _cases(text: str, arity: int = 1) -> tuple[Condition, ...]:
     return tuple(parse_condition(part.strip(), arity) for part in split_outside(text, " or "))
-
-
-def _int(text: str) -> int:
-    return int(text.replace(",", ""))

@@ -158,8 +158,11 @@ class Experience:
 
 
 def seen_of(prints: str) -> tuple[int, ...]:
-    """Inverse of `Experience.prints`."""
-    data = base64.urlsafe_b64decode(prints)
+    """Inverse of `Experience.prints`; `ConfigError` for what that never gives."""
+    try:
+        data = base64.urlsafe_b64decode(prints)
+    except ValueError as error:
+        raise ConfigError(f"rules: expected fingerprints in base64 ({error}), got {prints!r:.60}") from None
     return tuple(int.from_bytes(data[k : k + 3], "big") for k in range(0, len(data), 3))
 
 

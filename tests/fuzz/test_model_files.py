@@ -49,3 +49,13 @@ def test_laws_that_speak_of_velocities_alone_are_told(
         change(body["laws"]["laws"])
         tally = fuzzer.use(name, body, arrays)
         assert not tally.findings, tally.findings[0].trace
+
+
+def test_terms_without_weight_are_described(fuzzer: Fuzzer) -> None:
+    body, arrays = copy.deepcopy(fuzzer.files["ball-modes-history"])
+    for part in body["targets"]:
+        for mode in part["model"]["clusterer"]["modes"]:
+            for role in mode["roles"]:
+                role["terms"] = [[name, 0.0] for name, _ in role["terms"]]
+    tally = fuzzer.use("ball-modes-history", body, arrays)
+    assert tally.accepted and not tally.findings, tally.findings[0].trace

@@ -132,6 +132,18 @@ DAMAGES: dict[str, tuple[str, Change, str]] = {
     "rules that leave a target out": (
         "truck", lambda b, a: b.update(report={"rules": "Learned from 9 transitions."}), "expected rules of"
     ),
+    "advice with a field too many": (
+        "truck",
+        lambda b, a: b.update(
+            report={
+                "rules": "",
+                "advice": [
+                    {"target": "x", "unexplained": 0, "left": 1, "features": [], "law": "", "remains": 1, "kind": 1}
+                ],
+            }
+        ),
+        "unknown",
+    ),
     "laws without a tolerance": ("ball-laws", lambda b, a: b["laws"]["laws"].update(tolerance=0.0), "tolerance"),
     "a number in the history that is no size": (
         "truck-history", lambda b, a: a["table0.x"].__setitem__((0, 0), 1e200), "at most 1e"

@@ -6,6 +6,7 @@ import base64
 import copy
 import math
 import random
+import re
 from collections.abc import Iterator
 from typing import Any, TypeAlias
 
@@ -25,6 +26,15 @@ STRANGE: tuple[Any, ...] = (
     [], {}, [[]], [0], [None], [1, 2, 3], {"x": 1}, [[0, 1]], [["a", 1.0]],
 )  # fmt: skip
 """What is put in place of what was there."""
+
+
+WORDS = (
+    "", "0", "-1", "0.0", "1e-320", "1e308", "-1e308", "1e999", "nan", "inf", "9" * 30, "9" * 5_000, "1_000", "if",
+    "elif", "else", "always", "not", "no", "some", "or", "and", "max", "min", "(", ")", "((", "[", "]", "A", "B", "Z",
+    "n", "t", "v_n", "u_n", "J_n", "J_t", "v'_n", "x", "task.reward", "sin(", "action", "touching", "nothing:", "is",
+    "±", "steps", "é",
+)  # fmt: skip
+"""What is put in place of a word of a text."""
 
 
 class Mutator:
@@ -77,7 +87,9 @@ class Mutator:
             ways += [self._nudge] * 6
         elif isinstance(node, str):
             ways += [self._rename] * 3
-            if len(node) > 40:
+            if "\n" in node:
+                ways += [self._edit] * 12
+            elif len(node) > 40:
                 ways += [self._scramble] * 4
         elif isinstance(node, list) and node:
             ways += [self._reorder] * 4
@@ -105,6 +117,26 @@ class Mutator:
     def _rename(self, holder: Any, key: Any) -> None:
         node, other = holder[key], self.rng.choice(self._strings)
         holder[key] = self.rng.choice((other, other, node + "x", node[1:], node.upper(), node + "'"))
+
+    def _edit(self, holder: Any, key: Any) -> None:
+        """Of a text some lines or words go, come twice, change places, or become others."""
+        rng = self.rng
+        lines = holder[key].split("\n")
+        for _ in range(rng.choice((1, 1, 2, 4))):
+            k, j = rng.randrange(len(lines)), rng.randrange(len(lines))
+            match rng.randrange(7):
+                case 0:
+                    lines[k] = ""
+                case 1:
+                    lines.insert(j, lines[k])
+                case 2:
+                    lines[k], lines[j] = lines[j], lines[k]
+                case _:
+                    words, others = (re.findall(r"\s+|[\w.]+|\W", lines[at]) for at in (k, j))
+                    if words and others:
+                        words[rng.randrange(len(words))] = rng.choice((*WORDS, rng.choice(others)))
+                        lines[k] = "".join(words)
+        holder[key] = "\n".join(lines)
 
     def _scramble(self, holder: Any, key: Any) -> None:
         """Of an array in base64 some bytes become others, or some are missing."""
