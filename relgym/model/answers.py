@@ -37,9 +37,6 @@ _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
 )
 
 
-FEW_LEFT = 20
-"""A target is explained if less than one example in so many isn't."""
-
 _NOTHING = Calibration()
 
 
@@ -91,6 +88,7 @@ class Answers(StandIns):
         self.hindsight = Hindsight()
         self.calibration = Calibration(config.claim_probability)
         self.latest = NOISE
+        self._unsettled = True
         self.leaned_on = False
 
     def bounds(self, mode: int) -> bool:
@@ -157,7 +155,7 @@ class Answers(StandIns):
     @property
     def rough(self) -> bool:
         """Whether so much is unexplained, or explained only roughly, that regressions may know better."""
-        return self._guessable or FEW_LEFT * self.clusterer.noise_examples > self.clusterer.seen
+        return self._guessable or self._unsettled
 
     @property
     def _lost(self) -> bool:

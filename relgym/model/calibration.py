@@ -111,7 +111,9 @@ class Judgement(NamedTuple):
 
 def key_of(outcome: int, winner: int, margin: float) -> Key:
     """The cell of a prediction."""
-    return Key(outcome, winner, int(_bins(np.array([margin]))[0]))
+    if margin == math.inf:
+        return Key(outcome, winner, 7)
+    return Key(outcome, winner, min(max(math.frexp(margin)[1] + 2, 1), 6) if margin > 0.0 else 0)
 
 
 def keys_of(
@@ -323,15 +325,14 @@ class Calibration:
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
         self.trials += 1
         self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
-        spoke = self.judge(audit.key, audit.values).speaker
         within = max(rounding, error * self.change)
         self._slips[0] += 1.0
-        self._slips[1] += claimed and errors[spoke] > within
+        self._slips[1] += claimed and errors[audit.speaker] > within
         if self._slips[0] > MEMORY:
             self._slips = [0.5 * each for each in self._slips]
         for key in dict.fromkeys((_whole(audit.key), audit.key)):
             if key not in self._cells:
-                self._cells[key] = _Cell.new(spoke)
+                self._cells[key] = _Cell.new(audit.speaker)
             self._cells[key].count(errors, within)
         self._judged.clear()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -64,8 +65,8 @@ def _settled(
     one: Prediction,
 ) -> Prediction:
     """A prediction with the value of who codes such ones best, and how right that will be."""
-    model, own = parts.models[target], np.array([one.value])
-    values = tuple(_experts(parts, target, percept, index, following[None], own)[0].tolist())
+    model = parts.models[target]
+    values = _experts_one(parts, target, percept, index, following, one.value)
     winner = -one.mode if parts.governs(target) else one.mode
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
@@ -89,6 +90,34 @@ def _settled(
     )
 
 
+def _experts_one(
+    parts: Parts,
+    target: Target,
+    percept: Percept,
+    index: int,
+    following: NDArray[np.float64],
+    own: float,
+) -> tuple[float, ...]:
+    """`_experts` of a single scene."""
+    model = parts.models[target]
+    found = [math.nan] * len(EXPERTS)
+    present = float(following[percept.layout.column(index, target.property)])
+    found[PERSISTENCE] = present
+    if math.isfinite(own):
+        found[OWN] = own
+    if model.guesses_something:
+        guessed = model.guessed(percept, index, following[None])
+        found[GUESS] = math.nan if guessed is None else float(guessed[0])
+    if parts.governs(target):
+        return tuple(found)
+    latest = model.latest_values(percept, index, following[None])
+    found[LATEST] = math.nan if latest is None else float(latest[0])
+    changes = parts.regressed(percept, index, target.property) if model.rough else None
+    if changes is not None:
+        found[LINEAR : LINEAR + KINDS] = [present + float(change) for change in changes[0]]
+    return tuple(value if math.isfinite(value) else math.nan for value in found)
+
+
 def _outcome(one: Prediction, *, claimed: bool, known: bool) -> Outcome:
     """What is known of a mode's predictions has the last word on whether one is claimed."""
     if one.ok:
@@ -110,16 +139,17 @@ def _experts(
     found = np.full((len(own), len(EXPERTS)), np.nan)
     present = following[:, percept.layout.column(index, target.property)]
     found[:, OWN], found[:, PERSISTENCE] = np.where(np.isfinite(own), own, np.nan), present
-    guessed = model.guessed(percept, index, following)
+    guessed = model.guessed(percept, index, following) if model.guesses_something else None
     if guessed is not None:
         found[:, GUESS] = np.where(np.isfinite(guessed), guessed, np.nan)
     latest = None if parts.governs(target) else model.latest_values(percept, index, following)
     if latest is not None:
-        found[:, LATEST] = latest
+        found[:, LATEST] = np.where(np.isfinite(latest), latest, np.nan)
     if model.rough and not parts.governs(target):
         changes = parts.regressed(percept, index, target.property)
         if changes is not None:
-            found[:, LINEAR : LINEAR + KINDS] = present[:, None] + changes
+            told = present[:, None] + changes
+            found[:, LINEAR : LINEAR + KINDS] = np.where(np.isfinite(told), told, np.nan)
     return found
 
 

@@ -38,7 +38,8 @@ def values(own: float = math.nan, linear: float = math.nan, now: float = 0.0) ->
 def seen(
     known: Calibration, said: tuple[float, ...], came: float, key: Key = KEY, *, claimed: bool = True
 ) -> None:
-    known.look_back(Audit(key, said), came, claimed=claimed, rounding=1e-9, error=0.05)
+    audit = Audit(key, said, known.judge(key, said).speaker)
+    known.look_back(audit, came, claimed=claimed, rounding=1e-9, error=0.05)
 
 
 def right(n: int) -> Calibration:
