@@ -30,7 +30,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["EXPERTS", "Audit", "Calibration", "Judgement", "Key", "key_of", "keys_of"]
+__all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of"]
 
 EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
 """Who may give a value: the winner of the vote (or the law); the guess; both regressions; the mode that held last,
@@ -88,7 +88,7 @@ class Audit(NamedTuple):
     speaker: int = 0
 
 
-class Judgement(NamedTuple):
+class Assessment(NamedTuple):
     """What is made of a prediction.
 
     Attributes
@@ -238,10 +238,10 @@ class Calibration:
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
-        self._judged: dict[Key, tuple[tuple[int, ...], Judgement]] = {}
+        self._assessed: dict[Key, tuple[tuple[int, ...], Assessment]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_judged": {}}
+        return self.__dict__ | {"_assessed": {}}
 
     @property
     def change(self) -> float:
@@ -257,32 +257,32 @@ class Calibration:
         return self._slips[1] / max(self._slips[0], 100.0)
 
     # ------------------------------------------------------------------ what is made of a prediction
-    def judge(self, key: Key, values: Sequence[float]) -> Judgement:
+    def assess(self, key: Key, values: Sequence[float]) -> Assessment:
         """Who gives the value of a prediction, and how far that can be relied on."""
         able = tuple(k for k, value in enumerate(values) if math.isfinite(value))
-        known = self._judged.get(key)
+        known = self._assessed.get(key)
         if known is None or known[0] != able:
-            known = self._judged[key] = (able, self._judge(key, able))
+            known = self._assessed[key] = (able, self._assess(key, able))
         return known[1]
 
-    def judge_many(
+    def assess_many(
         self, key: Key, values: NDArray[np.float64]
-    ) -> Iterator[tuple[NDArray[np.intp], Judgement]]:
-        """`judge` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
+    ) -> Iterator[tuple[NDArray[np.intp], Assessment]]:
+        """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
         able, which = np.unique(np.isfinite(values), axis=0, return_inverse=True)
         for number, row in enumerate(able):
             rows = np.flatnonzero(which.reshape(-1) == number)
-            yield rows, self.judge(key, np.where(row, 0.0, np.nan).tolist())
+            yield rows, self.assess(key, np.where(row, 0.0, np.nan).tolist())
 
-    def _judge(self, key: Key, able: tuple[int, ...]) -> Judgement:
+    def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
         default = next(k for k in _BY_DEFAULT if k in able)
         whole, cell = self._cells.get(_whole(key)), self._cells.get(key)
         if whole is None:
-            return Judgement(default, math.nan if not self.trials else 0.5, math.nan, math.nan)
+            return Assessment(default, math.nan if not self.trials else 0.5, math.nan, math.nan)
         trusted = cell if cell is not None and cell.squares[PERSISTENCE][0] >= FEW else whole
         speaker = trusted.preferred(self.probability)
         if speaker not in able:
-            return Judgement(default, 0.0, math.nan, math.nan)
+            return Assessment(default, 0.0, math.nan, math.nan)
         share = 0.5
         for each in (whole, cell):
             if each is not None and speaker in each.records:
@@ -291,7 +291,7 @@ class Calibration:
         few = record is None or sum(record.errors.values()) < ENOUGH
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
         trials, own, _ = trusted.squares[speaker]
-        return Judgement(speaker, share, half, math.sqrt(own / trials) if trials else math.nan)
+        return Assessment(speaker, share, half, math.sqrt(own / trials) if trials else math.nan)
 
     # ------------------------------------------------------------------ how it came out
     def look_back(
@@ -334,12 +334,12 @@ class Calibration:
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker)
             self._cells[key].count(errors, within)
-        self._judged.clear()
+        self._assessed.clear()
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
         self._cells = {k: c for k, c in self._cells.items() if k.winner <= 0 or k.winner in modes}
-        self._judged.clear()
+        self._assessed.clear()
 
     def doubts(self, outcome: int, probability: float) -> bool:
         """Whether what won the vote was right less often than that, or the mode that held last speaks instead."""
@@ -348,7 +348,7 @@ class Calibration:
 
     def forget(self) -> None:
         """What follows is another model's word: only what mostly changes stays."""
-        self._cells, self._judged, self.trials = {}, {}, 0
+        self._cells, self._assessed, self.trials = {}, {}, 0
 
     def share(self, outcome: int) -> float:
         """Share of an outcome's predictions that were hits lately; NaN where there were none."""
@@ -356,11 +356,11 @@ class Calibration:
         own = None if whole is None else whole.records.get(OWN)
         return math.nan if own is None or not own.trials else own.hits / own.trials
 
-    def kinds(self, outcome: int) -> Iterator[tuple[float, Judgement]]:
+    def kinds(self, outcome: int) -> Iterator[tuple[float, Assessment]]:
         """Trials of each kind of predictions of an outcome, and what is made of such a prediction."""
         for key, cell in sorted(self._cells.items()):
             if key.outcome == outcome and key != _whole(key):
-                yield cell.squares[PERSISTENCE][0], self._judge(key, tuple(range(len(EXPERTS))))
+                yield cell.squares[PERSISTENCE][0], self._assess(key, tuple(range(len(EXPERTS))))
 
     def united(self, other: Calibration) -> Calibration:
         """What two models know together: cell by cell, the record of who looked back more often."""

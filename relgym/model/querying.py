@@ -70,7 +70,7 @@ def _settled(
     winner = -one.mode if parts.governs(target) else one.mode
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
-    told = model.judge(key, values)
+    told = model.assess(key, values)
     if told.speaker == LATEST and one.mode:
         one = replace(one, mode=model.latest, roles=one.roles[:1])
     spread = one.spread
@@ -210,7 +210,7 @@ def _settled_many(
     winners = -verdict.modes if parts.governs(target) else verdict.modes
     outcomes = np.where(verdict.modes != 0, np.int8(_PREDICTED), verdict.outcomes)
     for key, part in keys_of(outcomes, winners, verdict.margins):
-        for rows, told in model.judge_many(key, said[part]):
+        for rows, told in model.assess_many(key, said[part]):
             some = part[rows]
             values[some] = said[some, told.speaker]
             probability[some], interval[some] = told.probability, told.interval
