@@ -150,12 +150,15 @@ class _Record:
             self.run = 0
         self.run += 1 if hit else -1
         # The run under way isn't part of the record that it is held against.
-        before = self.trials - (abs(self.run) - 1)
-        share = (self.hits - max(self.run - 1, 0) + 0.5) / (before + 1.0) if before > 0.0 else 0.5
-        unlikely = -abs(self.run) * math.log2(min(max(share if hit else 1.0 - share, 1e-300), 1.0))
+        before = max(self.trials - (abs(self.run) - 1), 0.0)
+        share = (max(self.hits - max(self.run - 1, 0), 0.0) + 0.5) / (before + 1.0)
+        # It may have begun at any of the trials, which takes the logarithm of their number to say.
+        bits = -abs(self.run) * math.log2(share if hit else max(1.0 - share, 1e-300)) - math.log2(
+            before + 1.0
+        )
         self.trials += 1.0
         self.hits += hit
-        if before > 0.0 and unlikely >= EVIDENCE:
+        if before > 0.0 and bits >= EVIDENCE:
             self.trials, self.hits = float(abs(self.run)), float(max(self.run, 0))
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits

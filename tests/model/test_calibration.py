@@ -67,20 +67,22 @@ def test_a_new_kind_of_prediction_begins_with_what_the_others_tell() -> None:
     assert known.assess(Key(3, 0, 0), values(own=1.0)).probability == 0.5  # nor is another outcome's known
 
 
-def test_two_misses_of_a_sure_law_end_its_record() -> None:
-    known = right(500)
-    seen(known, values(own=1.0), 2.0)
-    assert known.assess(KEY, values(own=1.0)).probability > 0.99
+@pytest.mark.parametrize(("hits", "misses"), [(100, 3), (500, 2)])
+def test_a_few_misses_of_a_sure_law_end_its_record(hits: int, misses: int) -> None:
+    known = right(hits)
+    for _ in range(misses - 1):
+        seen(known, values(own=1.0), 2.0)
+        assert known.assess(KEY, values(own=1.0)).probability > 0.97
     seen(known, values(own=1.0), 2.0)
     assert known.assess(KEY, values(own=1.0)).probability < 0.2
 
 
-def test_ten_hits_of_what_was_right_half_the_time_do_so_too() -> None:
+def test_twenty_hits_of_what_was_right_half_the_time_do_so_too() -> None:
     known = Calibration()
     for k in range(100):
         seen(known, values(own=1.0), 1.0 + k % 2)
     assert known.assess(KEY, values(own=1.0)).probability == pytest.approx(0.5, abs=0.05)
-    for _ in range(12):
+    for _ in range(20):
         seen(known, values(own=1.0), 1.0)
     assert known.assess(KEY, values(own=1.0)).probability > 0.9
 
@@ -196,6 +198,16 @@ def test_memory_is_bounded() -> None:
     assert cell.records[OWN].trials <= MEMORY
     assert sum(cell.records[OWN].errors.values()) <= MEMORY + 1
     assert known.assess(KEY, values(own=1.0)).probability == pytest.approx(6 / 7, abs=0.02)
+
+
+def test_long_runs_of_either_kind_are_taken() -> None:
+    known = right(3 * MEMORY)
+    for _ in range(3 * MEMORY):
+        seen(known, values(own=1.0), 2.0)
+    assert known.assess(KEY, values(own=1.0)).probability < 0.01
+    for _ in range(3 * MEMORY):
+        seen(known, values(own=1.0), 1.0)
+    assert known.assess(KEY, values(own=1.0)).probability > 0.99
 
 
 def test_modes_that_are_gone_are_forgotten() -> None:
