@@ -142,8 +142,8 @@ class _Record:
     run: int = 0  # of hits (> 0) or misses (< 0), up to now
     errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
 
-    def count(self, error: float, within: float) -> None:
-        """Take in an error; it is a hit if it is no larger than so much."""
+    def count(self, error: float, within: float) -> bool:
+        """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
         self.errors = _counted(self.errors, _place(error))
         hit = error <= within
         if hit != (self.run > 0):
@@ -158,10 +158,12 @@ class _Record:
         )
         self.trials += 1.0
         self.hits += hit
-        if before > 0.0 and bits >= EVIDENCE:
+        ended = before > 0.0 and bits >= EVIDENCE
+        if ended:
             self.trials, self.hits = float(abs(self.run)), float(max(self.run, 0))
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+        return ended
 
     def share(self, prior: float) -> float:
         """Posterior mean of the share of hits."""
@@ -186,7 +188,8 @@ class _Cell:
         """Take in what each expert was off by; the best one speaks, if it leads by enough."""
         for expert in sorted({OWN, self.speaker}):
             if errors[expert] == errors[expert]:
-                self.records.setdefault(expert, _Record()).count(errors[expert], within)
+                if self.records.setdefault(expert, _Record()).count(errors[expert], within):
+                    self.squares[expert] = [0.0, 0.0, 0.0]
         base = errors[PERSISTENCE] ** 2
         for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
@@ -195,7 +198,7 @@ class _Cell:
                 sums[0] += 1.0
                 sums[1] += error * error
                 sums[2] += base
-        best = min(range(len(EXPERTS)), key=self.left)
+        best = min((k for k, error in enumerate(errors) if error == error), key=self.left)
         if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
@@ -213,11 +216,17 @@ class _Cell:
         ratio = self.left(other) / self.left(expert)
         return 0.5 * trials * math.log2(min(max(ratio, 1e-300), 1e300))
 
-    def preferred(self, probability: float) -> int:
-        """Who speaks: the winner where that can be claimed and leaves hardly more than what anybody would try."""
+    def preferred(self, able: Collection[int], probability: float) -> int:
+        """Who of those who have a value speaks.
+
+        The winner where that can be claimed and leaves hardly more than what anybody would try; else who codes best.
+        """
         own = self.records.get(OWN)
-        near = self.left(OWN) <= LEAVE * LEAVE * min(map(self.left, _KNOWN))
-        return OWN if own is not None and near and own.share(0.5) >= probability else self.speaker
+        if OWN in able and own is not None and own.share(0.5) >= probability:
+            least = min(self.left(expert) for expert in _KNOWN if expert in able)
+            if self.left(OWN) <= LEAVE * LEAVE * least:
+                return OWN
+        return self.speaker if self.speaker in able else min(able, key=self.left)
 
 
 class Calibration:
@@ -283,9 +292,7 @@ class Calibration:
         if whole is None:
             return Assessment(default, math.nan if not self.trials else 0.5, math.nan, math.nan)
         trusted = cell if cell is not None and cell.squares[PERSISTENCE][0] >= FEW else whole
-        speaker = trusted.preferred(self.probability)
-        if speaker not in able:
-            return Assessment(default, 0.0, math.nan, math.nan)
+        speaker = trusted.preferred(able, self.probability)
         share = 0.5
         for each in (whole, cell):
             if each is not None and speaker in each.records:
