@@ -59,6 +59,9 @@ LEAVE: Final = 1.1
 PRIOR: Final = 1.0
 """Trials that the prior of a share counts for, as Jeffreys' does."""
 
+YOUNG: Final = 256.0
+"""The share of slips is taken of at least so many predictions: one or two early ones say little."""
+
 COVERED: Final = 0.95
 """Share of what comes that intervals are to hold."""
 
@@ -244,7 +247,7 @@ class Calibration:
         Predictions that somebody looked back at.
     """
 
-    def __init__(self, probability: float = 0.95) -> None:
+    def __init__(self, probability: float = 0.9) -> None:
         self.probability = probability
         self.trials = 0
         self._cells: dict[Key, _Cell] = {}
@@ -266,7 +269,7 @@ class Calibration:
     @property
     def slips(self) -> float:
         """Share of the latest predictions that were claimed and off; of few, as if more had been right."""
-        return self._slips[1] / max(self._slips[0], 100.0)
+        return self._slips[1] / max(self._slips[0], YOUNG)
 
     # ------------------------------------------------------------------ what is made of a prediction
     def assess(self, key: Key, values: Sequence[float]) -> Assessment:

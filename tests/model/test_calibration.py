@@ -175,10 +175,10 @@ def test_intervals_hold_what_they_say() -> None:
 
 
 def test_slips_are_claims_that_were_off() -> None:
-    known = right(150)
+    known = right(298)
     seen(known, values(own=1.0), 9.0)
     seen(known, values(own=1.0), 9.0, claimed=False)
-    assert known.slips == pytest.approx(1 / 152)
+    assert known.slips == pytest.approx(1 / 300)
 
 
 def test_angles_are_off_the_short_way_round() -> None:
