@@ -60,8 +60,8 @@ class ModelConfig:
         is right. It counts only where predictions are looked back at, as wrappers and `WorldModel.fit` do.
     claim_slips
         Where more than this share of a property's latest predictions were claimed and off, only what is at least one
-        minus this probable is claimed. Default 0.0075, range (0, 1]: in the long run less than a per cent is claimed and
-        off, though some kinds of predictions are less sure than that.
+        minus this probable is claimed. Default 0.0075, range (0, 1]: in the long run less than a per cent is claimed
+        and off, though some kinds of predictions are less sure than that.
     regression_columns
         Regressions on all that a target may depend on are made on at most so many columns, squares and products
         included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.
