@@ -20,6 +20,8 @@ _Arrays = dict[str, NDArray[Any]]
 
 def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
     """Schema, config and everything learned; with history also what further learning needs."""
+    # What is under way isn't kept: whoever reads the file begins it again.
+    looks = [*([] if parts.inquiry is None else [parts.inquiry.look]), *parts.looks]
     return {
         "schema": schema_to_json(parts.schema),
         "config": parts.config.to_json(),
@@ -29,7 +31,8 @@ def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
             {"target": target_to_json(t), "model": parts.models[t].to_json(history=history)}
             for t in parts.targets
         ],
-        **({"looks": [list(look) for look in parts.looks]} if history and parts.looks else {}),
+        **({"looks": [list(look) for look in looks]} if history and looks else {}),
+        **({"saved_cells": parts.agenda.saved} if history else {}),
         "tables": [parts.tables[name].to_json() for name in sorted(parts.tables)] if history else [],
         "laws": None if parts.laws is None else parts.laws.to_json(history=history),
         **({"screen": parts.screen.to_json()} if history else {}),
@@ -88,6 +91,8 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     for k, name in enumerate(sorted(body.regressions)):
         parts.regressions[name].restore(data["regressions"][name], _of(arrays, f"regression{k}."))
     parts.looks = [(name, prop, inert) for name, prop, inert in body.looks]
+    if body.saved_cells is not None:
+        parts.agenda.saved = body.saved_cells
     if "screen" in data:
         parts.screen.restore(data["screen"])
     if parts.laws is not None:

@@ -17,6 +17,8 @@ from relgym.files.records import (
     Finite,
     Hex,
     Name,
+    Noise,
+    Number,
     Pair,
     Random,
     Record,
@@ -156,12 +158,12 @@ class ModeRecord(Record):
 class ClustererRecord(Record):
     """The modes of a target, and what finding more of them needs."""
 
-    sigma: Amount
+    sigma: Noise
     next_id: ModeId
-    largest: Amount
-    reach: Amount
-    spread: Amount
-    rounding: Amount
+    largest: Number
+    reach: Number
+    spread: Number
+    rounding: Noise
     approximate: bool
     noise: Count
     modes: list[ModeRecord]
@@ -170,6 +172,7 @@ class ClustererRecord(Record):
     random: Random
     due: bool = False
     chancy: bool = False
+    estimating: bool = False
 
 
 # ---------------------------------------------------------------------- clauses and trees
@@ -508,7 +511,7 @@ class ContactsRecord(Record):
 class LearnedLawsRecord(Record):
     """The laws; the last three fields only with history."""
 
-    tolerance: Amount
+    tolerance: Noise
     free: list[FreeLawRecord]
     pair: PairLawRecord | None
     shares: list[tuple[Name, Name, str, Literal[1, 2, 3], Finite]]
@@ -570,6 +573,7 @@ class Body(Record):
     seen: Count
     extra: dict[str, Any]
     looks: list[tuple[Name, Name, bool]] = []
+    saved_cells: int | None = None
     screen: ScreenRecord | None = None
     hindsight: dict[str, HindsightRecord] = {}
     calibration: dict[str, CalibrationRecord] = {}

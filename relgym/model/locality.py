@@ -203,7 +203,13 @@ class Neighbourhoods:
         return _Window(objects, objects.index(focus), small, columns)
 
 
-def learn_locally(parts: Parts, near: Neighbourhoods, transition: Transition, seen: int) -> LearnReport:
+def learn_locally(
+    parts: Parts,
+    near: Neighbourhoods,
+    transition: Transition,
+    seen: int,
+    told: ScenePrediction | None = None,
+) -> LearnReport:
     """Take up one transition of a large scene: of the objects that changed, or of one that didn't in its turn."""
     before, after = transition.before, transition.after
     layout, following = before.layout, next_values(before, after)
@@ -212,11 +218,26 @@ def learn_locally(parts: Parts, near: Neighbourhoods, transition: Transition, se
         window = near.window(focus)
         later = Scene(before.schema, window.scene.layout, following[window.columns])
         step = Transition(window.scene, later)
-        report = learn(parts, near.percept(focus), step, only=frozenset({window.place}))
+        said = None if told is None else _told_of(told, window, layout)
+        report = learn(parts, near.percept(focus), step, only=frozenset({window.place}), told=said)
         named = {(layout.names[focus], prop): part for (_, prop), part in report.parts.items()}
         known = {} if whole is None else whole.parts
         whole = LearnReport(known | named, report.work + (0 if whole is None else whole.work))
     return LearnReport({}, 0) if whole is None else whole
+
+
+def _told_of(told: ScenePrediction, window: _Window, layout: SceneLayout) -> ScenePrediction | None:
+    """What was predicted of the object that a small scene is around, in its names; None where others play roles."""
+    names = {layout.names[k]: window.scene.layout.names[n] for n, k in enumerate(window.objects)}
+    own = layout.names[window.objects[window.place]]
+    found = []
+    for one in told.parts:
+        if one.object == own:
+            if not all(role in names for role in one.roles):
+                return None
+            roles = tuple(names[role] for role in one.roles)
+            found.append(replace(one, object=names[own], roles=roles))
+    return ScenePrediction(window.scene, tuple(found))
 
 
 def _learned(

@@ -13,7 +13,7 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
-from relgym.model.chaining import Look, in_order
+from relgym.model.chaining import Inquiry, Look, in_order
 from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Percept, Perception
 from relgym.model.property_model import PropertyModel
@@ -23,6 +23,7 @@ from relgym.model.screening import Screen
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 from relgym.scene.sizes import check_sizes
+from relgym.scheduling.agenda import Agenda
 
 __all__ = ["MOST_TARGETS", "Parts"]
 
@@ -60,6 +61,10 @@ class Parts:
         Laws of motion; None with ``frames="world"``.
     looks
         Targets to be looked at for laws with next values, one in a step.
+    inquiry
+        The look that is being taken.
+    agenda
+        How much may be searched in a step, and what waits for its next piece.
     screen
         Tells gross errors in observations, which aren't learned from.
     """
@@ -84,6 +89,8 @@ class Parts:
         self.tables: dict[str, ExampleTable] = {}
         self.regressions: dict[str, Regression] = {}
         self.looks: list[Look] = []
+        self.inquiry: Inquiry | None = None
+        self.agenda = Agenda(earned=config.cells_per_step, most=config.most_cells, saved=config.saved_cells)
         self.screen = Screen()
         self.laws: Laws | None = None
         if config.frames == "auto":

@@ -14,7 +14,6 @@ from relgym.classification.mode_classifier import ModeClassifier
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.clustering.turn import Turn
 from relgym.config import ModelConfig
 from relgym.model.answers import Answers
 from relgym.model.casting import Casting
@@ -29,6 +28,7 @@ from relgym.model.spread import Spreads, measure
 from relgym.model.stops import Stops, find_stops
 from relgym.scene.objects import Target
 from relgym.scene.schema import SceneSchema
+from relgym.scheduling.agenda import Budget
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
@@ -104,7 +104,7 @@ class PropertyModel(Answers):
         y: float,
         situation: Situation,
         example: Example,
-        turn: Turn | None = None,
+        budget: Budget | None = None,
     ) -> ClusterReport:
         """Take up one example: cluster it, then let the classifiers see where it belongs.
 
@@ -116,11 +116,11 @@ class PropertyModel(Answers):
             The property's next value.
         situation, example
             How the target object is situated, in a single scene.
-        turn
-            Leave for a dear search; default: given.
+        budget
+            What may be spent on searches; default: as much as they take.
         """
         self._compare(situation, example, table.x[row], y)
-        report = self.clusterer.learn_one(table, row, y, turn)
+        report = self.clusterer.learn_one(table, row, y, budget)
         self._unsettled = float((self.clusterer.labels[-RECENT:] == NOISE).mean()) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
@@ -208,10 +208,22 @@ class PropertyModel(Answers):
         exemplars = self.classifier.exemplars.columns["row"]
         exemplars[:] = numbers[exemplars]
 
-    def search(self, table: ExampleTable) -> None:
-        """Make up for a dear search that still waits for its turn, if there is one."""
-        if self.clusterer.due:
-            self.clusterer.approximate_now(table)
+    def go_on(self, table: ExampleTable, budget: Budget) -> None:
+        """Go on with a search for modes that is under way, as far as the budget goes."""
+        if self.clusterer.go_on(table, budget):
+            self.follow(table)
+
+    def approximate(self, table: ExampleTable, budget: Budget) -> None:
+        """Look for an approximation if one is due, as far as the budget goes."""
+        if self.clusterer.due and self.clusterer.approximate_now(table, budget):
+            self.follow(table)
+
+    def search(self, table: ExampleTable, budget: Budget) -> None:
+        """Finish the searches that are under way or due."""
+        changed = False
+        while self.clusterer.searching or self.clusterer.due:
+            changed |= self.clusterer.go_on(table, budget) | self.clusterer.approximate_now(table, budget)
+        if changed:
             self.follow(table)
 
     def refresh(self, budget: int | None) -> int:
@@ -220,11 +232,10 @@ class PropertyModel(Answers):
         spent = self.classifier.refresh(left)
         return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
 
-    def reconsider(self, table: ExampleTable) -> int:
-        """Guess anew where nothing is explained and it is time; returns the work spent."""
-        if not self._guessable or not self.guesses.stale(self.clusterer.seen):
-            return 0
-        return self.guesses.renew(self.clusterer, table, self.scope)
+    def reconsider(self, table: ExampleTable, budget: Budget) -> None:
+        """Guess anew where nothing is explained and it is time, as far as the budget goes."""
+        if self._guessable and self.guesses.stale(self.clusterer.seen):
+            self.guesses.renew(self.clusterer, table, self.scope, budget)
 
     def retarget(self, target: Target, table: ExampleTable) -> None:
         """Be given other next values: modes and classifiers are learned again, from what is remembered."""
@@ -232,6 +243,7 @@ class PropertyModel(Answers):
         self.conditions = Conditions(self.schema, target)
         self.clusterer.retarget(target)
         self.casting = Casting(self._base, self.config.classification)
+        self.guesses.drop()
         self.hindsight = Hindsight()  # what follows is another model's word
         self.calibration.forget()
         self._follow(table)

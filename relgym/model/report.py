@@ -20,6 +20,7 @@ from relgym.model.spread_text import spread_text
 from relgym.model.text import Cell, as_relations, table
 from relgym.reporting.naming import named_text
 from relgym.reporting.parser import parse_rules
+from relgym.reporting.rules import RuleList
 from relgym.scene.objects import ACTION, Scene
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ __all__ = [
     "PairTable",
     "RoleRow",
     "TargetReport",
+    "checked_rules",
     "describe",
     "report",
 ]
@@ -109,7 +111,7 @@ def describe(
     if details or (not model.has_rules and not names and check is None):
         text = str(report(model, digits=digits))
     else:
-        text = _rules_text(model, digits, names, check)
+        text = checked_rules(model, digits, names, check).text(digits)
     if frame is None or model.laws is None or not model.governed:
         return text
     angles = (incline,) if isinstance(incline, (int, float)) else tuple(incline)
@@ -121,16 +123,23 @@ def describe(
     return "\n\n".join([text, *tables])
 
 
-def _rules_text(
-    model: WorldModel, digits: int, names: Mapping[str, str] | None, check: Iterable[Scene] | None
-) -> str:
+def checked_rules(
+    model: WorldModel,
+    digits: int = 7,
+    names: Mapping[str, str] | None = None,
+    check: Iterable[Scene] | None = None,
+) -> RuleList:
+    """A model's rules, with other names of conditions, and with how well the text agrees on some scenes.
+
+    Parameters are those of `describe`, which prints them.
+    """
     rules = model.rules()
     if names:
         rules = rules.renamed({named_text(rules, old): new for old, new in names.items()})
     if check is not None:
         measured, _ = agreement(model, parse_rules(rules.text(digits)), check)
         rules = replace(rules, agreement=measured.agreement)
-    return rules.text(digits)
+    return rules
 
 
 def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
