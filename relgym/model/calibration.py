@@ -55,7 +55,7 @@ LONG: Final = 1024
 """The same where experts are compared: then a lead of 10 bits is one of 1.4 % in root mean square."""
 
 FEW: Final = 32
-"""In a cell of fewer trials what all cells of the outcome say counts."""
+"""In a cell of fewer trials what all cells of the outcome say counts; and fewer hits don't end a record."""
 
 LEAVE: Final = 1.1
 """A law that can be claimed, and read, may leave so much more than regressions and persistence (root mean square)."""
@@ -165,7 +165,8 @@ class _Record:
         )
         self.trials += 1.0
         self.hits += hit
-        ended = before > 0.0 and bits >= EVIDENCE
+        # Hits come in runs where little happens: what was doubted is believed after more of them.
+        ended = before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= FEW)
         if ended:
             self.trials, self.hits = float(abs(self.run)), float(max(self.run, 0))
         if self.trials > MEMORY:

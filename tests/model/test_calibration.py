@@ -77,12 +77,13 @@ def test_a_few_misses_of_a_sure_law_end_its_record(hits: int, misses: int) -> No
     assert known.assess(KEY, values(own=1.0)).probability < 0.2
 
 
-def test_twenty_hits_of_what_was_right_half_the_time_do_so_too() -> None:
+def test_a_run_of_hits_of_what_was_right_half_the_time_do_so_too() -> None:
     known = Calibration()
     for k in range(100):
         seen(known, values(own=1.0), 1.0 + k % 2)
     assert known.assess(KEY, values(own=1.0)).probability == pytest.approx(0.5, abs=0.05)
-    for _ in range(20):
+    for _ in range(FEW):
+        assert known.assess(KEY, values(own=1.0)).probability < 0.7
         seen(known, values(own=1.0), 1.0)
     assert known.assess(KEY, values(own=1.0)).probability > 0.9
 
