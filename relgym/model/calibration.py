@@ -47,12 +47,9 @@ _BY_DEFAULT: Final = (OWN, GUESS, PERSISTENCE)
 EVIDENCE: Final = 10.0
 """Bits by which evidence must lead: it misleads once in 2^10 times."""
 
-MEMORY: Final = 256
-"""Of more trials than this the older ones count half: a share of 99 % is known to 0.9 % from half as many, and what
-still learns gets better."""
-
-LONG: Final = 1024
-"""The same where experts are compared: then a lead of 10 bits is one of 1.4 % in root mean square."""
+MEMORY: Final = 1024
+"""Of more trials than this the older ones count half: a share of 99 % is known to 0.4 % from half as many, and a lead
+of 10 bits is one of 1.4 % in root mean square."""
 
 FEW: Final = 32
 """In a cell of fewer trials what all cells of the outcome say counts; and fewer hits don't end a record."""
@@ -201,7 +198,7 @@ class _Cell:
         base = errors[PERSISTENCE] ** 2
         for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
-                if sums[0] >= LONG:
+                if sums[0] >= MEMORY:
                     sums[:] = [0.5 * s for s in sums]
                 sums[0] += 1.0
                 sums[1] += error * error
@@ -346,7 +343,7 @@ class Calibration:
         within = max(rounding, error * self.change)
         self._slips[0] += 1.0
         self._slips[1] += claimed and errors[audit.speaker] > within
-        if self._slips[0] > LONG:
+        if self._slips[0] > MEMORY:
             self._slips = [0.5 * each for each in self._slips]
         for key in dict.fromkeys((_whole(audit.key), audit.key)):
             if key not in self._cells:
