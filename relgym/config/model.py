@@ -68,12 +68,12 @@ class ModelConfig:
         changes. Default 0.05, range (0, 1]. Raising it claims approximations, too; lowering it claims exact laws alone.
     claim_probability
         How probable it must be, after how such predictions came out, that a prediction is no further off than that,
-        for it to be claimed (`Prediction.ok`). Default 0.95, range (0, 1]. Raising it claims less, and more of that
+        for it to be claimed (`Prediction.ok`). Default 0.9, range (0, 1]. Raising it claims less, and more of that
         is right. It counts only where predictions are looked back at, as wrappers and `WorldModel.fit` do.
     claim_slips
         Where more than this share of a property's latest predictions were claimed and off, only what is at least one
-        minus this probable is claimed. Default 0.005, range (0, 1]: of what is claimed, half a per cent is off in the
-        long run, though some kinds of predictions are less sure than that.
+        minus this probable is claimed. Default 0.0075, range (0, 1]: in the long run less than a per cent is claimed
+        and off, though some kinds of predictions are less sure than that.
     regression_columns
         Regressions on all that a target may depend on are made on at most so many columns, squares and products
         included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.
@@ -92,8 +92,8 @@ class ModelConfig:
     features: tuple[str, ...] = ()
     history: int = 200_000
     claim_error: float = 0.05
-    claim_probability: float = 0.95
-    claim_slips: float = 0.005
+    claim_probability: float = 0.9
+    claim_slips: float = 0.0075
     regression_columns: int = 320
 
     def __post_init__(self) -> None:

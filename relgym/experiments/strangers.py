@@ -2,7 +2,7 @@
 
 ``python -m relgym.experiments.strangers --out strangers.json`` learns from 2,000 random steps of each env with the
 default configuration, and predicts fresh episodes. Each (env, seed) that is done is in the file and isn't done again.
-Envs ending in ``-v5`` need the extra ``mujoco`` (``pip install mujoco``). What is measured, per property:
+Envs ending in ``-v5`` need the extra ``bench-envs``. What is measured, per property:
 
 - *claimed*, and *claimed and off*: by more than 5 % of the change (the median of those fresh steps that change it);
   *own*: by more than 5 % of each step's own change, however small;

@@ -16,7 +16,7 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.mode import NOISE
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.model.calibration import LATEST, OWN, Calibration, Judgement, Key
+from relgym.model.calibration import LATEST, OWN, Assessment, Calibration, Key
 from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions
 from relgym.model.functions import Verdict
@@ -36,9 +36,6 @@ _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
     for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
 )
 
-
-FEW_LEFT = 20
-"""A target is explained if less than one example in so many isn't."""
 
 _NOTHING = Calibration()
 
@@ -91,6 +88,7 @@ class Answers(StandIns):
         self.hindsight = Hindsight()
         self.calibration = Calibration(config.claim_probability)
         self.latest = NOISE
+        self._unsettled = True
         self.leaned_on = False
 
     def bounds(self, mode: int) -> bool:
@@ -110,17 +108,17 @@ class Answers(StandIns):
         """
         return len(self.classifier.modes) > 1 and self.hindsight.undecided
 
-    def judge(self, key: Key, values: Sequence[float]) -> Judgement:
+    def assess(self, key: Key, values: Sequence[float]) -> Assessment:
         """Who gives the value of a prediction, and how right it will be."""
-        return self._record.judge(key, values)
+        return self._record.assess(key, values)
 
-    def judge_many(
+    def assess_many(
         self, key: Key, values: NDArray[np.float64]
-    ) -> Iterator[tuple[NDArray[np.intp], Judgement]]:
-        """`judge` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
-        return self._record.judge_many(key, values)
+    ) -> Iterator[tuple[NDArray[np.intp], Assessment]]:
+        """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
+        return self._record.assess_many(key, values)
 
-    def claims(self, told: Judgement) -> bool:
+    def claims(self, told: Assessment) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
         if told.speaker not in (OWN, LATEST):
             return False
@@ -157,7 +155,7 @@ class Answers(StandIns):
     @property
     def rough(self) -> bool:
         """Whether so much is unexplained, or explained only roughly, that regressions may know better."""
-        return self._guessable or FEW_LEFT * self.clusterer.noise_examples > self.clusterer.seen
+        return self._guessable or self._unsettled
 
     @property
     def _lost(self) -> bool:

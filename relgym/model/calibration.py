@@ -30,7 +30,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["EXPERTS", "Audit", "Calibration", "Judgement", "Key", "key_of", "keys_of"]
+__all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of"]
 
 EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
 """Who may give a value: the winner of the vote (or the law); the guess; both regressions; the mode that held last,
@@ -48,16 +48,20 @@ EVIDENCE: Final = 10.0
 """Bits by which evidence must lead: it misleads once in 2^10 times."""
 
 MEMORY: Final = 1024
-"""Of more trials than this the older ones count half: a share of 99 % is known to 0.4 % from half as many."""
+"""Of more trials than this the older ones count half: a share of 99 % is known to 0.4 % from half as many, and a lead
+of 10 bits is one of 1.4 % in root mean square."""
 
 FEW: Final = 32
-"""In a cell of fewer trials what all cells of the outcome say counts."""
+"""In a cell of fewer trials what all cells of the outcome say counts; and fewer hits don't end a record."""
 
 LEAVE: Final = 1.1
 """A law that can be claimed, and read, may leave so much more than regressions and persistence (root mean square)."""
 
 PRIOR: Final = 1.0
 """Trials that the prior of a share counts for, as Jeffreys' does."""
+
+YOUNG: Final = 256.0
+"""The share of slips is taken of at least so many predictions: one or two early ones say little."""
 
 COVERED: Final = 0.95
 """Share of what comes that intervals are to hold."""
@@ -88,7 +92,7 @@ class Audit(NamedTuple):
     speaker: int = 0
 
 
-class Judgement(NamedTuple):
+class Assessment(NamedTuple):
     """What is made of a prediction.
 
     Attributes
@@ -111,7 +115,9 @@ class Judgement(NamedTuple):
 
 def key_of(outcome: int, winner: int, margin: float) -> Key:
     """The cell of a prediction."""
-    return Key(outcome, winner, int(_bins(np.array([margin]))[0]))
+    if margin == math.inf:
+        return Key(outcome, winner, 7)
+    return Key(outcome, winner, min(max(math.frexp(margin)[1] + 2, 1), 6) if margin > 0.0 else 0)
 
 
 def keys_of(
@@ -140,23 +146,29 @@ class _Record:
     run: int = 0  # of hits (> 0) or misses (< 0), up to now
     errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
 
-    def count(self, error: float, within: float) -> None:
-        """Take in an error; it is a hit if it is no larger than so much."""
+    def count(self, error: float, within: float) -> bool:
+        """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
         self.errors = _counted(self.errors, _place(error))
         hit = error <= within
         if hit != (self.run > 0):
             self.run = 0
         self.run += 1 if hit else -1
         # The run under way isn't part of the record that it is held against.
-        before = self.trials - (abs(self.run) - 1)
-        share = (self.hits - max(self.run - 1, 0) + 0.5) / (before + 1.0) if before > 0.0 else 0.5
-        unlikely = -abs(self.run) * math.log2(min(max(share if hit else 1.0 - share, 1e-300), 1.0))
+        before = max(self.trials - (abs(self.run) - 1), 0.0)
+        share = (max(self.hits - max(self.run - 1, 0), 0.0) + 0.5) / (before + 1.0)
+        # It may have begun at any of the trials, which takes the logarithm of their number to say.
+        bits = -abs(self.run) * math.log2(share if hit else max(1.0 - share, 1e-300)) - math.log2(
+            before + 1.0
+        )
         self.trials += 1.0
         self.hits += hit
-        if before > 0.0 and unlikely >= EVIDENCE:
+        # Hits come in runs where little happens: what was doubted is believed after more of them.
+        ended = before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= FEW)
+        if ended:
             self.trials, self.hits = float(abs(self.run)), float(max(self.run, 0))
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+        return ended
 
     def share(self, prior: float) -> float:
         """Posterior mean of the share of hits."""
@@ -181,7 +193,8 @@ class _Cell:
         """Take in what each expert was off by; the best one speaks, if it leads by enough."""
         for expert in sorted({OWN, self.speaker}):
             if errors[expert] == errors[expert]:
-                self.records.setdefault(expert, _Record()).count(errors[expert], within)
+                if self.records.setdefault(expert, _Record()).count(errors[expert], within):
+                    self.squares[expert] = [0.0, 0.0, 0.0]
         base = errors[PERSISTENCE] ** 2
         for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
@@ -190,7 +203,7 @@ class _Cell:
                 sums[0] += 1.0
                 sums[1] += error * error
                 sums[2] += base
-        best = min(range(len(EXPERTS)), key=self.left)
+        best = min((k for k, error in enumerate(errors) if error == error), key=self.left)
         if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
@@ -208,11 +221,17 @@ class _Cell:
         ratio = self.left(other) / self.left(expert)
         return 0.5 * trials * math.log2(min(max(ratio, 1e-300), 1e300))
 
-    def preferred(self, probability: float) -> int:
-        """Who speaks: the winner where that can be claimed and leaves hardly more than what anybody would try."""
+    def preferred(self, able: Collection[int], probability: float) -> int:
+        """Who of those who have a value speaks.
+
+        The winner where that can be claimed and leaves hardly more than what anybody would try; else who codes best.
+        """
         own = self.records.get(OWN)
-        near = self.left(OWN) <= LEAVE * LEAVE * min(map(self.left, _KNOWN))
-        return OWN if own is not None and near and own.share(0.5) >= probability else self.speaker
+        if OWN in able and own is not None and own.share(0.5) >= probability:
+            least = min(self.left(expert) for expert in _KNOWN if expert in able)
+            if self.left(OWN) <= LEAVE * LEAVE * least:
+                return OWN
+        return self.speaker if self.speaker in able else min(able, key=self.left)
 
 
 class Calibration:
@@ -230,16 +249,16 @@ class Calibration:
         Predictions that somebody looked back at.
     """
 
-    def __init__(self, probability: float = 0.95) -> None:
+    def __init__(self, probability: float = 0.9) -> None:
         self.probability = probability
         self.trials = 0
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
-        self._judged: dict[Key, tuple[tuple[int, ...], Judgement]] = {}
+        self._assessed: dict[Key, tuple[tuple[int, ...], Assessment]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_judged": {}}
+        return self.__dict__ | {"_assessed": {}}
 
     @property
     def change(self) -> float:
@@ -252,35 +271,33 @@ class Calibration:
     @property
     def slips(self) -> float:
         """Share of the latest predictions that were claimed and off; of few, as if more had been right."""
-        return self._slips[1] / max(self._slips[0], 100.0)
+        return self._slips[1] / max(self._slips[0], YOUNG)
 
     # ------------------------------------------------------------------ what is made of a prediction
-    def judge(self, key: Key, values: Sequence[float]) -> Judgement:
+    def assess(self, key: Key, values: Sequence[float]) -> Assessment:
         """Who gives the value of a prediction, and how far that can be relied on."""
         able = tuple(k for k, value in enumerate(values) if math.isfinite(value))
-        known = self._judged.get(key)
+        known = self._assessed.get(key)
         if known is None or known[0] != able:
-            known = self._judged[key] = (able, self._judge(key, able))
+            known = self._assessed[key] = (able, self._assess(key, able))
         return known[1]
 
-    def judge_many(
+    def assess_many(
         self, key: Key, values: NDArray[np.float64]
-    ) -> Iterator[tuple[NDArray[np.intp], Judgement]]:
-        """`judge` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
+    ) -> Iterator[tuple[NDArray[np.intp], Assessment]]:
+        """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
         able, which = np.unique(np.isfinite(values), axis=0, return_inverse=True)
         for number, row in enumerate(able):
             rows = np.flatnonzero(which.reshape(-1) == number)
-            yield rows, self.judge(key, np.where(row, 0.0, np.nan).tolist())
+            yield rows, self.assess(key, np.where(row, 0.0, np.nan).tolist())
 
-    def _judge(self, key: Key, able: tuple[int, ...]) -> Judgement:
+    def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
         default = next(k for k in _BY_DEFAULT if k in able)
         whole, cell = self._cells.get(_whole(key)), self._cells.get(key)
         if whole is None:
-            return Judgement(default, math.nan if not self.trials else 0.5, math.nan, math.nan)
+            return Assessment(default, math.nan if not self.trials else 0.5, math.nan, math.nan)
         trusted = cell if cell is not None and cell.squares[PERSISTENCE][0] >= FEW else whole
-        speaker = trusted.preferred(self.probability)
-        if speaker not in able:
-            return Judgement(default, 0.0, math.nan, math.nan)
+        speaker = trusted.preferred(able, self.probability)
         share = 0.5
         for each in (whole, cell):
             if each is not None and speaker in each.records:
@@ -289,7 +306,7 @@ class Calibration:
         few = record is None or sum(record.errors.values()) < ENOUGH
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
         trials, own, _ = trusted.squares[speaker]
-        return Judgement(speaker, share, half, math.sqrt(own / trials) if trials else math.nan)
+        return Assessment(speaker, share, half, math.sqrt(own / trials) if trials else math.nan)
 
     # ------------------------------------------------------------------ how it came out
     def look_back(
@@ -323,22 +340,21 @@ class Calibration:
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
         self.trials += 1
         self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
-        spoke = self.judge(audit.key, audit.values).speaker
         within = max(rounding, error * self.change)
         self._slips[0] += 1.0
-        self._slips[1] += claimed and errors[spoke] > within
+        self._slips[1] += claimed and errors[audit.speaker] > within
         if self._slips[0] > MEMORY:
             self._slips = [0.5 * each for each in self._slips]
         for key in dict.fromkeys((_whole(audit.key), audit.key)):
             if key not in self._cells:
-                self._cells[key] = _Cell.new(spoke)
+                self._cells[key] = _Cell.new(audit.speaker)
             self._cells[key].count(errors, within)
-        self._judged.clear()
+        self._assessed.clear()
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
         self._cells = {k: c for k, c in self._cells.items() if k.winner <= 0 or k.winner in modes}
-        self._judged.clear()
+        self._assessed.clear()
 
     def doubts(self, outcome: int, probability: float) -> bool:
         """Whether what won the vote was right less often than that, or the mode that held last speaks instead."""
@@ -347,7 +363,7 @@ class Calibration:
 
     def forget(self) -> None:
         """What follows is another model's word: only what mostly changes stays."""
-        self._cells, self._judged, self.trials = {}, {}, 0
+        self._cells, self._assessed, self.trials = {}, {}, 0
 
     def share(self, outcome: int) -> float:
         """Share of an outcome's predictions that were hits lately; NaN where there were none."""
@@ -355,11 +371,11 @@ class Calibration:
         own = None if whole is None else whole.records.get(OWN)
         return math.nan if own is None or not own.trials else own.hits / own.trials
 
-    def kinds(self, outcome: int) -> Iterator[tuple[float, Judgement]]:
+    def kinds(self, outcome: int) -> Iterator[tuple[float, Assessment]]:
         """Trials of each kind of predictions of an outcome, and what is made of such a prediction."""
         for key, cell in sorted(self._cells.items()):
             if key.outcome == outcome and key != _whole(key):
-                yield cell.squares[PERSISTENCE][0], self._judge(key, tuple(range(len(EXPERTS))))
+                yield cell.squares[PERSISTENCE][0], self._assess(key, tuple(range(len(EXPERTS))))
 
     def united(self, other: Calibration) -> Calibration:
         """What two models know together: cell by cell, the record of who looked back more often."""

@@ -386,6 +386,7 @@ class PropertyRecord(Record):
     limits: LimitsRecord = field(default_factory=LimitsRecord)
     stops: StopsRecord = field(default_factory=StopsRecord)
     latest: ModeOrNoise = 0
+    unsettled: bool = False
 
 
 class TargetModel(Record):

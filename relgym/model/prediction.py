@@ -25,7 +25,9 @@ class Outcome(enum.Enum):
     and so it is where an approximation isn't good (`relgym.model.scope`); or, where modes cover the examples but
     nothing tells which of them holds when, it is what the vote's winner says; outside experience it is what the mode
     says that would win the vote; what depends on such a fallback value follows from it; else the property keeps its
-    value.
+    value. So it is for a model that nobody told how its predictions came out. Of one that was told, the value is that
+    of whoever codes such predictions best, and a mode's or a law's prediction that isn't right often enough for a claim
+    is `UNSURE` (`relgym.model.calibration`).
     """
 
     PREDICTED = "predicted by a mode"

@@ -39,6 +39,10 @@ HOPELESS, DOUBTFUL = 200, 500
 """Without a mode after so many examples there is no law; with most of so many recent ones unexplained, hardly one."""
 
 
+RECENT, LEFT = 200, 0.05
+"""Where a larger share of so many recent examples is unexplained, regressions may know better."""
+
+
 class PropertyModel(Answers):
     """Learns and predicts one target.
 
@@ -117,6 +121,7 @@ class PropertyModel(Answers):
         """
         self._compare(situation, example, table.x[row], y)
         report = self.clusterer.learn_one(table, row, y, budget)
+        self._unsettled = float((self.clusterer.labels[-RECENT:] == NOISE).mean()) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self._unexplained = self._assess()
@@ -293,6 +298,7 @@ class PropertyModel(Answers):
             "spreads": self.spreads.to_json(),
             "scope": self.scope.to_json(),
             "latest": self.latest,
+            "unsettled": self._unsettled,
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
             "limits": self.limits.to_json(),
@@ -311,6 +317,7 @@ class PropertyModel(Answers):
         self.spreads = Spreads.from_json(data["spreads"])
         self.scope = Scope.from_json(data.get("scope", {}))
         self.latest = int(data.get("latest", NOISE))
+        self._unsettled = bool(data.get("unsettled", False))
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))

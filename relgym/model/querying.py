@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -64,12 +65,12 @@ def _settled(
     one: Prediction,
 ) -> Prediction:
     """A prediction with the value of who codes such ones best, and how right that will be."""
-    model, own = parts.models[target], np.array([one.value])
-    values = tuple(_experts(parts, target, percept, index, following[None], own)[0].tolist())
+    model = parts.models[target]
+    values = _experts_one(parts, target, percept, index, following, one.value)
     winner = -one.mode if parts.governs(target) else one.mode
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
-    told = model.judge(key, values)
+    told = model.assess(key, values)
     if told.speaker == LATEST and one.mode:
         one = replace(one, mode=model.latest, roles=one.roles[:1])
     spread = one.spread
@@ -87,6 +88,34 @@ def _settled(
         interval=told.interval,
         audit=Audit(key, values, told.speaker),
     )
+
+
+def _experts_one(
+    parts: Parts,
+    target: Target,
+    percept: Percept,
+    index: int,
+    following: NDArray[np.float64],
+    own: float,
+) -> tuple[float, ...]:
+    """`_experts` of a single scene."""
+    model = parts.models[target]
+    found = [math.nan] * len(EXPERTS)
+    present = float(following[percept.layout.column(index, target.property)])
+    found[PERSISTENCE] = present
+    if math.isfinite(own):
+        found[OWN] = own
+    if model.guesses_something:
+        guessed = model.guessed(percept, index, following[None])
+        found[GUESS] = math.nan if guessed is None else float(guessed[0])
+    if parts.governs(target):
+        return tuple(found)
+    latest = model.latest_values(percept, index, following[None])
+    found[LATEST] = math.nan if latest is None else float(latest[0])
+    changes = parts.regressed(percept, index, target.property) if model.rough else None
+    if changes is not None:
+        found[LINEAR : LINEAR + KINDS] = [present + float(change) for change in changes[0]]
+    return tuple(value if math.isfinite(value) else math.nan for value in found)
 
 
 def _outcome(one: Prediction, *, claimed: bool, known: bool) -> Outcome:
@@ -110,16 +139,17 @@ def _experts(
     found = np.full((len(own), len(EXPERTS)), np.nan)
     present = following[:, percept.layout.column(index, target.property)]
     found[:, OWN], found[:, PERSISTENCE] = np.where(np.isfinite(own), own, np.nan), present
-    guessed = model.guessed(percept, index, following)
+    guessed = model.guessed(percept, index, following) if model.guesses_something else None
     if guessed is not None:
         found[:, GUESS] = np.where(np.isfinite(guessed), guessed, np.nan)
     latest = None if parts.governs(target) else model.latest_values(percept, index, following)
     if latest is not None:
-        found[:, LATEST] = latest
+        found[:, LATEST] = np.where(np.isfinite(latest), latest, np.nan)
     if model.rough and not parts.governs(target):
         changes = parts.regressed(percept, index, target.property)
         if changes is not None:
-            found[:, LINEAR : LINEAR + KINDS] = present[:, None] + changes
+            told = present[:, None] + changes
+            found[:, LINEAR : LINEAR + KINDS] = np.where(np.isfinite(told), told, np.nan)
     return found
 
 
@@ -180,7 +210,7 @@ def _settled_many(
     winners = -verdict.modes if parts.governs(target) else verdict.modes
     outcomes = np.where(verdict.modes != 0, np.int8(_PREDICTED), verdict.outcomes)
     for key, part in keys_of(outcomes, winners, verdict.margins):
-        for rows, told in model.judge_many(key, said[part]):
+        for rows, told in model.assess_many(key, said[part]):
             some = part[rows]
             values[some] = said[some, told.speaker]
             probability[some], interval[some] = told.probability, told.interval

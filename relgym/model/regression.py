@@ -1,4 +1,4 @@
-"""What least squares on a type's own numbers and the action say of all its targets: a rival of modes and guesses.
+"""What least squares on a type's own numbers and the action say of its targets: a baseline beside modes and guesses.
 
 Regression of the change on (x, u, 1), and on squares and products of these where they are few, is what anybody would
 try first. So it is tried beside everything else, and where it codes what comes in fewer bits it gives the value

@@ -68,6 +68,11 @@ class StandIns(ModeFunctions):
         """The guess used where approximations aren't, if it is better than the best guess of all."""
         return self.guesses.beyond if self._guessable and self.scope.tree is not None else None
 
+    @property
+    def guesses_something(self) -> bool:
+        """Whether there is any guess that stands in."""
+        return self.guess is not None or self.guess_beyond is not None
+
     def guess_at(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Guess | None:
         """The guess for one object of a single scene; arguments as of `predict_one`."""
         if self.guess_beyond is None:

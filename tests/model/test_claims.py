@@ -42,7 +42,7 @@ def byte(rng: np.random.Generator) -> Numbers:
             value = (192.0 if value == 0.0 else 0.0) if count < 800 else float(rng.integers(1, 191))
 
 
-def redrawn(rng: np.random.Generator) -> Numbers:
+def resampled(rng: np.random.Generator) -> Numbers:
     """A number drawn anew once in a hundred steps."""
     value = rng.normal()
     while True:
@@ -111,7 +111,7 @@ def squares(said: list[ScenePrediction], steps: list[Transition], prop: str) -> 
     return float(np.square(told - came).sum()), float(np.square(now - came).sum())
 
 
-@pytest.mark.parametrize("world", [pixels, byte, redrawn, wrapped, clock])
+@pytest.mark.parametrize("world", [pixels, byte, resampled, wrapped, clock])
 def test_what_is_claimed_is_right(world: Callable[[np.random.Generator], Numbers]) -> None:
     props = ("x", "v") if world is pixels else ("x",)
     schema = schema_of(props)

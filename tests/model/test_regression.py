@@ -1,0 +1,93 @@
+"""Regressions on everything: which columns, how far they go, and what of them is kept."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+from points import schema_of, transitions
+
+from relgym.model.fitting import compare_and_learn
+from relgym.model.regression import FIRST, Regression
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Transition
+
+SCHEMA = schema_of(("x", "y"), ("a",))
+SIGNATURE = WorldModel(SCHEMA)._parts.signature_of(("self", "action"))
+
+
+def taught(n: int, most: int = 320, seed: int = 0) -> Regression:
+    """Of a change by a product, and of one by a sum."""
+    rng = np.random.default_rng(seed)
+    found = Regression(most)
+    for row in rng.normal(size=(n, len(SIGNATURE.columns))):
+        x, y, a = (row[SIGNATURE.column(*key)] for key in ((0, "x"), (0, "y"), (1, "a")))
+        found.learn_one(SIGNATURE, row, {"x": x * a, "y": y + 2.0 * a})
+    return found
+
+
+def test_sums_are_linear_and_products_are_not() -> None:
+    found = taught(400)
+    rows = np.random.default_rng(9).normal(size=(50, len(SIGNATURE.columns)))
+    x, y, a = (rows[:, SIGNATURE.column(*key)] for key in ((0, "x"), (0, "y"), (1, "a")))
+    said = found.values(SIGNATURE, rows)
+    assert said is not None
+    assert found.targets == ["x", "y"]
+    np.testing.assert_allclose(said[:, :, 1], np.stack([y + 2.0 * a] * 2, axis=1), atol=0.05)
+    assert np.abs(said[:, 1, 0] - x * a).max() < 0.1
+    assert np.abs(said[:, 0, 0] - x * a).max() > 0.5
+
+
+def test_nothing_is_said_before_there_are_enough_examples_and_of_too_many_columns() -> None:
+    rows = np.zeros((1, len(SIGNATURE.columns)))
+    assert taught(FIRST - 1).values(SIGNATURE, rows) is None
+    assert taught(FIRST).values(SIGNATURE, rows) is not None
+    assert taught(FIRST, most=2).values(SIGNATURE, rows) is None
+    linear = taught(FIRST, most=3).values(SIGNATURE, rows)
+    assert linear is not None
+    assert np.isnan(linear[0, 1]).all()
+
+
+def test_changes_never_go_far_beyond_those_that_were_seen() -> None:
+    found = taught(200)
+    said = found.values(SIGNATURE, np.full((1, len(SIGNATURE.columns)), 1e6))
+    assert said is not None
+    assert np.nanmax(np.abs(said)) < 20.0
+
+
+def test_what_was_saved_says_and_learns_the_same() -> None:
+    for n in (10, 150):
+        found, again = taught(n), Regression(320)
+        data = json.loads(json.dumps(found.to_json(history=True)))
+        again.restore(data, found.to_arrays())
+        more = np.random.default_rng(5).normal(size=(80, len(SIGNATURE.columns)))
+        for row in more:
+            for each in (found, again):
+                each.learn_one(SIGNATURE, row, {"x": row[0], "y": row[1]})
+        one, other = found.values(SIGNATURE, more), again.values(SIGNATURE, more)
+        assert one is not None
+        assert other is not None
+        assert one.tobytes() == other.tobytes()
+
+
+def test_what_no_law_explains_is_predicted_by_them_and_not_claimed() -> None:
+    def step(s: np.ndarray, u: np.ndarray) -> list[float]:
+        return [float(np.tanh(s[0] * u[0]) + 0.3 * s[1]), float(s[1])]
+
+    rng = np.random.default_rng(3)
+
+    def some(n: int) -> list[Transition]:
+        return transitions(SCHEMA, step, rng.normal(size=(n, 2)), rng.normal(size=(n, 1)))
+
+    model = WorldModel(SCHEMA)
+    for transition in some(500):
+        compare_and_learn(model, transition, model.predict_one(transition.before))
+    fresh = some(100)
+    parts = [model.predict_one(t.before)["self", "x"] for t in fresh]
+    came = np.array([t.after["self"]["x"] for t in fresh])
+    now = np.array([t.before["self"]["x"] for t in fresh])
+    error = np.sqrt(np.square([p.value for p in parts] - came).mean())
+    assert not any(p.ok for p in parts)
+    assert error < 0.5 * np.sqrt(np.square(now - came).mean())
+    inside = np.mean([abs(p.value - y) <= p.interval for p, y in zip(parts, came, strict=True)])
+    assert inside > 0.85
