@@ -21,7 +21,7 @@ Rows = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class RoleRule:
-    """What must hold of an object B that plays a role beside the target A; no clauses: any object of the type does."""
+    """What must hold of an object B bound to a role beside the target A; no clauses: any object of the type does."""
 
     role: Role
     clauses: tuple[Clause, ...]
