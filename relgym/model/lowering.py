@@ -68,6 +68,7 @@ class _Lowering:
         self.nan, self.zero, self.one = (2 * layout.width + k for k in range(3))
         self.keys: dict[tuple[str, str], int] = {}
         self.everything = False
+        self.wanted: set[int] = set()
         if layout.bodies:
             self._check()
         self.unary = {
@@ -142,6 +143,7 @@ class _Lowering:
             APPROACH_EPS,
             parts.schema.precision,
             tuple(extractor.names),
+            frozenset(self.wanted),
             tuple(extractor.features),
             others,
             parts.schema.offsets,
@@ -413,6 +415,7 @@ class _Lowering:
         if classifier is None:
             return None
         self.everything = True
+        self.wanted |= set(self.relation_numbers.values())  # they say in which order bodies are looked at
         descriptions = []
         for d in classifier.descriptions:
             clauses: tuple[tuple[ir.Clause, float], ...] = ()
@@ -457,6 +460,7 @@ class _Lowering:
                 for context, relations, unary in known.used
             )
             self.everything |= body >= 0 and any(context == "all" for context, _, _ in known.used)
+            self.wanted |= {r for _, relations, _ in known.used for r in relations}
             experience = ir.Experience(used, tuple(sorted(int(s) for s in known.seen)))
         by_tie = tuple(classifier._voting._by_tie(classifier.counts))
         return ir.Vote(contests, by_tie, classifier._voting.runoff, experience)
@@ -528,6 +532,7 @@ class _Lowering:
             elif literal.relation in self.relation_numbers:
                 first, second = args
                 number = self.relation_numbers[literal.relation]
+                self.wanted.add(number)
                 literals.append(ir.Related(number, first, second, literal.negated))
             else:
                 objects = 0 if bodiless else self.unary[literal.relation]

@@ -41,6 +41,7 @@ from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.rules import doubted, rule_list
+from relgym.model.running import Programs
 from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
 from relgym.model.storage import read_model, write_model
@@ -106,6 +107,7 @@ class WorldModel:
 
         self._neighbourhoods: tuple[Scene, Neighbourhoods] | None = None
         self._journal = Journal()
+        self._programs = Programs()
         self._damaged = False
 
     def __getstate__(self) -> dict[str, Any]:
@@ -116,6 +118,7 @@ class WorldModel:
             "_neighbourhoods": None,
             "_rules": None,
             "_journal": Journal(),
+            "_programs": Programs(),
         }
 
     @property
@@ -130,6 +133,7 @@ class WorldModel:
         if self._damaged:
             self._roll_back()
         mark = self._journal.prepare(self._learned)
+        self._programs.changed()
         try:
             yield
             self._journal.add(name, arguments, numbers)
@@ -147,6 +151,7 @@ class WorldModel:
 
     def _roll_back(self) -> None:
         """Be what it was after the last step that was made as a whole."""
+        self._programs.changed()
         whole: WorldModel = self._journal.replayed(lambda model, name, given: getattr(model, name)(*given))
         # All at once, as far as interrupts go.
         self.__dict__.update(
@@ -438,6 +443,7 @@ class WorldModel:
         merge(whole, other._parts, follow_laws=other.seen > self.seen)
         seen = self.seen + other.seen
         finish(whole)
+        self._programs.changed()
         self.__dict__.update(_state=whole, seen=seen, _percept=None, _neighbourhoods=None, _journal=Journal())
 
     def untaught(self) -> WorldModel:
@@ -489,12 +495,32 @@ class WorldModel:
         ObservationError
             NaN or infinity somewhere, or another schema.
         """
+        if (found := self._run_one(scene)) is not None:
+            return found
         self._parts.check(scene)
         check_size(self._parts, scene.layout)
         with self._calm(scene.vector):
             if large(scene.layout):
                 return predict_locally(self._parts, self._near(scene), scene)
             return predict(self._parts, self._perceive(scene), scene)
+
+    def _run_one(self, scene: Scene) -> ScenePrediction | None:
+        """What the compiled program says of a scene; None where there is none, or the scene can't be."""
+        parts = self._parts
+        if not parts.admits(scene) or large(scene.layout):
+            return None
+        runner = self._programs.of(parts, scene.layout, 1)
+        return None if runner is None else runner.one(scene)
+
+    def _run_many(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> BatchPrediction | None:
+        """The same of n scenes; None too for what isn't an array of such."""
+        parts = self._parts
+        if not parts.knows(layout) or large(layout) or not isinstance(vectors, np.ndarray):
+            return None
+        if vectors.ndim != 2 or vectors.shape[1] != layout.width or vectors.dtype != np.float64:
+            return None
+        runner = self._programs.of(parts, layout, len(vectors))
+        return None if runner is None else runner.many(np.ascontiguousarray(vectors))
 
     def _near(self, scene: Scene) -> Neighbourhoods:
         """A large scene, taken apart; the last one is remembered."""
@@ -518,6 +544,8 @@ class WorldModel:
         vectors
             State vectors, shape ``(n, layout.width)``.
         """
+        if (found := self._run_many(layout, vectors)) is not None:
+            return found
         vectors = self._parts.checked_batch(layout, vectors)
         check_size(self._parts, layout)
         with self._calm(vectors):

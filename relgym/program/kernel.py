@@ -25,7 +25,9 @@ from relgym.program.tape import (
     AT_KINEMATICS,
     AT_LAWS,
     AT_MOVERS,
+    AT_NEXTS,
     AT_PAIRS,
+    AT_READS,
     BODIES,
     BODY,
     DIMENSIONS,
@@ -36,13 +38,18 @@ from relgym.program.tape import (
     KINEMATICS,
     LAWS,
     MOVERS,
+    NEXTS,
     OFFSETS,
     OTHERS,
     PAIRS,
     PART,
     PARTING,
     PRECISION,
+    READS,
     RELATIONS,
+    REMEMBERED,
+    REMEMBERED_MODES,
+    REMEMBERED_ROLES,
     SLACK,
     TOUCH,
     TURN,
@@ -206,8 +213,13 @@ def place(code, numbers, s, k):
         a, b = numbers[n + 2 * v] * width, numbers[n + 2 * v + 1] * height
         along = (numbers[n + 2 * w] - numbers[n + 2 * v]) * width
         up = (numbers[n + 2 * w + 1] - numbers[n + 2 * v + 1]) * height
-        length = math.sqrt(along * along + up * up)
-        across, down = up / length, -along / length
+        if up == 0.0:  # what the root and the quotients would be, to the last bit
+            length, across, down = abs(along), 0.0, -1.0 if along > 0.0 else 1.0
+        elif along == 0.0:
+            length, across, down = abs(up), 1.0 if up > 0.0 else -1.0, 0.0
+        else:
+            length = math.sqrt(along * along + up * up)
+            across, down = up / length, -along / length
         s.edge[0, k, v] = cos * a + -sin * b
         s.edge[1, k, v] = sin * a + cos * b
         s.edge[2, k, v] = cos * across + -sin * down
@@ -671,6 +683,24 @@ def move(code, numbers, s):
 
 # ---------------------------------------------------------------------------------------------- what a body sees
 @compiled
+def nearest_to(code, numbers, s, t):
+    """The body nearest to t, of several the first one; t itself where there is no other."""
+    first, gap = t, math.inf
+    for k in range(code[BODIES]):
+        if k != t and apart(code, s, t, k) < gap:
+            first, gap = k, apart(code, s, t, k)
+    if first == t:
+        return t
+    best, least = first, measure(code, numbers, s, min(t, first), max(t, first))
+    for k in range(code[BODIES]):
+        if k != t and k != first and not apart(code, s, t, k) - CLEAR > least:
+            distance = measure(code, numbers, s, min(t, k), max(t, k))
+            if distance < least or (distance == least and k < best):
+                best, least = k, distance
+    return best
+
+
+@compiled
 def surroundings(code, numbers, s, t):
     """Contexts and pair features of body t (`relgym.scene.surroundings`)."""
     if s.masks[3] == t:
@@ -686,16 +716,12 @@ def surroundings(code, numbers, s, t):
     for k in range(bodies):
         told = s.told[k]
         if k == t:
-            for f in range(facts + others):
-                told[f] = math.nan
             continue
         i, j = (t, k) if t < k else (k, t)
         near = touch(code, numbers, s, t, k)
-        for f in range(facts):
-            told[f] = math.nan
-        for f in range(others):
-            told[facts + f] = s.x[code[at_others + k * others + f]]
         if near or offsets:
+            for f in range(facts):
+                told[f] = math.nan
             measure(code, numbers, s, i, j)
             sign = 1.0 if t < k else -1.0
             nx, ny, nz = s.gap[1, i, j] * sign, s.gap[2, i, j] * sign, 0.0
@@ -726,31 +752,30 @@ def surroundings(code, numbers, s, t):
                     told[dims + 3 + d] = s.body[t, BX + d] - s.body[k, BX + d]
     close = touched
     if touched == 0:
-        best, least = -1, math.inf
-        for k in range(bodies):
-            if k != t and not apart(code, s, t, k) - CLEAR > least:
-                i, j = (t, k) if t < k else (k, t)
-                distance = measure(code, numbers, s, i, j)
-                if distance < least:
-                    best, least = k, distance
-        if best >= 0:
-            close = one << best
+        close = one << nearest_to(code, numbers, s, t)
     close |= one << t
     s.masks[1] = close
     s.masks[2] = (one << bodies) - one
-    if not code[PARTING]:
-        s.masks[0] = close
-        return
-    kept = close & ~leaving
-    if kept != one << t:
-        s.masks[1] = kept
-    struck = one << t
+    s.masks[0] = close
+    if code[PARTING]:
+        kept = close & ~leaving
+        if kept != one << t:
+            s.masks[1] = kept
+        struck = one << t
+        for k in range(bodies):
+            if touched & ~leaving & (one << k):
+                i, j = (t, k) if t < k else (k, t)
+                if s.told[k, dims + 1] <= fastest + limit(numbers, s, i, j, PART, SPEED):
+                    struck |= one << k
+        s.masks[0] = struck
+    asked = s.masks[2] if code[EVERYTHING] else s.masks[0] | s.masks[1]
     for k in range(bodies):
-        if touched & ~leaving & (one << k):
-            i, j = (t, k) if t < k else (k, t)
-            if s.told[k, dims + 1] <= fastest + limit(numbers, s, i, j, PART, SPEED):
-                struck |= one << k
-    s.masks[0] = struck
+        if asked & (one << k):
+            if not (touched & (one << k) or (offsets and k != t)):
+                for f in range(facts):
+                    s.told[k, f] = math.nan
+            for f in range(others):
+                s.told[k, facts + f] = math.nan if k == t else s.x[code[at_others + k * others + f]]
 
 
 @compiled
@@ -770,72 +795,85 @@ def closing(code, numbers, s, a, b):
 
 
 @compiled
-def beside(s, a, b, axis):
-    """Whether body a lies on the low side of b along an axis."""
-    low_b, high_a = s.body[b, LOW_X + axis], s.body[a, HIGH_X + axis]
-    wide_a = high_a - s.body[a, LOW_X + axis]
-    wide_b = s.body[b, HIGH_X + axis] - low_b
-    offset = s.body[a, BX + axis] - s.body[b, BX + axis]
-    return (low_b - high_a) - offset >= -(ALIGN_MARGIN * min(wide_a, wide_b))
+def side(code, s, a, b):
+    """How body a lies to b: bits of the kinds of relations between their bounding boxes; touching aside."""
+    one, kinds = np.int64(1), np.int64(0)
+    mine = theirs = 0.0
+    over = True
+    for d in range(code[DIMENSIONS]):
+        low_a, high_a = s.body[a, LOW_X + d], s.body[a, HIGH_X + d]
+        low_b, high_b = s.body[b, LOW_X + d], s.body[b, HIGH_X + d]
+        offset = s.body[a, BX + d] - s.body[b, BX + d]
+        wide_a, wide_b = high_a - low_a, high_b - low_b
+        margin = -(ALIGN_MARGIN * min(wide_a, wide_b))
+        less, greater = (low_b - high_a) - offset >= margin, (low_a - high_b) + offset >= margin
+        if less:
+            kinds |= one << (5 + d)
+        if greater:
+            kinds |= one << (8 + d)
+        if not (less or greater):
+            kinds |= one << (11 + d)
+        mine, theirs = mine + wide_a * wide_a, theirs + wide_b * wide_b
+        if d == code[UP]:
+            over = over and greater
+        else:
+            top, bottom = min(high_a + offset, high_b), max(low_a + offset, low_b)
+            over = over and top - bottom >= MIN_OVERLAP * wide_a
+    if over:
+        kinds |= one << 3
+    if SIZE_RATIO * math.sqrt(mine) < math.sqrt(theirs):
+        kinds |= one << 4
+    return kinds
 
 
 @compiled
-def stands(code, numbers, s, kind, a, b):
-    """Whether a relation holds of bodies a and b."""
-    if kind == 0:
-        return closing(code, numbers, s, a, b) < math.inf
-    if kind == 1:
-        own = closing(code, numbers, s, a, b)
-        if not own < math.inf:
+def fastest(code, numbers, s, a, b):
+    """Whether a approaches no other body faster than b, which it approaches."""
+    own = closing(code, numbers, s, a, b)
+    slack = limit(numbers, s, min(a, b), max(a, b), PART, SPEED)
+    for k in range(code[BODIES]):
+        if k != a and k != b and own > closing(code, numbers, s, a, k) + slack:
             return False
-        slack = limit(numbers, s, min(a, b), max(a, b), PART, SPEED)
-        for k in range(code[BODIES]):
-            if k != a and own > closing(code, numbers, s, a, k) + slack:
-                return False
-        return True
-    if kind == 2:
-        return touch(code, numbers, s, a, b)
-    if kind == 3:
-        if not (beside(s, b, a, code[UP]) and touch(code, numbers, s, a, b)):
-            return False
-        for h in range(code[DIMENSIONS]):
-            low, high = s.body[a, LOW_X + h], s.body[a, HIGH_X + h]
-            offset = s.body[a, BX + h] - s.body[b, BX + h]
-            top = min(high + offset, s.body[b, HIGH_X + h])
-            bottom = max(low + offset, s.body[b, LOW_X + h])
-            if h != code[UP] and not top - bottom >= MIN_OVERLAP * (high - low):
-                return False
-        return True
-    if kind == 4:
-        mine = theirs = 0.0
-        for d in range(code[DIMENSIONS]):
-            own, other = s.body[a, HIGH_X + d] - s.body[a, LOW_X + d], s.body[b, HIGH_X + d] - s.body[b, LOW_X + d]
-            mine, theirs = mine + own * own, theirs + other * other
-        return SIZE_RATIO * math.sqrt(mine) < math.sqrt(theirs)
-    if kind < 8:
-        return beside(s, a, b, kind - 5)
-    if kind < 11:
-        return beside(s, b, a, kind - 8)
-    return not (beside(s, a, b, kind - 11) or beside(s, b, a, kind - 11))
+    return True
 
 
 @compiled
 def relate(code, numbers, s, among):
-    """Work out all relations between some objects."""
+    """Work out all relations that are asked for between some objects."""
     if among & ~s.masks[4] == 0:
         return
     among |= s.masks[4]
     s.masks[4] = among
-    one, at = np.int64(1), code[AT_BODIES] + BODY * code[BODIES]
+    one, at, bodies = np.int64(1), code[AT_BODIES] + BODY * code[BODIES], code[BODIES]
+    asked, state = np.int64(0), mixed(np.uint64(among))
     for r in range(code[RELATIONS]):
-        for k in range(code[BODIES]):
-            s.rows[r, k] = s.columns[r, k] = 0
-        for a in range(code[BODIES]):
-            if among & (one << a):
-                for b in range(code[BODIES]):
-                    if b != a and among & (one << b) and stands(code, numbers, s, code[at + r], a, b):
-                        s.rows[r, a] |= one << b
-                        s.columns[r, b] |= one << a
+        if code[at + r] >= 0:
+            asked |= one << code[at + r]
+            for k in range(bodies):
+                s.rows[r, k] = s.columns[r, k] = 0
+    for a in range(bodies):
+        if not among & (one << a):
+            continue
+        for b in range(bodies):
+            if b == a or not among & (one << b):
+                continue
+            kinds = side(code, s, a, b) if asked & ~7 else np.int64(0)
+            if touch(code, numbers, s, a, b):
+                kinds |= 4
+                if asked & 3 and closing(code, numbers, s, a, b) < math.inf:
+                    kinds |= 1
+                    if asked & 2 and fastest(code, numbers, s, a, b):
+                        kinds |= 2
+            else:
+                kinds &= ~(one << 3)
+            kinds &= asked
+            state = (state ^ np.uint64(kinds + 1)) * MIX_A
+            state ^= state >> S27
+            for r in range(code[RELATIONS]):
+                if code[at + r] >= 0 and kinds & (one << code[at + r]):
+                    s.rows[r, a] |= one << b
+                    s.columns[r, b] |= one << a
+    s.state[0] = state
 
 
 # ---------------------------------------------------------------------------------------------- clauses
@@ -1139,7 +1177,10 @@ def rank(code, numbers, s, vote, count, target):
 # ---------------------------------------------------------------------------------------------- roles
 @compiled
 def line_up(code, numbers, s, t):
-    """Bodies in canonical order as t sees them (`relgym.scene.context.canonical_order`), t itself first."""
+    """Bodies in canonical order as t sees them (`relgym.scene.context.canonical_order`), t itself first.
+
+    Returns whether some are alike in their relations to t, so that numbers decide.
+    """
     bodies, relations = code[BODIES], code[RELATIONS]
     toward, around = s.hashes[0], s.hashes[1]
     order = s.lineup[0]
@@ -1170,6 +1211,7 @@ def line_up(code, numbers, s, t):
             j -= 1
         order[j] = k
         count += 1
+    return tied
 
 
 @compiled
@@ -1366,6 +1408,79 @@ def clip(numbers, x, answer_numbers, present, value):
 
 
 @compiled
+def remembered(code, s, a):
+    """The place in the memory of what relations alone decide of an answer; -1: there is no room for it.
+
+    A record holds flags (1: the situation was seen, 2: it wasn't, 4: ranked), the margin, the ranking, and for every
+    mode whether its roles were filled (1, 2: they can't be) and by whom. States are told apart by 64 bits, as situations
+    are (`relgym.classification.familiarity`).
+    """
+    if code[code[a + 10]] > REMEMBERED_MODES:
+        return np.int64(-1)
+    key = s.state[0] ^ mixed(np.uint64(a + 1))
+    for k in range(3):
+        key = mixed(key ^ np.uint64(s.masks[k]))
+    slot = np.int64(key & np.uint64(REMEMBERED - 1))
+    if s.memory_keys[slot] != key:
+        s.memory_keys[slot] = key
+        for k in range(s.memory.shape[1]):
+            s.memory[slot, k] = 0
+    return slot
+
+
+@compiled
+def ranked(code, numbers, s, a, slot):
+    """Rank the modes, or remember how they are ranked; the margin."""
+    vote, count = code[a + 11], code[code[a + 10]]
+    if slot < 0 or code[a + 23] == 0:
+        return rank(code, numbers, s, vote, count, max(code[a + 2], 0))
+    record = s.memory[slot]
+    if record[0] & 4 == 0:
+        record[1] = rank(code, numbers, s, vote, count, max(code[a + 2], 0))
+        record[0] |= 4
+        for k in range(count):
+            record[2 + k] = s.order[0, k]
+    for k in range(count):
+        s.order[0, k] = record[2 + k]
+    return record[1]
+
+
+@compiled
+def familiar(code, s, a, slot):
+    """Whether the situation was seen in training, or what is remembered of that."""
+    experience, target = code[code[a + 11] + 3], max(code[a + 2], 0)
+    if slot < 0:
+        return seen_before(code, s, experience, target)
+    record = s.memory[slot]
+    if record[0] & 3 == 0:
+        record[0] |= 1 if seen_before(code, s, experience, target) else 2
+    return record[0] & 1 == 1
+
+
+@compiled
+def players_of(code, numbers, s, a, mode, number, slot, tied):
+    """Fill the roles of a mode: bodies in `s.cast[0]`; whether they can be, and whether numbers decide an order."""
+    casting = code[mode + 3]
+    if casting == 0:
+        return False, tied
+    roles = code[casting + 1]
+    record = s.memory[max(slot, 0)]
+    at = 2 + REMEMBERED_MODES + number * (1 + REMEMBERED_ROLES)
+    if slot >= 0 and record[at]:
+        for k in range(roles):
+            s.cast[0, k] = record[at + 1 + k]
+        return record[at] == 1, tied
+    if tied < 0:
+        tied = 1 if line_up(code, numbers, s, code[a + 2]) else 0
+    done = assign(code, numbers, s, casting, code[a + 2])
+    if slot >= 0 and tied == 0 and roles <= REMEMBERED_ROLES:
+        record[at] = 1 if done else 2
+        for k in range(roles):
+            record[at + 1 + k] = s.cast[0, k]
+    return done, tied
+
+
+@compiled
 def by_modes(code, numbers, s, a, players):
     """Value, outcome, mode and margin of an answer by modes (`relgym.model.answers`)."""
     x, target = s.x, code[a + 2]
@@ -1373,7 +1488,7 @@ def by_modes(code, numbers, s, a, players):
         return math.nan, UNEXPLAINED, np.int64(0), 0.0
     if code[a + 7] == 2:
         return math.nan, NO_MODE, np.int64(0), 0.0
-    if code[a + 12] and not code[code[a + 13] + leaf(code, numbers, s, code[a + 12])]:
+    if beyond(code, numbers, s, a):
         return math.nan, UNEXPLAINED, np.int64(0), 0.0
     modes, count, vote = code[a + 10] + 1, code[code[a + 10]], code[a + 11]
     for k in range(count):
@@ -1390,10 +1505,14 @@ def by_modes(code, numbers, s, a, players):
     clipped = code[a + 15] if code[a + 14] else np.int64(-1)
     margin = math.inf
     s.order[0, 0] = 0
-    casts = code[a + 22] != 0
+    casts, slot = code[a + 22] != 0, np.int64(-1)
     if vote or casts:
         if target >= 0:
-            surroundings(code, numbers, s, target)
+            if code[a + 24]:
+                surroundings(code, numbers, s, target)
+            else:  # nobody asks what is near
+                s.masks[0] = s.masks[1] = 0
+                s.masks[2], s.masks[3] = (np.int64(1) << code[BODIES]) - 1, -1
             relate(code, numbers, s, s.masks[2] if code[EVERYTHING] else s.masks[0] | s.masks[1])
         else:
             # What has no body stands alone: object 0 of one, in no relation to anything.
@@ -1402,24 +1521,23 @@ def by_modes(code, numbers, s, a, players):
             s.told[0, :] = math.nan
             s.rows[:, 0] = 0
             s.columns[:, 0] = 0
-    own = max(target, 0)
+            s.state[0] = ZERO64
+        slot = remembered(code, s, a)
     if vote:
-        margin = rank(code, numbers, s, vote, count, own) / VOTE_UNIT
-        if code[vote + 3] and not seen_before(code, s, code[vote + 3], own):
+        margin = ranked(code, numbers, s, a, slot) / VOTE_UNIT
+        if code[vote + 3] and not familiar(code, s, a, slot):
             mode = code[modes + s.order[0, 0]]
             value = x[code[mode + 1]]
-            return clip(numbers, x, code[a + 18], clipped, value), OUTSIDE, np.int64(0), 0.0
-    lined = False
+            return clip(numbers, x, code[a + 18], clipped, value), OUTSIDE, code[mode], 0.0
+    tied = -1
     for rank_ in range(count):
         mode = code[modes + s.order[0, rank_]]
         if code[mode + 2] == 0:
             continue
         value = x[code[mode + 1]]
         if code[mode + 4]:
-            if not lined:
-                line_up(code, numbers, s, target)
-                lined = True
-            if code[mode + 3] == 0 or not assign(code, numbers, s, code[mode + 3], target):
+            done, tied = players_of(code, numbers, s, a, mode, s.order[0, rank_], slot, tied)
+            if not done:
                 if not code[a + 9]:
                     continue
                 return math.nan, OUTSIDE, np.int64(0), 0.0
@@ -1451,13 +1569,19 @@ def by_modes(code, numbers, s, a, players):
 
 
 @compiled
+def beyond(code, numbers, s, a):
+    """Whether a scene lies out of the scope of an answer's modes."""
+    return code[a + 12] != 0 and code[code[a + 13] + leaf(code, numbers, s, code[a + 12])] == 0
+
+
+@compiled
 def guessed(code, numbers, s, a):
     """The fallback value of an answer; NaN if there is none."""
     value = math.nan
     if code[a + 16]:
         value = total(code, numbers, s.x, code[a + 16])
     if code[a + 17]:
-        if code[a + 12] and not code[code[a + 13] + leaf(code, numbers, s, code[a + 12])]:
+        if beyond(code, numbers, s, a):
             value = total(code, numbers, s.x, code[a + 17])
     return clip(numbers, s.x, code[a + 18], code[a + 15], value)
 
@@ -1492,6 +1616,7 @@ def step(code, numbers, s, outcomes, modes, margins, players, touched):
             touched[k] = hits(code, s, body)
         else:
             value, outcome, mode, margin = by_modes(code, numbers, s, a, own)
+            touched[k] = mode
         needs = code[a + 4]
         for n in range(code[needs]):
             if s.lost[code[needs + 1 + n]]:
@@ -1503,7 +1628,9 @@ def step(code, numbers, s, outcomes, modes, margins, players, touched):
             if outcome == PREDICTED:
                 outcome = OUTSIDE
             value = guessed(code, numbers, s, a)
+            touched[k] = 0
             if math.isfinite(value):
+                touched[k] = -2 if beyond(code, numbers, s, a) else -1
                 x[width + column] = value
         known = told and outcome == PREDICTED
         outcomes[k], margins[k] = outcome, margin
@@ -1540,12 +1667,12 @@ def run(code, numbers, spaces, vectors, following, outcomes, modes, margins, pla
     spaces
         Work space, shape ``(1,)`` of `SPACE`.
     vectors, following
-        State vectors, and where the next ones go, shape ``(n, width)``.
+        State vectors, finite, and copies of them, into which next values are written, shape ``(n, width)``.
     outcomes, modes, margins
         Where these go, shape ``(n, answers)``.
     players, touched
-        Bodies that play roles, shape ``(n, answers, roles)``, and whom movers touch, as bits, ``(n, answers)``; of
-        length 1 where nobody asks.
+        Bodies that play roles, shape ``(n, answers, roles)``, and, ``(n, answers)``, whom a mover touches, as bits, or
+        the mode that gave a value, -1: a guess, -2: one out of scope. Of length 1 where nobody asks.
 
     Returns
     -------
@@ -1555,13 +1682,17 @@ def run(code, numbers, spaces, vectors, following, outcomes, modes, margins, pla
     s = spaces[0]
     s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
     for n in range(vectors.shape[0]):
-        for k in range(width):
-            s.x[k] = vectors[n, k]
-            s.x[width + k] = vectors[n, k]
+        for k in range(code[READS]):
+            column = code[code[AT_READS] + k]
+            s.x[column] = vectors[n, column]
+        for k in range(code[NEXTS]):
+            column = code[code[AT_NEXTS] + k]
+            s.x[width + column] = s.x[column]
         told = n if n < len(players) else 0
         bad = step(code, numbers, s, outcomes[n], modes[n], margins[n], players[told], touched[told])
         if bad:
             return bad
-        for k in range(width):
-            following[n, k] = s.x[width + k]
+        for k in range(code[NEXTS]):
+            column = code[code[AT_NEXTS] + k]
+            following[n, column] = s.x[width + column]
     return 0

@@ -532,8 +532,8 @@ class Program:
         2 in the plane, else 3; which of the axes in use points up; sense in which angles turn, 1 or -1.
     touch, part, precision
         Distance up to which bodies touch, speed up to which they don't part, relative precision of the numbers.
-    relations
-        Names of all relations, in the order of their numbers.
+    relations, wanted
+        Names of all relations, in the order of their numbers, and the numbers of those that anybody asks for.
     facts
         Names of the contact facts of a pair; behind them come the numbers that other bodies have.
     others
@@ -564,6 +564,7 @@ class Program:
     part: float
     precision: float
     relations: tuple[str, ...]
+    wanted: frozenset[int]
     facts: tuple[str, ...]
     others: tuple[tuple[int, ...], ...]
     offsets: bool

@@ -16,10 +16,10 @@ from relgym.program import records as ir
 
 __all__ = ["Tape", "encoded"]
 
-HEADER = 26
+HEADER = 30
 (WIDTH, REGISTERS, BODIES, AT_BODIES, ANSWERS, AT_ANSWERS, MOVERS, AT_MOVERS, PAIRS, AT_PAIRS, LAWS, AT_LAWS) = range(12)
 (KINEMATICS, AT_KINEMATICS, ANGLES, AT_ANGLES, RELATIONS, FACTS, OTHERS) = range(12, 19)
-(OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP) = range(19, 25)
+(OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP, READS, AT_READS, NEXTS, AT_NEXTS) = range(19, 29)
 """Entries of the header."""
 
 (TURN, TOUCH, PART, PRECISION, SLACK) = range(5)
@@ -44,6 +44,9 @@ RELATION_KINDS = {
 MOST_REGISTERS, MOST_CONTACTS, MOST_CORNERS, MOST_RELATIONS, MOST_FEATURES = 4096, 128, 16, 16, 64
 MOST_MODES, MOST_VARIABLES, MOST_ROLES, MOST_KEYS = 64, 12, 12, 256
 """What a work space has room for."""
+
+REMEMBERED, REMEMBERED_MODES, REMEMBERED_ROLES = 512, 8, 6
+"""Relational states that a kernel remembers answers of (a power of two), and of how many modes and roles."""
 
 _K = ir.MOST_BODIES
 SPACE = np.dtype(
@@ -73,6 +76,9 @@ SPACE = np.dtype(
         ("lineup", np.int64, (1, _K)),  # bodies in canonical order
         ("options", np.float64, ((MOST_ROLES + 1) ** 2, 4)),  # candidates of roles
         ("cast", np.int64, (5, _K + 2)),
+        ("state", np.uint64, (1,)),  # all relations that are known, as a number
+        ("memory_keys", np.uint64, (REMEMBERED,)),
+        ("memory", np.int64, (REMEMBERED, 2 + REMEMBERED_MODES * (2 + REMEMBERED_ROLES))),
     ],
     align=True,
 )
@@ -138,11 +144,17 @@ class _Writer:
         ]
         self.roles = 1
         self.variables = 1
+        self.reads: set[int] = set()
 
     def put(self, *values: int) -> int:
         """Append whole numbers; where they begin."""
         self.code.extend(int(v) for v in values)
         return len(self.code) - len(values)
+
+    def col(self, *columns: int) -> list[int]:
+        """Columns, of which note is taken that somebody reads them."""
+        self.reads.update(columns)
+        return list(columns)
 
     def num(self, *values: float) -> int:
         """Append numbers; where they begin."""
@@ -156,12 +168,13 @@ class _Writer:
         bodies = [v for k in range(len(p.bodies)) for v in self._body(k)]
         head[AT_BODIES] = self.put(*bodies)
         head[RELATIONS], head[FACTS] = len(p.relations), len(p.facts)
-        kinds = [self._relation(name) for name in p.relations]
-        # Behind the bodies: kinds of the relations, then the columns of the others' numbers.
+        wanted = p.wanted
+        kinds = [self._relation(name) if k in wanted else -1 for k, name in enumerate(p.relations)]
+        # Behind the bodies: kinds of the relations (-1: nobody asks), then the columns of the others' numbers.
         self.put(*kinds)
         width = len(p.others[0]) if p.others else 0
         head[OTHERS] = width
-        self.put(*(c for row in p.others for c in row))
+        self.put(*self.col(*(c for row in p.others for c in row)))
         head[OFFSETS], head[PARTING], head[EVERYTHING] = p.offsets, p.parting, p.everything
         head[DIMENSIONS], head[UP] = p.dimensions, p.up
         head[KEYS] = 1 + max((a.key for a in p.answers), default=0)
@@ -172,10 +185,24 @@ class _Writer:
         at = self.num(*(step for _, step, _ in p.kinematics))
         head[KINEMATICS] = len(p.kinematics)
         head[AT_KINEMATICS] = self.put(
-            *(v for k, (place, _, rate) in enumerate(p.kinematics) for v in (place, rate, at + k))
+            *(v for k, (place, _, rate) in enumerate(p.kinematics) for v in (place, *self.col(rate), at + k))
         )
         head[ANGLES], head[AT_ANGLES] = len(p.angles), self.put(*p.angles)
+        self._note_reads()
         return Tape(np.array(self.code, dtype=np.int64), np.array(self.numbers), self.roles)
+
+    def _note_reads(self) -> None:
+        """Which present values a step reads, and which next values it reads or writes."""
+        p, head = self.program, self.code
+        written = {a.column for a in p.answers} | {place for place, _, _ in p.kinematics} | set(p.angles)
+        nexts = sorted(written | {c - p.width for c in self.reads if p.width <= c < 2 * p.width})
+        reads = sorted({c for c in self.reads if 0 <= c < p.width} | set(nexts))
+        head[READS], head[AT_READS] = len(reads), self.put(*reads)
+        head[NEXTS], head[AT_NEXTS] = len(nexts), self.put(*nexts)
+
+    @property
+    def _casts(self) -> bool:
+        return any(mode.roles for a in self.program.answers for mode in a.modes)
 
     def _relation(self, name: str) -> int:
         if name in RELATION_KINDS:
@@ -190,9 +217,19 @@ class _Writer:
         xs, ys = [x for x, _ in b.outline] or [0.0], [y for _, y in b.outline] or [0.0]
         least = self.num(min(xs), min(ys), max(xs), max(ys), *(v for corner in b.outline for v in corner))
         flags = [b.moves, b.spin, b.spins, self.program.groups[number]]
+        self.col(*b.position[:2], *b.extent[:2], b.angle, *b.velocity, b.spin)
+        if self.program.precision or self.program.dimensions == 3:
+            self.col(*b.position, *b.extent)
+        if self.program.dimensions == 3 or self._casts:
+            self.col(*b.pose)
         return [shape, len(b.outline), least, *b.position, *b.extent, b.angle, *b.velocity, *map(int, flags), *b.pose]
 
     def _sum(self, s: ir.Sum) -> int:
+        at = self.num(*(w for _, w in s.terms))
+        return self.put(len(s.terms), at, *self.col(*(c for c, _ in s.terms)))
+
+    def _rule(self, s: ir.Sum) -> int:
+        """A sum over what laws read of a contact, not over registers."""
         at = self.num(*(w for _, w in s.terms))
         return self.put(len(s.terms), at, *(c for c, _ in s.terms))
 
@@ -218,14 +255,14 @@ class _Writer:
         at = self.num(share.constant, pair.grip)
         if share.columns is None:
             return [pair.first, pair.second, 0, 0, 0, at]
-        return [pair.first, pair.second, share.power, *share.columns, at]
+        return [pair.first, pair.second, share.power, *self.col(*share.columns), at]
 
     def _law(self, law: ir.Law) -> int:
         rules = []
         for along in law.rules:
             written = []
             for rule in along:
-                pieces = [self._sum(piece) for piece in rule.pieces]
+                pieces = [self._rule(piece) for piece in rule.pieces]
                 written.append(
                     self.put(rule.operator == "max", rule.back, rule.forth, len(pieces), *pieces)
                 )
@@ -265,7 +302,7 @@ class _Writer:
     def _tree(self, tree: ir.Tree | None) -> int:
         if tree is None:
             return 0
-        sights = [self.put(s.column, s.minus, s.variable, s.feature) for s in tree.sights]
+        sights = [self.put(*self.col(s.column, s.minus), s.variable, s.feature) for s in tree.sights]
         at = self.num(*(t for _, t, _, _ in tree.nodes))
         nodes = [v for s, _, b, a in tree.nodes for v in (sights[s] if s >= 0 else 0, b, a)]
         return self.put(len(tree.nodes), at, *nodes)
@@ -277,7 +314,7 @@ class _Writer:
             *(
                 v
                 for k, t in enumerate(stage.tests)
-                for v in (t.column, t.minus, t.at_most, t.negated, at + k)
+                for v in (*self.col(t.column, t.minus), t.at_most, t.negated, at + k)
             )
         )
         tree = self._tree(stage.tree)
@@ -325,7 +362,7 @@ class _Writer:
         roles = []
         for role in mode.roles:
             at = self.num(*(w for w, _ in role.terms))
-            columns = [c for _, row in role.terms for c in row]
+            columns = self.col(*(c for _, row in role.terms for c in row))
             roles.append(self.put(role.place, len(role.terms), at, role.number, *columns))
             self.roles = max(self.roles, role.number + 1)
         casting = self._casting(mode.casting)
@@ -334,7 +371,7 @@ class _Writer:
     def _answer(self, a: ir.Answer) -> int:
         features = [self._feature(f) for f in a.features]
         follows = [
-            v for f in a.follows for v in (f.register, f.column, f.value, self.num(f.scale), f.scale == 0.0)
+            v for f in a.follows for v in (f.register, *self.col(f.column), f.value, self.num(f.scale), f.scale == 0.0)
         ]
         modes = [self._mode(mode) for mode in a.modes]
         stops = [self._stop(each) for each in a.stops]
@@ -362,7 +399,7 @@ class _Writer:
             self._tree(tree),
             self.put(*outcomes),
             int(a.clipped),
-            reach.present if a.reach is not None else -1,
+            *self.col(reach.present if a.reach is not None else -1),
             0 if a.guess is None else self._sum(a.guess),
             0 if a.beyond is None else self._sum(a.beyond),
             numbers,
@@ -370,21 +407,45 @@ class _Writer:
             a.high[0],  # 20
             lists[3],
             int(any(mode.roles for mode in a.modes)),
+            int(a.vote is not None and _relational(a.vote)),
+            int(a.vote is not None and _narrow(a.vote)),
         )
 
     def _feature(self, feature: ir.Feature) -> int:
         kinds = {"": 0, "sin": 1, "cos": 2}
-        factors = [v for f in feature.factors for v in (f.column, kinds[f.function], f.frequency)]
+        factors = [v for f in feature.factors for v in (*self.col(f.column), kinds[f.function], f.frequency)]
         return self.put(feature.register, len(feature.factors), *factors)
 
     def _stop(self, each: ir.Stop | ir.Landing) -> int:
         if isinstance(each, ir.Stop):
             at = self.num(each.value, each.step, each.bound, each.side)
-            return self.put(0, each.mode, each.column, at)
-        return self.put(1, each.mode, each.column, self.num(each.value, each.at, each.slack))
+            return self.put(0, each.mode, *self.col(each.column), at)
+        return self.put(1, each.mode, *self.col(each.column), self.num(each.value, each.at, each.slack))
 
 
 def _variables(literal: ir.Literal) -> set[int]:
     """Variables of a literal, `ANY` left aside."""
     args = (literal.first, literal.second) if isinstance(literal, ir.Related) else (literal.variable,)
     return {a for a in args if a != ir.ANY}
+
+
+def _relational(vote: ir.Vote) -> bool:
+    """Whether relations alone decide a vote, and no number does."""
+    stages = [stage for contest in vote.contests for stage in contest.stages]
+    literals = [each for stage in stages if stage.clause is not None for each in stage.clause.literals]
+    numeric = any(stage.tests or stage.tree is not None for stage in stages)
+    return not numeric and not any(isinstance(each, ir.PairTest) for each in literals)
+
+
+def _narrow(vote: ir.Vote) -> bool:
+    """Whether a vote asks what is near the target, or for features of pairs."""
+    stages = [stage for contest in vote.contests for stage in contest.stages]
+    literals = [each for stage in stages if stage.clause is not None for each in stage.clause.literals]
+    sights = [sight for stage in stages if stage.tree is not None for sight in stage.tree.sights]
+    contexts = {contest.context for contest in vote.contests}
+    contexts |= {context for context, _, _ in vote.experience.used} if vote.experience is not None else set()
+    return (
+        contexts != {ir.CONTEXTS.index("all")}
+        or any(isinstance(each, ir.PairTest) for each in literals)
+        or any(sight.feature >= 0 for sight in sights)
+    )
