@@ -124,7 +124,9 @@ class Boxes:
         """Property vectors by object, of one state vector or of n: arrays that nobody else has."""
         if self._as_they_are:
             own = vectors.copy()
-            return {name: own[..., layout.slice(k)] for k, name in enumerate(layout.names) if name in self._dtypes}
+            return {
+                name: own[..., layout.slice(k)] for k, name in enumerate(layout.names) if name in self._dtypes
+            }
         rounded = self.rounded(layout, vectors)
         return {
             name: rounded[..., layout.slice(k)].astype(self._dtypes[name])
@@ -222,9 +224,7 @@ class BoxesShown:
         if parts not in self._changing:
             layout = self.layout
             pairs = {(layout.index(name), prop) for name, prop in parts if name in layout.names}
-            pairs |= {
-                (i, law.property) for law in self._schema.derivations for i in layout.of_type(law.type)
-            }
+            pairs |= {(i, law.property) for law in self._schema.derivations for i in layout.of_type(law.type)}
             pairs |= {(i, prop) for i, t in enumerate(layout.types) for prop in t.angles}
             self._changing[parts] = np.array(sorted(layout.column(*pair) for pair in pairs), dtype=np.intp)
         return self._boxes.inside_at(self.layout, vectors, self._changing[parts])

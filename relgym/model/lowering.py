@@ -3,7 +3,7 @@
 What a program can't say is left to arrays (`relgym.model.querying`): laws of motion in space (and bodies there but
 boxes that aren't turned, and spheres), other geometries than
 ``"arrays"``, functions that users registered, roles of objects without a body that several could play, and scenes of
-more than `MOST_BODIES` bodies. `lowered` says so by `relgym.program.records.Beyond`.
+more than `MOST_BODIES` bodies. `lowered` says so by `relgym.program.records.BeyondError`.
 """
 
 from __future__ import annotations
@@ -33,9 +33,8 @@ from relgym.model.scenes import angle_columns
 from relgym.model.stops import Stop as LearnedStop
 from relgym.numeric.tree import DecisionTree
 from relgym.program import records as ir
-from relgym.scene.axes import WORLD, Axes
+from relgym.scene.axes import Axes
 from relgym.scene.contacts import APPROACH_EPS
-from relgym.scene.context import slots
 from relgym.scene.objects import TASK, SceneLayout, Target, pose_columns
 from relgym.scene.shapes import Box, Sphere, outline
 
@@ -47,7 +46,7 @@ def lowered(parts: Parts, layout: SceneLayout) -> ir.Program:
 
     Raises
     ------
-    Beyond
+    BeyondError
         Arrays must answer.
 
     Notes
@@ -86,11 +85,11 @@ class _Lowering:
     def _check(self) -> None:
         shapes = {type(self.layout.types[i].shape) for i in self.layout.bodies}
         if not self.axes.planar and shapes not in ({Box}, {Sphere}):
-            raise ir.Beyond("a world in space of other bodies than boxes, or spheres")
+            raise ir.BeyondError("a world in space of other bodies than boxes, or spheres")
         if self.perception.extractor.geometry != "arrays":
-            raise ir.Beyond(f"the geometry {self.perception.extractor.geometry!r}")
+            raise ir.BeyondError(f"the geometry {self.perception.extractor.geometry!r}")
         if len(self.layout.bodies) > ir.MOST_BODIES:
-            raise ir.Beyond(f"more than {ir.MOST_BODIES} bodies")
+            raise ir.BeyondError(f"more than {ir.MOST_BODIES} bodies")
 
     def _mask(self, flags: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> int:
         return sum(1 << int(k) for k in np.flatnonzero(flags))
@@ -197,7 +196,7 @@ class _Lowering:
         laws = self.parts.laws
         assert laws is not None, "asked only where laws govern something"
         if not self.axes.planar:
-            raise ir.Beyond("laws of motion in space")
+            raise ir.BeyondError("laws of motion in space")
         book: LawBook = laws.learner.book
         cast = book.cast(self.layout)
         movers = tuple(self._mover(book, cast, body) for body in cast.movers)
@@ -218,9 +217,11 @@ class _Lowering:
 
     def _law(self, law: PairLaw, chosen: np.ndarray[tuple[int, int], np.dtype[np.intp]]) -> ir.Law:
         if law.frame not in FRAMES:
-            raise ir.Beyond(f"the frame {law.frame!r}")
+            raise ir.BeyondError(f"the frame {law.frame!r}")
         letters = axis_names(law.frame, 2)
-        columns = {f"{what}_{letter}": 2 * k + j for k, letter in enumerate(letters) for j, what in enumerate("uv")}
+        columns = {
+            f"{what}_{letter}": 2 * k + j for k, letter in enumerate(letters) for j, what in enumerate("uv")
+        }
         columns |= {f"J_{letter}": 4 + k for k, letter in enumerate(letters)}
         first, second = (tuple(_rule(rule, columns) for rule in rules) for rules in law.axes)
         numbers = tuple(tuple(int(n) for n in row) for row in chosen)
@@ -228,7 +229,9 @@ class _Lowering:
 
     def _pair(self, book: LawBook, cast: Cast, k: int) -> ir.Pair:
         first, second = int(cast.first[k]), int(cast.second[k])
-        grip = book.pair.grip(cast.kinds[k]) if book.pair is not None and book.pair.frame == POINT else math.nan
+        grip = (
+            book.pair.grip(cast.kinds[k]) if book.pair is not None and book.pair.frame == POINT else math.nan
+        )
         if not cast.both[k]:
             return ir.Pair(first, second, ir.Share(), grip)
         known = book.shares.get(cast.kinds[k])
@@ -254,9 +257,7 @@ class _Lowering:
         signature = situation.signature
         gather = self.perception.gather(layout, signature, tuple(situation.plain.tolist()))
         one = _Columns(self, signature, gather.tolist())
-        guess, beyond = (
-            _bound_sum(model._guessing(signature, beyond=b), one.column) for b in (False, True)
-        )
+        guess, beyond = (_bound_sum(model._guessing(signature, beyond=b), one.column) for b in (False, True))
         scope = None
         bounded = guess is not None or beyond is not None or model.clusterer.approximate
         if model.scope.tree is not None and (places := model.scope.places(signature)) is not None:
@@ -382,7 +383,7 @@ class _Lowering:
         if not binding.open:
             return ir.Mode(number, register, function, (), None, players)
         if body < 0:
-            raise ir.Beyond("roles that several could play, of an object without a body")
+            raise ir.BeyondError("roles that several could play, of an object without a body")
         return ir.Mode(
             number,
             register,
@@ -398,12 +399,14 @@ class _Lowering:
             embodied = role.type in model.casting.vocabulary.unary
             if forced < 0:
                 if not embodied:
-                    raise ir.Beyond("a role that several objects without a body could play")
+                    raise ir.BeyondError("a role that several objects without a body could play")
                 terms = []
                 for prop, weight in role.terms:
                     bare, primed = prop.rstrip(PRIME), prop.endswith(PRIME)
                     columns = tuple(
-                        layout.column(i, bare) + layout.width * primed if layout.types[i].name == role.type else -1
+                        layout.column(i, bare) + layout.width * primed
+                        if layout.types[i].name == role.type
+                        else -1
                         for i in layout.bodies
                     )
                     terms.append((weight, columns))
@@ -480,7 +483,9 @@ class _Lowering:
             tree = c.fall_through_tree if number == last else c.clause_trees[number]
             tests, said = [], None
             if clause is not None:
-                tests = [self._test(literal, scalars) for literal in clause if literal.op and not literal.args]
+                tests = [
+                    self._test(literal, scalars) for literal in clause if literal.op and not literal.args
+                ]
                 said = self._clause(clause, 1, pair, bodiless=body < 0)
             names = {(stage, leaf): n for (stage, leaf), n in c.outcome_of.items() if stage == number}
             if tree is None:
@@ -502,7 +507,9 @@ class _Lowering:
         """What each column of a tree looks at; columns that it doesn't test may be anything."""
         wanted = {k for k in tree.column if k >= 0}
         names, found = c.scope.scalars, list[ir.Sight]()
-        bound = [] if clause is None else [(v, f) for v in range(1, clause.variables) for _, f in c.scope.pair]
+        bound = (
+            [] if clause is None else [(v, f) for v in range(1, clause.variables) for _, f in c.scope.pair]
+        )
         for k in range(len(names) + len(bound)):
             if k not in wanted:
                 found.append(ir.Sight())
@@ -562,7 +569,7 @@ class _Columns:
             factors = []
             for atom in feature.atoms:
                 if atom.function not in ("", "sin", "cos"):
-                    raise ir.Beyond(f"the function {atom.function!r}, which a user registered")
+                    raise ir.BeyondError(f"the function {atom.function!r}, which a user registered")
                 factors.append(ir.Factor(self._gather[atom.column], atom.function, atom.frequency))
             register = self._lowering.register()
             self.features[index] = ir.Feature(register, tuple(factors), feature.name)

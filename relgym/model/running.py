@@ -24,7 +24,7 @@ from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.spread import Spreads, action_columns
 from relgym.model.spread_split import place_of
-from relgym.program.records import Answer, Beyond, Program
+from relgym.program.records import Answer, BeyondError, Program
 from relgym.program.tape import SPACE, encoded
 from relgym.scene.objects import Scene, SceneLayout
 
@@ -90,7 +90,7 @@ class Programs:
         runner: Runner | None
         try:
             runner = Runner(parts, layout, lowered(parts, layout), kernel)
-        except Beyond:
+        except BeyondError:
             runner = None
         self._known[id(layout)] = (layout, parts, runner)
         return runner
@@ -153,7 +153,9 @@ class Runner:
         n, count = len(vectors), len(self._keys)
         with np.errstate(over="ignore", invalid="ignore"):
             total = float(vectors.sum())
-        if not math.isfinite(total) and not np.isfinite(vectors).all():  # finite numbers, too, may add up to infinity
+        if (
+            not math.isfinite(total) and not np.isfinite(vectors).all()
+        ):  # finite numbers, too, may add up to infinity
             return None
         following = vectors.copy()
         outcomes, modes = np.empty((n, count), dtype=np.int8), np.empty((n, count), dtype=np.int64)

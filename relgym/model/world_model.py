@@ -34,10 +34,11 @@ from relgym.model.locality import (
     predict_locally,
     predict_many_locally,
 )
+from relgym.model.lowering import lowered
 from relgym.model.merging import merge
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
-from relgym.model.prediction import BatchPrediction, ScenePrediction
+from relgym.model.prediction import BatchPrediction, Outcome, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.rules import doubted, rule_list
@@ -45,6 +46,8 @@ from relgym.model.running import Programs
 from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
 from relgym.model.storage import read_model, write_model
+from relgym.program.records import BeyondError
+from relgym.program.source import python_source
 from relgym.reporting.naming import named_text
 from relgym.reporting.parser import parse_rules
 from relgym.reporting.rules import RuleList
@@ -634,6 +637,35 @@ class WorldModel:
         return describe(
             self, details=details, digits=digits, names=names, check=check, frame=frame, incline=incline
         )
+
+    @refusing(ConfigError)
+    def to_python(self, layout: SceneLayout | None = None) -> str:
+        """The model as the text of a Python module that needs numpy alone, for scenes with certain objects.
+
+        Its ``step(vector)`` predicts one scene, ``predict(vectors)`` many: next state vectors, outcomes (by the order
+        of `Outcome`), modes and margins, as `predict_batch` does. Every mode, law and choice between two modes is a
+        function of its own.
+
+        Parameters
+        ----------
+        layout
+            The scenes' layout; default: all objects of the schema.
+
+        Raises
+        ------
+        ConfigError
+            The model holds what isn't written as Python: roles that several objects could play, bodies in space,
+            functions that a user registered.
+        """
+        layout = self.schema.layout() if layout is None else layout
+        try:
+            program = lowered(self._parts, layout)
+            sentences = tuple(outcome.value for outcome in Outcome)
+            return python_source(program, self.describe() if self.has_rules else repr(self), sentences)
+        except BeyondError as beyond:
+            raise ConfigError(
+                f"this model can't be written as Python, since it holds {beyond}; predict_batch runs it"
+            ) from None
 
     @property
     def has_rules(self) -> bool:

@@ -1,1 +1,1 @@
-"""A model as one small program: records that people and tools read, a flat encoding, a compiled kernel, Python source."""
+"""A model as one small program: records to read, a flat encoding, a compiled kernel, Python source."""

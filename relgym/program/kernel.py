@@ -34,9 +34,9 @@ from relgym.program.tape import (
     EVERYTHING,
     FACTS,
     KEYS,
-    MOST_CONTACTS,
     KINEMATICS,
     LAWS,
+    MOST_CONTACTS,
     MOVERS,
     NEXTS,
     OFFSETS,
@@ -103,7 +103,9 @@ MIX_A, MIX_B = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 S30, S27, S31, ONE64, ZERO64 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(1), np.uint64(0)
 BX, LOW_X, HIGH_X, SIZE, SPEED = 0, 3, 6, 9, 10
 BY, LOW_Y, HIGH_Y = 1, 4, 7
-(SHAPE, CORNERS, OUTLINE, COL_X, COL_Y, COL_Z, COL_SX, COL_SY, COL_SZ, COL_ANGLE, COL_VX, COL_VY, COL_VZ) = range(13)
+(SHAPE, CORNERS, OUTLINE, COL_X, COL_Y, COL_Z, COL_SX, COL_SY, COL_SZ, COL_ANGLE, COL_VX, COL_VY, COL_VZ) = (
+    range(13)
+)
 MOVES, COL_SPIN, SPINS, GROUP, POSE = range(13, 18)
 (NX, NY, CX, CY, COS, SIN, SHARE, GRIP, ARM_A, ARM_B, JX, JY, DX, DY, EX, EY) = range(16)
 
@@ -162,10 +164,13 @@ def look(code, numbers, s):
         s.placed[k] = 0
         if code[DIMENSIONS] == 3:
             depth = x[code[at + COL_SZ]]
-            if not depth > 0.0 or (code[at + SHAPE] == 0 and max(abs(depth - width), abs(height - width)) > ROUND * width):
+            if not depth > 0.0:
                 return BAD_SIZE
-            if code[at + SHAPE] != 0 and (x[code[at + POSE + 3]], x[code[at + POSE + 4]], x[code[at + POSE + 5]]) != (0.0, 0.0, 0.0):
-                return TURNED
+            if code[at + SHAPE] == 0 and max(abs(depth - width), abs(height - width)) > ROUND * width:
+                return BAD_SIZE
+            for d in range(3, 6):
+                if code[at + SHAPE] != 0 and x[code[at + POSE + d]] != 0.0:
+                    return TURNED
             for d in range(3):
                 body[k, BX + d] = x[code[at + COL_X + d]]
                 half = 0.5 * (width if code[at + SHAPE] == 0 else x[code[at + COL_SX + d]])
@@ -174,7 +179,12 @@ def look(code, numbers, s):
             if abs(height - width) > ROUND * width:
                 return BAD_SIZE
             radius = 0.5 * width
-            body[k, LOW_X], body[k, LOW_Y], body[k, HIGH_X], body[k, HIGH_Y] = -radius, -radius, radius, radius
+            body[k, LOW_X], body[k, LOW_Y], body[k, HIGH_X], body[k, HIGH_Y] = (
+                -radius,
+                -radius,
+                radius,
+                radius,
+            )
         elif x[code[at + COL_ANGLE]] == 0.0:
             n = code[at + OUTLINE]
             body[k, LOW_X], body[k, LOW_Y] = numbers[n] * width, numbers[n + 1] * height
@@ -186,7 +196,12 @@ def look(code, numbers, s):
             for v in range(code[at + CORNERS]):
                 least_x, most_x = min(least_x, s.edge[0, k, v]), max(most_x, s.edge[0, k, v])
                 least_y, most_y = min(least_y, s.edge[1, k, v]), max(most_y, s.edge[1, k, v])
-            body[k, LOW_X], body[k, LOW_Y], body[k, HIGH_X], body[k, HIGH_Y] = least_x, least_y, most_x, most_y
+            body[k, LOW_X], body[k, LOW_Y], body[k, HIGH_X], body[k, HIGH_Y] = (
+                least_x,
+                least_y,
+                most_x,
+                most_y,
+            )
         if precision != 0.0:
             size = speed = 1.0
             for column in (COL_X, COL_Y, COL_Z, COL_SX, COL_SY, COL_SZ):
@@ -514,9 +529,7 @@ def compose(code, numbers, law, s, count, bodies, spins, out):
             c, pair, a, b = s.contact[k], s.pair[k, 0], s.pair[k, 1], s.pair[k, 2]
             x, y = relative(point, v, c, a, b)
             now_x, now_y = relative(point, now, c, a, b)
-            new_x, new_y = respond(
-                code, numbers, law, pair, c, now_x, now_y, x - c[JX], y - c[JY], features
-            )
+            new_x, new_y = respond(code, numbers, law, pair, c, now_x, now_y, x - c[JX], y - c[JY], features)
             c[DX], c[DY] = new_x - c[JX], new_y - c[JY]
             push(point, v, c, a, b, c[DX], c[DY])
             c[JX], c[JY] = new_x, new_y
@@ -1411,9 +1424,9 @@ def clip(numbers, x, answer_numbers, present, value):
 def remembered(code, s, a):
     """The place in the memory of what relations alone decide of an answer; -1: there is no room for it.
 
-    A record holds flags (1: the situation was seen, 2: it wasn't, 4: ranked), the margin, the ranking, and for every
-    mode whether its roles were filled (1, 2: they can't be) and by whom. States are told apart by 64 bits, as situations
-    are (`relgym.classification.familiarity`).
+    A record holds flags (1: the situation was seen, 2: it wasn't, 4: ranked), the margin, the ranking, and for
+    every mode whether its roles were filled (1, 2: they can't be) and by whom. States are told apart by 64 bits, as
+    situations are (`relgym.classification.familiarity`).
     """
     if code[code[a + 10]] > REMEMBERED_MODES:
         return np.int64(-1)

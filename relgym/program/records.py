@@ -4,8 +4,8 @@ A program says what happens to a row of numbers, and nothing else: it knows colu
 of objects and no names of properties. `relgym.model.lowering` makes it of a model; `relgym.program.tape` writes it as
 two arrays, which `relgym.program.kernel` runs; `relgym.program.source` writes it as Python.
 
-**Registers.** For a state vector of width w, columns 0 … w - 1 hold the present values, w … 2 w - 1 the next ones (which
-begin as copies and are filled in as they become known), 2 w is NaN (what is missing), 2 w + 1 is 0 and 2 w + 2 is 1.
+**Registers.** For a state vector of width w, columns 0 … w - 1 hold the present values, w … 2 w - 1 the next ones
+(which begin as copies and are filled in as they become known), 2 w is NaN (missing), 2 w + 1 is 0, 2 w + 2 is 1.
 Behind them lie features and what modes predict. `CONSTANT` in the place of a column stands for the number 1.
 
 **A step.** (1) `Motion`: free laws give every mover's next velocity; contacts then change them until all agree.
@@ -27,7 +27,7 @@ __all__ = [
     "MOST_BODIES",
     "Answer",
     "AxisRule",
-    "Beyond",
+    "BeyondError",
     "Body",
     "Casting",
     "Clause",
@@ -47,8 +47,8 @@ __all__ = [
     "Pair",
     "PairTest",
     "Program",
-    "Related",
     "Reach",
+    "Related",
     "Role",
     "Share",
     "Sight",
@@ -76,7 +76,7 @@ FRAMES = ("contact", "point", "turned", "centres", "own", "world")
 """Frames of contact laws (`relgym.laws.frames`)."""
 
 
-class Beyond(Exception):
+class BeyondError(Exception):
     """A program has no words, or no room, for what was learned; the message says for what."""
 
 

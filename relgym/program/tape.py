@@ -17,7 +17,20 @@ from relgym.program import records as ir
 __all__ = ["Tape", "encoded"]
 
 HEADER = 30
-(WIDTH, REGISTERS, BODIES, AT_BODIES, ANSWERS, AT_ANSWERS, MOVERS, AT_MOVERS, PAIRS, AT_PAIRS, LAWS, AT_LAWS) = range(12)
+(
+    WIDTH,
+    REGISTERS,
+    BODIES,
+    AT_BODIES,
+    ANSWERS,
+    AT_ANSWERS,
+    MOVERS,
+    AT_MOVERS,
+    PAIRS,
+    AT_PAIRS,
+    LAWS,
+    AT_LAWS,
+) = range(12)
 (KINEMATICS, AT_KINEMATICS, ANGLES, AT_ANGLES, RELATIONS, FACTS, OTHERS) = range(12, 19)
 (OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP, READS, AT_READS, NEXTS, AT_NEXTS) = range(19, 29)
 """Entries of the header."""
@@ -63,7 +76,11 @@ SPACE = np.dtype(
         ("features", np.float64, (6,)),  # what laws read of a contact
         ("body_flags", np.int64, (4, _K)),  # stated, known, involved, stated by the law in force
         ("told", np.float64, (_K, MOST_FEATURES)),  # pair features of a target
-        ("masks", np.int64, (6,)),  # contexts of a target; whose they are; among whom relations are known; the time
+        (
+            "masks",
+            np.int64,
+            (6,),
+        ),  # contexts of a target; whose they are; among whom relations are known; the time
         ("rows", np.int64, (MOST_RELATIONS, _K)),  # to whom an object stands in a relation
         ("columns", np.int64, (MOST_RELATIONS, _K)),  # who stands in a relation to an object
         ("value", np.int64, (MOST_VARIABLES,)),  # objects of variables
@@ -109,7 +126,7 @@ def encoded(program: ir.Program) -> Tape:
 
     Raises
     ------
-    Beyond
+    BeyondError
         There is no room for it in a work space.
     """
     writer = _Writer(program)
@@ -127,7 +144,7 @@ def encoded(program: ir.Program) -> Tape:
     }
     for what, (size, most) in sizes.items():
         if size > most:
-            raise ir.Beyond(f"{size} {what}, of which there may be {most}")
+            raise ir.BeyondError(f"{size} {what}, of which there may be {most}")
     return tape
 
 
@@ -222,7 +239,17 @@ class _Writer:
             self.col(*b.position, *b.extent)
         if self.program.dimensions == 3 or self._casts:
             self.col(*b.pose)
-        return [shape, len(b.outline), least, *b.position, *b.extent, b.angle, *b.velocity, *map(int, flags), *b.pose]
+        return [
+            shape,
+            len(b.outline),
+            least,
+            *b.position,
+            *b.extent,
+            b.angle,
+            *b.velocity,
+            *map(int, flags),
+            *b.pose,
+        ]
 
     def _sum(self, s: ir.Sum) -> int:
         at = self.num(*(w for _, w in s.terms))
@@ -263,9 +290,7 @@ class _Writer:
             written = []
             for rule in along:
                 pieces = [self._rule(piece) for piece in rule.pieces]
-                written.append(
-                    self.put(rule.operator == "max", rule.back, rule.forth, len(pieces), *pieces)
-                )
+                written.append(self.put(rule.operator == "max", rule.back, rule.forth, len(pieces), *pieces))
             rules.append(self.put(*written))
         chosen = [self.put(*row) for row in law.chosen]
         return self.put(ir.FRAMES.index(law.frame), *rules, *chosen)
@@ -371,16 +396,16 @@ class _Writer:
     def _answer(self, a: ir.Answer) -> int:
         features = [self._feature(f) for f in a.features]
         follows = [
-            v for f in a.follows for v in (f.register, *self.col(f.column), f.value, self.num(f.scale), f.scale == 0.0)
+            v
+            for f in a.follows
+            for v in (f.register, *self.col(f.column), f.value, self.num(f.scale), f.scale == 0.0)
         ]
         modes = [self._mode(mode) for mode in a.modes]
         stops = [self._stop(each) for each in a.stops]
         tree, outcomes = a.scope if a.scope is not None else (None, ())
         reach = a.reach or ir.Reach(a.column, -math.inf, math.inf)
         numbers = self.num(reach.least, reach.most, a.low[1], a.high[1])
-        lists = [
-            self.put(len(v), *v) for v in (list(a.needs), features, modes, stops)
-        ]
+        lists = [self.put(len(v), *v) for v in (list(a.needs), features, modes, stops)]
         at_follows = self.put(len(a.follows), *follows)
         state = ("modes", "lost", "none").index(a.state)
         return self.put(

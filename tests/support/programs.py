@@ -22,8 +22,7 @@ from relgym.model.prediction import BatchPrediction
 from relgym.model.querying import predict_many
 from relgym.model.running import Runner
 from relgym.program import kernel
-from relgym.scene.objects import Kinematics, ObjectType, SceneLayout, Target
-from relgym.scene.objects import POSE
+from relgym.scene.objects import POSE, Kinematics, ObjectType, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Prism, Sphere, Wedge
 
