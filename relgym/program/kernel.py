@@ -1494,7 +1494,7 @@ def players_of(code, numbers, s, a, mode, number, slot, tied):
 
 
 @compiled
-def by_modes(code, numbers, s, a, players):
+def by_modes(code, numbers, s, a, players, told, answer):
     """Value, outcome, mode and margin of an answer by modes (`relgym.model.answers`)."""
     x, target = s.x, code[a + 2]
     if code[a + 7] == 1:
@@ -1558,7 +1558,7 @@ def by_modes(code, numbers, s, a, players):
             for r in range(code[mode + 4]):
                 role = code[mode + 5 + r]
                 body = s.cast[0, code[role]]
-                players[code[role + 3]] = body
+                players[told, answer, code[role + 3]] = body
                 for k in range(code[role + 1]):
                     value += numbers[code[role + 2] + k] * x[code[role + 4 + k * code[BODIES] + body]]
         value = clip(numbers, x, code[a + 18], clipped, value)
@@ -1600,7 +1600,7 @@ def guessed(code, numbers, s, a):
 
 
 @compiled
-def step(code, numbers, s, outcomes, modes, margins, players, touched):
+def step(code, numbers, s, n, outcomes, modes, margins, told_at, players, touched):
     """One step of the scene whose present values stand in `s.x`; 0, or why not."""
     x, width = s.x, code[WIDTH]
     if code[BODIES]:
@@ -1618,7 +1618,6 @@ def step(code, numbers, s, outcomes, modes, margins, players, touched):
         features = code[a + 5]
         for f in range(code[features]):
             x[code[code[features + 1 + f]]] = product(code, x, code[features + 1 + f])
-        own = players[k]
         if code[a + 3] >= 0:
             body = code[a + 2]
             if s.body_flags[1, body]:
@@ -1626,13 +1625,13 @@ def step(code, numbers, s, outcomes, modes, margins, players, touched):
                 mode = np.int64(TOUCHING if s.body_flags[2, body] else FREE)
             else:
                 value, outcome, mode, margin = math.nan, OUTSIDE, np.int64(0), 0.0
-            touched[k] = hits(code, s, body)
+            touched[told_at, k] = hits(code, s, body)
         else:
-            value, outcome, mode, margin = by_modes(code, numbers, s, a, own)
-            touched[k] = mode
+            value, outcome, mode, margin = by_modes(code, numbers, s, a, players, told_at, k)
+            touched[told_at, k] = mode
         needs = code[a + 4]
-        for n in range(code[needs]):
-            if s.lost[code[needs + 1 + n]]:
+        for j in range(code[needs]):
+            if s.lost[code[needs + 1 + j]]:
                 outcome, margin = DEPENDS, 0.0
         told = math.isfinite(value)
         if told:
@@ -1641,13 +1640,13 @@ def step(code, numbers, s, outcomes, modes, margins, players, touched):
             if outcome == PREDICTED:
                 outcome = OUTSIDE
             value = guessed(code, numbers, s, a)
-            touched[k] = 0
+            touched[told_at, k] = 0
             if math.isfinite(value):
-                touched[k] = -2 if beyond(code, numbers, s, a) else -1
+                touched[told_at, k] = -2 if beyond(code, numbers, s, a) else -1
                 x[width + column] = value
         known = told and outcome == PREDICTED
-        outcomes[k], margins[k] = outcome, margin
-        modes[k] = mode if known or (told and outcome == UNEXPLAINED) else 0
+        outcomes[n, k], margins[n, k] = outcome, margin
+        modes[n, k] = mode if known or (told and outcome == UNEXPLAINED) else 0
         if not known:
             s.lost[code[a + 1]] = 1
     for k in range(code[KINEMATICS]):
@@ -1702,7 +1701,7 @@ def run(code, numbers, spaces, vectors, following, outcomes, modes, margins, pla
             column = code[code[AT_NEXTS] + k]
             s.x[width + column] = s.x[column]
         told = n if n < len(players) else 0
-        bad = step(code, numbers, s, outcomes[n], modes[n], margins[n], players[told], touched[told])
+        bad = step(code, numbers, s, n, outcomes, modes, margins, told, players, touched)
         if bad:
             return bad
         for k in range(code[NEXTS]):

@@ -175,13 +175,13 @@ class _Source:
         add("LAWS = (")
         for number, law in enumerate(m.laws):
             frame = letters[law.frame]
-            rules = [
+            written = [
                 "("
                 + " ".join(f"(law{number}_{frame[a]}{k}, {r.back}, {r.forth})," for k, r in enumerate(some))
                 + ")"
                 for a, some in enumerate(law.rules)
             ]
-            add(f"    ({law.frame!r}, ({rules[0]}, {rules[1]}), {law.chosen!r}),")
+            add(f"    ({law.frame!r}, ({written[0]}, {written[1]}), {law.chosen!r}),")
         add(")")
         add(
             "# pairs that may meet: first and second body, share (a number, or two columns and a power), grip"

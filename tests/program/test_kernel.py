@@ -6,50 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dreams import cart_model, flat_model, line_model, lost_model, room_model
+from dreams import room_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from programs import Array, assert_alike, books, crowded, lawful, room_schema, runner, with_laws
+from programs import MODELS, assert_alike, books, crowded, lawful, room_schema, runner, scenes_of, with_laws
 
 from relgym.experiments.law_trials import TRIALS
 from relgym.laws.learner import LawLearner
-from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Scene, SceneLayout
-
-MODELS = {
-    "cart": cart_model,
-    "cart with a lost velocity": lost_model,
-    "flat numbers": flat_model,
-    "room by laws": lambda: room_model("auto"),
-    "room by modes": room_model,
-    "line with roles": line_model,
-}
-
-
-def scenes_of(model: WorldModel, count: int, seed: int = 0) -> tuple[SceneLayout, Array]:
-    """Scenes near those that a model has seen, some of them far off."""
-    table = next(iter(model._parts.tables.values()))
-    assert len(table)
-    from relgym.envs.learned_model_setting import recorded
-
-    starts = recorded(model).starts
-    names = [name for name in model.schema.order if name not in starts[0].layout.names]
-    layout = model.schema.layout([*starts[0].layout.names, *names])
-    rng = np.random.default_rng(seed)
-    rows = []
-    for k in range(count):
-        start = starts[k % len(starts)]
-        parts = {o.name: o.values.copy() for o in start}
-        for name in names:
-            parts[name] = rng.uniform(0.0, 5.0, len(model.schema.type_of(name).properties))
-        rows.append(np.concatenate([parts[name] for name in layout.names]))
-    vectors = np.array(rows)
-    moved = np.ones(layout.width, dtype=bool)
-    for index in layout.bodies:
-        sizes = [layout.offsets[index] + k for k in layout.types[index].pose_columns()[3:] if k >= 0]
-        moved[sizes] = False
-    noise = rng.normal(size=vectors.shape) * moved * rng.choice([0.0, 1e-3, 0.3], size=(count, 1))
-    return layout, vectors + noise
+from relgym.scene.objects import Scene
 
 
 @pytest.mark.parametrize("name", MODELS)

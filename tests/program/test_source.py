@@ -12,8 +12,7 @@ import pytest
 from dreams import line_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from programs import arrays, books, crowded, room_schema, with_laws
-from test_kernel import MODELS, scenes_of
+from programs import MODELS, arrays, books, crowded, room_schema, scenes_of, with_laws
 
 from relgym.errors import ConfigError
 from relgym.laws.learner import LawLearner

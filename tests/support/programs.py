@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from dreams import cart_model, flat_model, line_model, lost_model, room_model
 from hypothesis import strategies as st
-from law_streams import taught
+from law_streams import Stream, taught
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
+from relgym.envs.learned_model_setting import recorded
 from relgym.experiments.law_trials import Trial, trial_rooms
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
@@ -21,6 +23,7 @@ from relgym.model.parts import Parts
 from relgym.model.prediction import BatchPrediction
 from relgym.model.querying import predict_many
 from relgym.model.running import Runner
+from relgym.model.world_model import WorldModel
 from relgym.program import kernel
 from relgym.scene.objects import POSE, Kinematics, ObjectType, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
@@ -55,7 +58,6 @@ def assert_alike(parts: Parts, layout: SceneLayout, vectors: Array, tolerance: f
 
 def lawful(trial: Trial, *, seed: int = 1, count: int = 3) -> tuple[Parts, SceneLayout, Array]:
     """Parts of a model that knows the laws of a trial world, and scenes of others of its rooms."""
-    from law_streams import Stream
 
     def streams(seed: int, rooms: int) -> Iterable[Stream]:
         found = trial_rooms(trial.world, rooms, seed=seed, steps=150)
@@ -74,6 +76,40 @@ def with_laws(schema: SceneSchema, learner: LawLearner) -> Parts:
     parts.laws.learner = learner
     parts.laws.governed = frozenset(learner.types)
     return parts
+
+
+MODELS = {
+    "cart": cart_model,
+    "cart with a lost velocity": lost_model,
+    "flat numbers": flat_model,
+    "room by laws": lambda: room_model("auto"),
+    "room by modes": room_model,
+    "line with roles": line_model,
+}
+
+
+def scenes_of(model: WorldModel, count: int, seed: int = 0) -> tuple[SceneLayout, Array]:
+    """Scenes near those that a model has seen, some of them far off."""
+    table = next(iter(model._parts.tables.values()))
+    assert len(table)
+    starts = recorded(model).starts
+    names = [name for name in model.schema.order if name not in starts[0].layout.names]
+    layout = model.schema.layout([*starts[0].layout.names, *names])
+    rng = np.random.default_rng(seed)
+    rows = []
+    for k in range(count):
+        start = starts[k % len(starts)]
+        parts = {o.name: o.values.copy() for o in start}
+        for name in names:
+            parts[name] = rng.uniform(0.0, 5.0, len(model.schema.type_of(name).properties))
+        rows.append(np.concatenate([parts[name] for name in layout.names]))
+    vectors = np.array(rows)
+    moved = np.ones(layout.width, dtype=bool)
+    for index in layout.bodies:
+        sizes = [layout.offsets[index] + k for k in layout.types[index].pose_columns()[3:] if k >= 0]
+        moved[sizes] = False
+    noise = rng.normal(size=vectors.shape) * moved * rng.choice([0.0, 1e-3, 0.3], size=(count, 1))
+    return layout, vectors + noise
 
 
 # ---------------------------------------------------------------------- worlds that hypothesis makes up
