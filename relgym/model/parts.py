@@ -92,7 +92,7 @@ class Parts:
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_kin": {}, "_known": {}}  # keyed by identity, which a copy doesn't share
 
-    def admits(self, scene: Scene) -> bool:
+    def admits(self, scene: object) -> bool:
         """Whether a scene is known to follow the schema and holds finite numbers; sizes aren't asked."""
         if not isinstance(scene, Scene):
             return False

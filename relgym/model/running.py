@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,11 +56,8 @@ class Programs:
         self._known: dict[int, tuple[SceneLayout, Parts, Runner | None]] = {}
         self._asked = 0
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__()  # type: ignore[misc]
+    def __reduce__(self) -> tuple[type[Programs], tuple[()]]:
+        return Programs, ()
 
     def changed(self) -> None:
         """The model isn't what it was: programs are out of date."""
@@ -117,6 +114,17 @@ def _kernel() -> ModuleType | None:
     return _loaded[0]
 
 
+class _Told(NamedTuple):
+    """What the kernel writes, in the order in which it takes it."""
+
+    following: NDArray[np.float64]
+    outcomes: NDArray[np.int8]
+    modes: _Bits
+    margins: NDArray[np.float64]
+    players: _Bits
+    noted: _Bits
+
+
 class Runner:
     """Runs the program of one model for one layout.
 
@@ -134,74 +142,63 @@ class Runner:
         self._space = np.zeros(1, dtype=SPACE)
         if self._space.dtype.fields is not None and not hasattr(kernel.run, "py_func"):
             self._space = self._space.view(np.recarray)  # interpreted (NUMBA_DISABLE_JIT)
-        count = len(program.answers)
-        self._players = np.full((1, count, self._tape.roles), -1, dtype=np.int64)
-        self._noted = np.zeros((1, count), dtype=np.int64)
         pair = None if parts.laws is None else parts.laws.learner.book.pair
         self._frame = "world" if pair is None else pair.frame
         self._keys = tuple((a.object, a.property) for a in program.answers)
         self._frames = tuple(self._frame if a.component >= 0 else "world" for a in program.answers)
-        self._one = (
-            np.empty((1, count), dtype=np.int8),
-            np.empty((1, count), dtype=np.int64),
-            np.empty((1, count)),
-        )
-        self._tellers = tuple(_Teller(parts, layout, a) for a in program.answers)
+        self._tellers = tuple(_Teller(parts, layout, a, self._frame) for a in program.answers)
 
     def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """Predict what follows n scenes; None: arrays must, or can say why not."""
-        n, count = len(vectors), len(self._keys)
         with np.errstate(over="ignore", invalid="ignore"):
             total = float(vectors.sum())
         if (
             not math.isfinite(total) and not np.isfinite(vectors).all()
-        ):  # finite numbers, too, may add up to infinity
+        ):  # finite numbers may add up to infinity
             return None
-        following = vectors.copy()
-        outcomes, modes = np.empty((n, count), dtype=np.int8), np.empty((n, count), dtype=np.int64)
-        margins = np.empty((n, count))
-        tape = self._tape
-        if self._run(
-            tape.code, tape.numbers, self._space, vectors, following, outcomes, modes, margins, self._players,
-            self._noted,
-        ):  # fmt: skip
+        told = self._told(vectors)
+        if told is None:
             return None
-        return BatchPrediction(self._layout, following, self._keys, modes, outcomes, margins, self._frames)
+        return BatchPrediction(
+            self._layout, told.following, self._keys, told.modes, told.outcomes, told.margins, self._frames
+        )
 
     def one(self, scene: Scene) -> ScenePrediction | None:
-        """Predict what follows one scene; None: arrays must, or can say why not."""
-        vectors = scene.vector[None]
-        following = vectors.copy()
-        outcomes, modes, margins = self._one
-        tape = self._tape
-        if self._run(
-            tape.code, tape.numbers, self._space, vectors, following, outcomes, modes, margins, self._players,
-            self._noted,
-        ):  # fmt: skip
+        """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not."""
+        now = scene.vector
+        told = self._told(now[None])
+        if told is None:
             return None
-        after, now = following[0], scene.vector
-        told = zip(
-            self._tellers,
-            outcomes[0].tolist(),
-            modes[0].tolist(),
-            margins[0].tolist(),
-            self._noted[0].tolist(),
-            strict=True,
-        )
+        after, players = told.following[0], told.players[0]
+        outcomes, modes = told.outcomes[0].tolist(), told.modes[0].tolist()
+        margins, noted = told.margins[0].tolist(), told.noted[0].tolist()
         found = tuple(
-            teller.tell(now, after, outcome, mode, margin, noted, self._players[0, k], self._frame)
-            for k, (teller, outcome, mode, margin, noted) in enumerate(told)
+            teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
+            for k, teller in enumerate(self._tellers)
         )
         return ScenePrediction(Scene(scene.schema, self._layout, after), found)
+
+    def _told(self, vectors: NDArray[np.float64]) -> _Told | None:
+        """Run the program. What it writes to is new each time: another thread may ask before this one has read it."""
+        n, count = len(vectors), len(self._keys)
+        told = _Told(
+            vectors.copy(),
+            np.empty((n, count), dtype=np.int8),
+            np.empty((n, count), dtype=np.int64),
+            np.empty((n, count)),
+            np.empty((1, count, self._tape.roles), dtype=np.int64),
+            np.zeros((1, count), dtype=np.int64),
+        )
+        return None if self._run(self._tape.code, self._tape.numbers, self._space, vectors, *told) else told
 
 
 class _Teller:
     """What is told of one answer to a single scene: who plays which role, and the spread."""
 
-    __slots__ = ("_answer", "_body_names", "_modes", "_parts", "_spreads", "_stand_ins")
+    __slots__ = ("_answer", "_body_names", "_frame", "_modes", "_spreads", "_stand_ins")
 
-    def __init__(self, parts: Parts, layout: SceneLayout, answer: Answer) -> None:
-        self._answer, self._parts = answer, parts
+    def __init__(self, parts: Parts, layout: SceneLayout, answer: Answer, frame: str) -> None:
+        self._answer, self._frame = answer, frame
         self._body_names = tuple(layout.names[i] for i in layout.bodies)
         self._modes = {mode.id: mode for mode in answer.modes}
         index = layout.index(answer.object)
@@ -226,7 +223,6 @@ class _Teller:
         margin: float,
         noted: int,
         players: _Bits,
-        frame: str,
     ) -> Prediction:
         """The prediction of a scene; `noted` is the mode that gave the value, or of laws whom the body touches."""
         a = self._answer
@@ -243,7 +239,7 @@ class _Teller:
                 roles = self._roles(mode, players)
         if noted < 0:  # a fallback value
             spread = self._stand_ins[1] if noted == -2 and self._stand_ins[2] else self._stand_ins[0]
-        said = frame if mode == TOUCHING and a.component >= 0 else "world"
+        said = self._frame if mode == TOUCHING and a.component >= 0 else "world"
         return Prediction(a.object, a.property, value, OUTCOMES[outcome], mode, roles, margin, said, spread)
 
     def _roles(self, mode: int, players: _Bits) -> tuple[str, ...]:
