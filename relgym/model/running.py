@@ -25,7 +25,7 @@ from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Predicti
 from relgym.model.spread import Spreads, action_columns
 from relgym.model.spread_split import place_of
 from relgym.program.records import Answer, BeyondError, Program
-from relgym.program.tape import SPACE, encoded
+from relgym.program.tape import encoded
 from relgym.scene.objects import Scene, SceneLayout
 
 if TYPE_CHECKING:
@@ -137,9 +137,9 @@ class Runner:
     def __init__(self, parts: Parts, layout: SceneLayout, program: Program, kernel: ModuleType) -> None:
         self._parts, self._layout = parts, layout
         self.program = program
-        self._tape = encoded(program)
+        tape = encoded(program)
         self._run = kernel.run
-        self._space = np.zeros(1, dtype=SPACE)
+        self._roles, self._space = tape.roles, tape.space()
         if self._space.dtype.fields is not None and not hasattr(kernel.run, "py_func"):
             self._space = self._space.view(np.recarray)  # interpreted (NUMBA_DISABLE_JIT)
         pair = None if parts.laws is None else parts.laws.learner.book.pair
@@ -186,10 +186,10 @@ class Runner:
             np.empty((n, count), dtype=np.int8),
             np.empty((n, count), dtype=np.int64),
             np.empty((n, count)),
-            np.empty((1, count, self._tape.roles), dtype=np.int64),
+            np.empty((1, count, self._roles), dtype=np.int64),
             np.zeros((1, count), dtype=np.int64),
         )
-        return None if self._run(self._tape.code, self._tape.numbers, self._space, vectors, *told) else told
+        return None if self._run(self._space, vectors, *told) else told
 
 
 class _Teller:

@@ -128,15 +128,28 @@ def smallest(a: float, b: float) -> float:
 
 
 @compiled
-def total(code, numbers, x, at):
+def total(s, at):
     """A sum of weighted registers."""
-    value, weight = 0.0, code[at + 1]
-    for k in range(code[at]):
-        column = code[at + 2 + k]
+    value, weight = 0.0, s.code[at + 1]
+    for k in range(s.code[at]):
+        column = s.code[at + 2 + k]
         if column < 0:
-            value += numbers[weight + k]
+            value += s.numbers[weight + k]
         else:
-            value += numbers[weight + k] * x[column]
+            value += s.numbers[weight + k] * s.x[column]
+    return value
+
+
+@compiled
+def piece(s, at):
+    """A sum over what laws read of a contact."""
+    value, weight = 0.0, s.code[at + 1]
+    for k in range(s.code[at]):
+        column = s.code[at + 2 + k]
+        if column < 0:
+            value += s.numbers[weight + k]
+        else:
+            value += s.numbers[weight + k] * s.features[column]
     return value
 
 
@@ -150,32 +163,32 @@ def mixed(h):
 
 # ---------------------------------------------------------------------------------------------- shapes
 @compiled
-def look(code, numbers, s):
+def look(s):
     """Take up the bodies of a scene: places, bounding boxes; 0, or `BAD_SIZE`."""
     x, body = s.x, s.body
-    precision = numbers[PRECISION]
+    precision = s.numbers[PRECISION]
     s.masks[5] += 3  # what is known of other scenes' pairs is out of date
-    for k in range(code[BODIES]):
-        at = code[AT_BODIES] + BODY * k
-        body[k, BX], body[k, BY] = x[code[at + COL_X]], x[code[at + COL_Y]]
-        width, height = x[code[at + COL_SX]], x[code[at + COL_SY]]
+    for k in range(s.code[BODIES]):
+        at = s.code[AT_BODIES] + BODY * k
+        body[k, BX], body[k, BY] = x[s.code[at + COL_X]], x[s.code[at + COL_Y]]
+        width, height = x[s.code[at + COL_SX]], x[s.code[at + COL_SY]]
         if not (width > 0.0 and height > 0.0):
             return BAD_SIZE
         s.placed[k] = 0
-        if code[DIMENSIONS] == 3:
-            depth = x[code[at + COL_SZ]]
+        if s.code[DIMENSIONS] == 3:
+            depth = x[s.code[at + COL_SZ]]
             if not depth > 0.0:
                 return BAD_SIZE
-            if code[at + SHAPE] == 0 and max(abs(depth - width), abs(height - width)) > ROUND * width:
+            if s.code[at + SHAPE] == 0 and max(abs(depth - width), abs(height - width)) > ROUND * width:
                 return BAD_SIZE
             for d in range(3, 6):
-                if code[at + SHAPE] != 0 and x[code[at + POSE + d]] != 0.0:
+                if s.code[at + SHAPE] != 0 and x[s.code[at + POSE + d]] != 0.0:
                     return TURNED
             for d in range(3):
-                body[k, BX + d] = x[code[at + COL_X + d]]
-                half = 0.5 * (width if code[at + SHAPE] == 0 else x[code[at + COL_SX + d]])
+                body[k, BX + d] = x[s.code[at + COL_X + d]]
+                half = 0.5 * (width if s.code[at + SHAPE] == 0 else x[s.code[at + COL_SX + d]])
                 body[k, LOW_X + d], body[k, HIGH_X + d] = -half, half
-        elif code[at + SHAPE] == 0:
+        elif s.code[at + SHAPE] == 0:
             if abs(height - width) > ROUND * width:
                 return BAD_SIZE
             radius = 0.5 * width
@@ -185,15 +198,15 @@ def look(code, numbers, s):
                 radius,
                 radius,
             )
-        elif x[code[at + COL_ANGLE]] == 0.0:
-            n = code[at + OUTLINE]
-            body[k, LOW_X], body[k, LOW_Y] = numbers[n] * width, numbers[n + 1] * height
-            body[k, HIGH_X], body[k, HIGH_Y] = numbers[n + 2] * width, numbers[n + 3] * height
+        elif x[s.code[at + COL_ANGLE]] == 0.0:
+            n = s.code[at + OUTLINE]
+            body[k, LOW_X], body[k, LOW_Y] = s.numbers[n] * width, s.numbers[n + 1] * height
+            body[k, HIGH_X], body[k, HIGH_Y] = s.numbers[n + 2] * width, s.numbers[n + 3] * height
         else:
-            place(code, numbers, s, k)
+            place(s, k)
             least_x = least_y = math.inf
             most_x = most_y = -math.inf
-            for v in range(code[at + CORNERS]):
+            for v in range(s.code[at + CORNERS]):
                 least_x, most_x = min(least_x, s.edge[0, k, v]), max(most_x, s.edge[0, k, v])
                 least_y, most_y = min(least_y, s.edge[1, k, v]), max(most_y, s.edge[1, k, v])
             body[k, LOW_X], body[k, LOW_Y], body[k, HIGH_X], body[k, HIGH_Y] = (
@@ -205,29 +218,29 @@ def look(code, numbers, s):
         if precision != 0.0:
             size = speed = 1.0
             for column in (COL_X, COL_Y, COL_Z, COL_SX, COL_SY, COL_SZ):
-                size = max(size, abs(x[code[at + column]]))
+                size = max(size, abs(x[s.code[at + column]]))
             for column in (COL_VX, COL_VY, COL_VZ):
-                speed = max(speed, abs(x[code[at + column]]))
+                speed = max(speed, abs(x[s.code[at + column]]))
             body[k, SIZE], body[k, SPEED] = size, speed
     return 0
 
 
 @compiled
-def place(code, numbers, s, k):
+def place(s, k):
     """Work out a polygon's edges: where they start, relative to its place, their outward normals and lengths."""
     if s.placed[k]:
         return
     s.placed[k] = 1
-    at = code[AT_BODIES] + BODY * k
-    count, n = code[at + CORNERS], code[at + OUTLINE] + 4
-    width, height = s.x[code[at + COL_SX]], s.x[code[at + COL_SY]]
-    angle = s.x[code[at + COL_ANGLE]] * numbers[TURN]
+    at = s.code[AT_BODIES] + BODY * k
+    count, n = s.code[at + CORNERS], s.code[at + OUTLINE] + 4
+    width, height = s.x[s.code[at + COL_SX]], s.x[s.code[at + COL_SY]]
+    angle = s.x[s.code[at + COL_ANGLE]] * s.numbers[TURN]
     cos, sin = (1.0, 0.0) if angle == 0.0 else (math.cos(angle), math.sin(angle))
     for v in range(count):
         w = v + 1 if v + 1 < count else 0
-        a, b = numbers[n + 2 * v] * width, numbers[n + 2 * v + 1] * height
-        along = (numbers[n + 2 * w] - numbers[n + 2 * v]) * width
-        up = (numbers[n + 2 * w + 1] - numbers[n + 2 * v + 1]) * height
+        a, b = s.numbers[n + 2 * v] * width, s.numbers[n + 2 * v + 1] * height
+        along = (s.numbers[n + 2 * w] - s.numbers[n + 2 * v]) * width
+        up = (s.numbers[n + 2 * w + 1] - s.numbers[n + 2 * v + 1]) * height
         if up == 0.0:  # what the root and the quotients would be, to the last bit
             length, across, down = abs(along), 0.0, -1.0 if along > 0.0 else 1.0
         elif along == 0.0:
@@ -370,44 +383,49 @@ def solids(s, i, j, kind):
 
 
 @compiled
-def measure(code, numbers, s, i, j):
+def measure(s, i, j):
     """Signed distance of bodies i < j; the normal points from j to i."""
     now = s.masks[5]
     if s.known[0, i, j] == now:
         return s.gap[0, i, j]
     s.known[0, i, j] = now
-    a, b = code[AT_BODIES] + BODY * i, code[AT_BODIES] + BODY * j
-    kind_a, kind_b = code[a + SHAPE], code[b + SHAPE]
-    if code[DIMENSIONS] == 3:
+    a, b = s.code[AT_BODIES] + BODY * i, s.code[AT_BODIES] + BODY * j
+    kind_a, kind_b = s.code[a + SHAPE], s.code[b + SHAPE]
+    if s.code[DIMENSIONS] == 3:
         solids(s, i, j, kind_a)
         return s.gap[0, i, j]
     x, y = s.body[i, BX] - s.body[j, BX], s.body[i, BY] - s.body[j, BY]
-    wide_a, wide_b = s.x[code[a + COL_SX]], s.x[code[b + COL_SX]]
+    wide_a, wide_b = s.x[s.code[a + COL_SX]], s.x[s.code[b + COL_SX]]
     if kind_a == 0 and kind_b == 0:
         d, nx, ny = discs(x, y, 0.5 * wide_a + 0.5 * wide_b)
     elif kind_a == 0:
-        place(code, numbers, s, j)
-        d, nx, ny = disc_and_polygon(x, y, 0.5 * wide_a, s.edge, j, code[b + CORNERS])
+        place(s, j)
+        d, nx, ny = disc_and_polygon(x, y, 0.5 * wide_a, s.edge, j, s.code[b + CORNERS])
     elif kind_b == 0:
-        place(code, numbers, s, i)
-        d, nx, ny = disc_and_polygon(-x, -y, 0.5 * wide_b, s.edge, i, code[a + CORNERS])
+        place(s, i)
+        d, nx, ny = disc_and_polygon(-x, -y, 0.5 * wide_b, s.edge, i, s.code[a + CORNERS])
         nx, ny = -nx, -ny
-    elif kind_a == 2 and kind_b == 2 and s.x[code[a + COL_ANGLE]] == 0.0 and s.x[code[b + COL_ANGLE]] == 0.0:
-        tall_a, tall_b = s.x[code[a + COL_SY]], s.x[code[b + COL_SY]]
+    elif (
+        kind_a == 2
+        and kind_b == 2
+        and s.x[s.code[a + COL_ANGLE]] == 0.0
+        and s.x[s.code[b + COL_ANGLE]] == 0.0
+    ):
+        tall_a, tall_b = s.x[s.code[a + COL_SY]], s.x[s.code[b + COL_SY]]
         d, nx, ny = boxes(x, y, 0.5 * wide_a + 0.5 * wide_b, 0.5 * tall_a + 0.5 * tall_b)
     else:
-        place(code, numbers, s, i)
-        place(code, numbers, s, j)
-        d, nx, ny = polygons(x, y, s.edge, i, code[a + CORNERS], j, code[b + CORNERS])
+        place(s, i)
+        place(s, j)
+        d, nx, ny = polygons(x, y, s.edge, i, s.code[a + CORNERS], j, s.code[b + CORNERS])
     s.gap[0, i, j], s.gap[1, i, j], s.gap[2, i, j] = d, nx, ny
     return d
 
 
 @compiled
-def apart(code, s, i, j):
+def apart(s, i, j):
     """Gap of the bounding boxes of two bodies: no more than their distance, but for rounding."""
     body, widest = s.body, -math.inf
-    for d in range(code[DIMENSIONS]):
+    for d in range(s.code[DIMENSIONS]):
         x = body[i, BX + d] - body[j, BX + d]
         gap = max(body[i, LOW_X + d] + x - body[j, HIGH_X + d], body[j, LOW_X + d] - x - body[i, HIGH_X + d])
         widest = max(widest, gap)
@@ -415,25 +433,25 @@ def apart(code, s, i, j):
 
 
 @compiled
-def limit(numbers, s, i, j, least, size):
+def limit(s, i, j, least, size):
     """Distance up to which two bodies touch, or speed up to which they don't part."""
-    if numbers[PRECISION] == 0.0:
-        return numbers[least]
-    return numbers[least] + numbers[PRECISION] * max(s.body[i, size], s.body[j, size])
+    if s.numbers[PRECISION] == 0.0:
+        return s.numbers[least]
+    return s.numbers[least] + s.numbers[PRECISION] * max(s.body[i, size], s.body[j, size])
 
 
 @compiled
-def touch(code, numbers, s, i, j):
+def touch(s, i, j):
     """Whether two bodies touch. Those whose bounding boxes are clear of each other aren't measured."""
     if i > j:
         i, j = j, i
     now = s.masks[5]
     if s.known[1, i, j] < now:
-        most = limit(numbers, s, i, j, TOUCH, SIZE)
-        if s.known[0, i, j] != now and apart(code, s, i, j) > max(CLEAR, 2.0 * most):
+        most = limit(s, i, j, TOUCH, SIZE)
+        if s.known[0, i, j] != now and apart(s, i, j) > max(CLEAR, 2.0 * most):
             s.known[1, i, j] = now
         else:
-            s.known[1, i, j] = now + 1 if measure(code, numbers, s, i, j) <= most else now
+            s.known[1, i, j] = now + 1 if measure(s, i, j) <= most else now
     return s.known[1, i, j] == now + 1
 
 
@@ -483,38 +501,37 @@ def push(point, v, c, a, b, x, y):
 
 
 @compiled
-def rule(code, numbers, at, features):
+def rule(s, at):
     """The velocity after a contact along one axis: maximum or minimum of pieces."""
-    value = total(code, numbers, features, code[at + 4])
-    for k in range(1, code[at + 3]):
-        other = total(code, numbers, features, code[at + 4 + k])
-        value = largest(value, other) if code[at] else smallest(value, other)
+    value = piece(s, s.code[at + 4])
+    for k in range(1, s.code[at + 3]):
+        other = piece(s, s.code[at + 4 + k])
+        value = largest(value, other) if s.code[at] else smallest(value, other)
     return value
 
 
 @compiled
-def respond(code, numbers, law, pair, c, now_x, now_y, free_x, free_y, features):
+def respond(s, law, pair, c, now_x, now_y, free_x, free_y):
     """Change of the relative velocity at a contact (`relgym.laws.composition.respond`)."""
-    ax, ay, bx, by = axes(code[law], c, free_x, free_y)
-    features[0], features[1] = free_x * ax + free_y * ay, now_x * ax + now_y * ay
-    features[2], features[3] = free_x * bx + free_y * by, now_x * bx + now_y * by
+    ax, ay, bx, by = axes(s.code[law], c, free_x, free_y)
+    s.features[0], s.features[1] = free_x * ax + free_y * ay, now_x * ax + now_y * ay
+    s.features[2], s.features[3] = free_x * bx + free_y * by, now_x * bx + now_y * by
     change_x = change_y = 0.0
     for k in range(2):
-        number = code[code[law + 3 + k] + pair]
-        u = features[2 * k]
-        after = u if number < 0 else rule(code, numbers, code[code[law + 1 + k] + number], features)
-        features[4 + k] = after - u
-        change_x += features[4 + k] * (ax if k == 0 else bx)
-        change_y += features[4 + k] * (ay if k == 0 else by)
+        number = s.code[s.code[law + 3 + k] + pair]
+        u = s.features[2 * k]
+        after = u if number < 0 else rule(s, s.code[s.code[law + 1 + k] + number])
+        s.features[4 + k] = after - u
+        change_x += s.features[4 + k] * (ax if k == 0 else bx)
+        change_y += s.features[4 + k] * (ay if k == 0 else by)
     return change_x, change_y
 
 
 @compiled
-def compose(code, numbers, law, s, count, bodies, spins, out):
+def compose(s, law, count, bodies, spins, out):
     """Let all contacts act until nothing changes (`relgym.laws.composition.compose`); whether it settled."""
     now, free, v = s.velocity[0], s.velocity[1], s.velocity[out]
-    point = code[law] == 1
-    features = s.features
+    point = s.code[law] == 1
     worst = 0.0
     for k in range(bodies):
         for d in range(3 if spins else 2):
@@ -529,7 +546,7 @@ def compose(code, numbers, law, s, count, bodies, spins, out):
             c, pair, a, b = s.contact[k], s.pair[k, 0], s.pair[k, 1], s.pair[k, 2]
             x, y = relative(point, v, c, a, b)
             now_x, now_y = relative(point, now, c, a, b)
-            new_x, new_y = respond(code, numbers, law, pair, c, now_x, now_y, x - c[JX], y - c[JY], features)
+            new_x, new_y = respond(s, law, pair, c, now_x, now_y, x - c[JX], y - c[JY])
             c[DX], c[DY] = new_x - c[JX], new_y - c[JY]
             push(point, v, c, a, b, c[DX], c[DY])
             c[JX], c[JY] = new_x, new_y
@@ -565,36 +582,36 @@ def leap(point, s, count, v):
 
 
 @compiled
-def within(code, numbers, law, s, count, v):
+def within(s, law, count, v):
     """Whether no contact turns a body back in a sense in which none was seen to (`relgym.laws.composition.within`)."""
-    slack, point = numbers[SLACK], code[law] == 1
+    slack, point = s.numbers[SLACK], s.code[law] == 1
     for k in range(count):
         c, pair = s.contact[k], s.pair[k, 0]
         after_x, after_y = relative(point, v, c, s.pair[k, 1], s.pair[k, 2])
         free_x, free_y = after_x - c[JX], after_y - c[JY]
-        ax, ay, bx, by = axes(code[law], c, free_x, free_y)
+        ax, ay, bx, by = axes(s.code[law], c, free_x, free_y)
         for j in range(2):
             x, y = (ax, ay) if j == 0 else (bx, by)
             value, without = after_x * x + after_y * y, free_x * x + free_y * y
-            number = code[code[law + 3 + j] + pair]
+            number = s.code[s.code[law + 3 + j] + pair]
             if number < 0:
                 return False
-            at = code[code[law + 1 + j] + number]
-            if value < -slack and without >= -slack and not code[at + 1]:
+            at = s.code[s.code[law + 1 + j] + number]
+            if value < -slack and without >= -slack and not s.code[at + 1]:
                 return False
-            if value > slack and without <= slack and not code[at + 2]:
+            if value > slack and without <= slack and not s.code[at + 2]:
                 return False
     return True
 
 
 @compiled
-def meet(code, numbers, s):
+def meet(s):
     """Find the contacts of those who move; how many there are."""
     count = 0
-    for pair in range(code[PAIRS]):
-        at = code[AT_PAIRS] + 6 * pair
-        a, b = code[at], code[at + 1]
-        if not touch(code, numbers, s, a, b):
+    for pair in range(s.code[PAIRS]):
+        at = s.code[AT_PAIRS] + 6 * pair
+        a, b = s.code[at], s.code[at + 1]
+        if not touch(s, a, b):
             continue
         if count == MOST_CONTACTS:
             return -1
@@ -607,17 +624,17 @@ def meet(code, numbers, s):
         length = math.sqrt(x * x + y * y)
         length = length if length > 0.0 else 1.0
         c[CX], c[CY] = x / length, y / length
-        first, second = code[AT_BODIES] + BODY * a, code[AT_BODIES] + BODY * b
-        angle = numbers[TURN] * s.x[code[first + COL_ANGLE]]
+        first, second = s.code[AT_BODIES] + BODY * a, s.code[AT_BODIES] + BODY * b
+        angle = s.numbers[TURN] * s.x[s.code[first + COL_ANGLE]]
         c[COS], c[SIN] = math.cos(angle), math.sin(angle)
-        c[ARM_A] = 0.5 * numbers[TURN] * s.x[code[first + COL_SX]] if code[first + SPINS] else 0.0
-        c[ARM_B] = 0.5 * numbers[TURN] * s.x[code[second + COL_SX]] if code[second + SPINS] else 0.0
-        c[GRIP] = numbers[code[at + 5] + 1] if c[ARM_A] != 0.0 or c[ARM_B] != 0.0 else 1.0
-        c[SHARE] = numbers[code[at + 5]]
-        if code[at + 2]:
+        c[ARM_A] = 0.5 * s.numbers[TURN] * s.x[s.code[first + COL_SX]] if s.code[first + SPINS] else 0.0
+        c[ARM_B] = 0.5 * s.numbers[TURN] * s.x[s.code[second + COL_SX]] if s.code[second + SPINS] else 0.0
+        c[GRIP] = s.numbers[s.code[at + 5] + 1] if c[ARM_A] != 0.0 or c[ARM_B] != 0.0 else 1.0
+        c[SHARE] = s.numbers[s.code[at + 5]]
+        if s.code[at + 2]:
             mine = theirs = 1.0
-            for _ in range(code[at + 2]):
-                mine, theirs = mine * s.x[code[at + 3]], theirs * s.x[code[at + 4]]
+            for _ in range(s.code[at + 2]):
+                mine, theirs = mine * s.x[s.code[at + 3]], theirs * s.x[s.code[at + 4]]
             both = mine + theirs
             c[SHARE] = math.nan if both == 0.0 else theirs / both
         count += 1
@@ -625,51 +642,59 @@ def meet(code, numbers, s):
 
 
 @compiled
-def move(code, numbers, s):
+def move(s):
     """Next velocities of all movers (`relgym.laws.book.LawBook.motion`); the number of contacts, -1: too many."""
-    bodies, x = code[BODIES], s.x
+    bodies, x = s.code[BODIES], s.x
     now, free, v, flags = s.velocity[0], s.velocity[1], s.velocity[2], s.body_flags
     spins = False
     for k in range(bodies):
-        at = code[AT_BODIES] + BODY * k
-        now[0, k], now[1, k], now[2, k] = x[code[at + COL_VX]], x[code[at + COL_VY]], x[code[at + COL_SPIN]]
+        at = s.code[AT_BODIES] + BODY * k
+        now[0, k], now[1, k], now[2, k] = (
+            x[s.code[at + COL_VX]],
+            x[s.code[at + COL_VY]],
+            x[s.code[at + COL_SPIN]],
+        )
         free[0, k], free[1, k], free[2, k] = now[0, k], now[1, k], now[2, k]
         flags[0, k] = flags[1, k] = flags[2, k] = 0
-        spins = spins or code[at + SPINS] == 1
-    for m in range(code[MOVERS]):
-        at = code[code[AT_MOVERS] + m]
-        k = code[at]
-        for d in range(code[at + 2]):
+        spins = spins or s.code[at + SPINS] == 1
+    for m in range(s.code[MOVERS]):
+        at = s.code[s.code[AT_MOVERS] + m]
+        k = s.code[at]
+        for d in range(s.code[at + 2]):
             free[d, k] = math.nan
-        for d in range(code[at + 3]):
-            free[d, k] = total(code, numbers, x, code[at + 4 + d])
+        for d in range(s.code[at + 3]):
+            free[d, k] = total(s, s.code[at + 4 + d])
         stated = 1
-        for d in range(code[at + 1]):
+        for d in range(s.code[at + 1]):
             if not math.isfinite(free[d, k]):
                 stated = 0
         flags[0, k] = flags[1, k] = stated
     for k in range(bodies):
         v[0, k], v[1, k], v[2, k] = free[0, k], free[1, k], free[2, k]
-    count = meet(code, numbers, s)
+    count = meet(s)
     if count <= 0:
         return count
     for k in range(count):
         flags[2, s.pair[k, 1]] = flags[2, s.pair[k, 2]] = 1
-    if code[LAWS] == 0:
+    if s.code[LAWS] == 0:
         for k in range(bodies):
             if flags[2, k]:
                 flags[0, k] = flags[1, k] = 0
         return count
-    law = code[code[AT_LAWS]]
-    settled = compose(code, numbers, law, s, count, bodies, spins, 2)
-    lawful, point = True, code[law] == 1
+    law = s.code[s.code[AT_LAWS]]
+    settled = compose(s, law, count, bodies, spins, 2)
+    lawful, point = True, s.code[law] == 1
     for k in range(count):
         c, pair = s.contact[k], s.pair[k, 0]
-        if code[code[law + 3] + pair] < 0 or code[code[law + 4] + pair] < 0 or not math.isfinite(c[SHARE]):
+        if (
+            s.code[s.code[law + 3] + pair] < 0
+            or s.code[s.code[law + 4] + pair] < 0
+            or not math.isfinite(c[SHARE])
+        ):
             lawful = False
         if point and not math.isfinite(c[GRIP]):
             lawful = False
-    seen = settled and lawful and within(code, numbers, law, s, count, v)
+    seen = settled and lawful and within(s, law, count, v)
     governed = 3 if point and spins else 2
     for k in range(bodies):
         if not flags[2, k]:
@@ -681,12 +706,12 @@ def move(code, numbers, s):
         flags[1, k] = 1 if stated and seen and flags[1, k] else 0
         flags[3, k] = 1 if stated else 0
         flags[0, k] = 1 if stated and flags[0, k] else 0
-    for other in range(1, code[LAWS]):
-        compose(code, numbers, code[code[AT_LAWS] + other], s, count, bodies, spins, 3)
+    for other in range(1, s.code[LAWS]):
+        compose(s, s.code[s.code[AT_LAWS] + other], count, bodies, spins, 3)
         for k in range(bodies):
             if flags[2, k]:
                 for d in range(governed):
-                    if not abs(s.velocity[3, d, k] - v[d, k]) <= numbers[SLACK]:
+                    if not abs(s.velocity[3, d, k] - v[d, k]) <= s.numbers[SLACK]:
                         flags[1, k] = 0
     for k in range(bodies):
         if flags[2, k] and not flags[3, k]:
@@ -696,59 +721,59 @@ def move(code, numbers, s):
 
 # ---------------------------------------------------------------------------------------------- what a body sees
 @compiled
-def nearest_to(code, numbers, s, t):
+def nearest_to(s, t):
     """The body nearest to t, of several the first one; t itself where there is no other."""
     first, gap = t, math.inf
-    for k in range(code[BODIES]):
-        if k != t and apart(code, s, t, k) < gap:
-            first, gap = k, apart(code, s, t, k)
+    for k in range(s.code[BODIES]):
+        if k != t and apart(s, t, k) < gap:
+            first, gap = k, apart(s, t, k)
     if first == t:
         return t
-    best, least = first, measure(code, numbers, s, min(t, first), max(t, first))
-    for k in range(code[BODIES]):
-        if k != t and k != first and not apart(code, s, t, k) - CLEAR > least:
-            distance = measure(code, numbers, s, min(t, k), max(t, k))
+    best, least = first, measure(s, min(t, first), max(t, first))
+    for k in range(s.code[BODIES]):
+        if k != t and k != first and not apart(s, t, k) - CLEAR > least:
+            distance = measure(s, min(t, k), max(t, k))
             if distance < least or (distance == least and k < best):
                 best, least = k, distance
     return best
 
 
 @compiled
-def surroundings(code, numbers, s, t):
+def surroundings(s, t):
     """Contexts and pair features of body t (`relgym.scene.surroundings`)."""
     if s.masks[3] == t:
         return
     s.masks[3] = t
-    bodies, facts, others = code[BODIES], code[FACTS], code[OTHERS]
-    offsets = code[OFFSETS]
+    bodies, facts, others = s.code[BODIES], s.code[FACTS], s.code[OTHERS]
+    offsets = s.code[OFFSETS]
     one = np.int64(1)
-    own, dims = code[AT_BODIES] + BODY * t, code[DIMENSIONS]
+    own, dims = s.code[AT_BODIES] + BODY * t, s.code[DIMENSIONS]
     touched = leaving = np.int64(0)
-    at_others = code[AT_BODIES] + BODY * bodies + code[RELATIONS]
+    at_others = s.code[AT_BODIES] + BODY * bodies + s.code[RELATIONS]
     fastest = math.inf
     for k in range(bodies):
         told = s.told[k]
         if k == t:
             continue
         i, j = (t, k) if t < k else (k, t)
-        near = touch(code, numbers, s, t, k)
+        near = touch(s, t, k)
         if near or offsets:
             for f in range(facts):
                 told[f] = math.nan
-            measure(code, numbers, s, i, j)
+            measure(s, i, j)
             sign = 1.0 if t < k else -1.0
             nx, ny, nz = s.gap[1, i, j] * sign, s.gap[2, i, j] * sign, 0.0
-            at = code[AT_BODIES] + BODY * k
-            rx = s.x[code[own + COL_VX]] - s.x[code[at + COL_VX]]
-            ry = s.x[code[own + COL_VY]] - s.x[code[at + COL_VY]]
+            at = s.code[AT_BODIES] + BODY * k
+            rx = s.x[s.code[own + COL_VX]] - s.x[s.code[at + COL_VX]]
+            ry = s.x[s.code[own + COL_VY]] - s.x[s.code[at + COL_VY]]
             approach = rx * nx + ry * ny
             slip = nx * ry - ny * rx
             if dims == 3:
-                nz, rz = s.gap[3, i, j] * sign, s.x[code[own + COL_VZ]] - s.x[code[at + COL_VZ]]
+                nz, rz = s.gap[3, i, j] * sign, s.x[s.code[own + COL_VZ]] - s.x[s.code[at + COL_VZ]]
                 approach += rz * nz
                 sx, sy, sz = rx - approach * nx, ry - approach * ny, rz - approach * nz
                 slip = math.sqrt(sx * sx + sy * sy + sz * sz)
-            parting = approach > limit(numbers, s, i, j, PART, SPEED)
+            parting = approach > limit(s, i, j, PART, SPEED)
             if near:
                 touched |= one << k
                 told[dims + 1] = approach
@@ -765,12 +790,12 @@ def surroundings(code, numbers, s, t):
                     told[dims + 3 + d] = s.body[t, BX + d] - s.body[k, BX + d]
     close = touched
     if touched == 0:
-        close = one << nearest_to(code, numbers, s, t)
+        close = one << nearest_to(s, t)
     close |= one << t
     s.masks[1] = close
     s.masks[2] = (one << bodies) - one
     s.masks[0] = close
-    if code[PARTING]:
+    if s.code[PARTING]:
         kept = close & ~leaving
         if kept != one << t:
             s.masks[1] = kept
@@ -778,42 +803,42 @@ def surroundings(code, numbers, s, t):
         for k in range(bodies):
             if touched & ~leaving & (one << k):
                 i, j = (t, k) if t < k else (k, t)
-                if s.told[k, dims + 1] <= fastest + limit(numbers, s, i, j, PART, SPEED):
+                if s.told[k, dims + 1] <= fastest + limit(s, i, j, PART, SPEED):
                     struck |= one << k
         s.masks[0] = struck
-    asked = s.masks[2] if code[EVERYTHING] else s.masks[0] | s.masks[1]
+    asked = s.masks[2] if s.code[EVERYTHING] else s.masks[0] | s.masks[1]
     for k in range(bodies):
         if asked & (one << k):
             if not (touched & (one << k) or (offsets and k != t)):
                 for f in range(facts):
                     s.told[k, f] = math.nan
             for f in range(others):
-                s.told[k, facts + f] = math.nan if k == t else s.x[code[at_others + k * others + f]]
+                s.told[k, facts + f] = math.nan if k == t else s.x[s.code[at_others + k * others + f]]
 
 
 @compiled
-def closing(code, numbers, s, a, b):
+def closing(s, a, b):
     """Normal speed of two bodies that touch and don't part; infinite of others."""
-    first, second = code[AT_BODIES] + BODY * a, code[AT_BODIES] + BODY * b
-    if not (code[first + MOVES] or code[second + MOVES]) or not touch(code, numbers, s, a, b):
+    first, second = s.code[AT_BODIES] + BODY * a, s.code[AT_BODIES] + BODY * b
+    if not (s.code[first + MOVES] or s.code[second + MOVES]) or not touch(s, a, b):
         return math.inf
     i, j = (a, b) if a < b else (b, a)
-    first, second = code[AT_BODIES] + BODY * i, code[AT_BODIES] + BODY * j
-    x = s.x[code[first + COL_VX]] - s.x[code[second + COL_VX]]
-    y = s.x[code[first + COL_VY]] - s.x[code[second + COL_VY]]
+    first, second = s.code[AT_BODIES] + BODY * i, s.code[AT_BODIES] + BODY * j
+    x = s.x[s.code[first + COL_VX]] - s.x[s.code[second + COL_VX]]
+    y = s.x[s.code[first + COL_VY]] - s.x[s.code[second + COL_VY]]
     speed = x * s.gap[1, i, j] + y * s.gap[2, i, j]
-    if code[DIMENSIONS] == 3:
-        speed += (s.x[code[first + COL_VZ]] - s.x[code[second + COL_VZ]]) * s.gap[3, i, j]
-    return speed if speed <= limit(numbers, s, i, j, PART, SPEED) else math.inf
+    if s.code[DIMENSIONS] == 3:
+        speed += (s.x[s.code[first + COL_VZ]] - s.x[s.code[second + COL_VZ]]) * s.gap[3, i, j]
+    return speed if speed <= limit(s, i, j, PART, SPEED) else math.inf
 
 
 @compiled
-def side(code, s, a, b):
+def side(s, a, b):
     """How body a lies to b: bits of the kinds of relations between their bounding boxes; touching aside."""
     one, kinds = np.int64(1), np.int64(0)
     mine = theirs = 0.0
     over = True
-    for d in range(code[DIMENSIONS]):
+    for d in range(s.code[DIMENSIONS]):
         low_a, high_a = s.body[a, LOW_X + d], s.body[a, HIGH_X + d]
         low_b, high_b = s.body[b, LOW_X + d], s.body[b, HIGH_X + d]
         offset = s.body[a, BX + d] - s.body[b, BX + d]
@@ -827,7 +852,7 @@ def side(code, s, a, b):
         if not (less or greater):
             kinds |= one << (11 + d)
         mine, theirs = mine + wide_a * wide_a, theirs + wide_b * wide_b
-        if d == code[UP]:
+        if d == s.code[UP]:
             over = over and greater
         else:
             top, bottom = min(high_a + offset, high_b), max(low_a + offset, low_b)
@@ -840,28 +865,28 @@ def side(code, s, a, b):
 
 
 @compiled
-def fastest(code, numbers, s, a, b):
+def fastest(s, a, b):
     """Whether a approaches no other body faster than b, which it approaches."""
-    own = closing(code, numbers, s, a, b)
-    slack = limit(numbers, s, min(a, b), max(a, b), PART, SPEED)
-    for k in range(code[BODIES]):
-        if k != a and k != b and own > closing(code, numbers, s, a, k) + slack:
+    own = closing(s, a, b)
+    slack = limit(s, min(a, b), max(a, b), PART, SPEED)
+    for k in range(s.code[BODIES]):
+        if k != a and k != b and own > closing(s, a, k) + slack:
             return False
     return True
 
 
 @compiled
-def relate(code, numbers, s, among):
+def relate(s, among):
     """Work out all relations that are asked for between some objects."""
     if among & ~s.masks[4] == 0:
         return
     among |= s.masks[4]
     s.masks[4] = among
-    one, at, bodies = np.int64(1), code[AT_BODIES] + BODY * code[BODIES], code[BODIES]
+    one, at, bodies = np.int64(1), s.code[AT_BODIES] + BODY * s.code[BODIES], s.code[BODIES]
     asked, state = np.int64(0), mixed(np.uint64(among))
-    for r in range(code[RELATIONS]):
-        if code[at + r] >= 0:
-            asked |= one << code[at + r]
+    for r in range(s.code[RELATIONS]):
+        if s.code[at + r] >= 0:
+            asked |= one << s.code[at + r]
             for k in range(bodies):
                 s.rows[r, k] = s.columns[r, k] = 0
     for a in range(bodies):
@@ -870,20 +895,20 @@ def relate(code, numbers, s, among):
         for b in range(bodies):
             if b == a or not among & (one << b):
                 continue
-            kinds = side(code, s, a, b) if asked & ~7 else np.int64(0)
-            if touch(code, numbers, s, a, b):
+            kinds = side(s, a, b) if asked & ~7 else np.int64(0)
+            if touch(s, a, b):
                 kinds |= 4
-                if asked & 3 and closing(code, numbers, s, a, b) < math.inf:
+                if asked & 3 and closing(s, a, b) < math.inf:
                     kinds |= 1
-                    if asked & 2 and fastest(code, numbers, s, a, b):
+                    if asked & 2 and fastest(s, a, b):
                         kinds |= 2
             else:
                 kinds &= ~(one << 3)
             kinds &= asked
             state = (state ^ np.uint64(kinds + 1)) * MIX_A
             state ^= state >> S27
-            for r in range(code[RELATIONS]):
-                if code[at + r] >= 0 and kinds & (one << code[at + r]):
+            for r in range(s.code[RELATIONS]):
+                if s.code[at + r] >= 0 and kinds & (one << s.code[at + r]):
                     s.rows[r, a] |= one << b
                     s.columns[r, b] |= one << a
     s.state[0] = state
@@ -898,11 +923,11 @@ def passes(value, at_most, threshold, negated):
 
 
 @compiled
-def allowed(code, numbers, s, literal, variable, context):
+def allowed(s, literal, variable, context):
     """Objects of a context that a variable may stand for, as far as one literal says; -1: all, without a variable."""
     one = np.int64(1)
-    kind, first, second = code[literal], code[literal + 1], code[literal + 2]
-    negated, found, bodies = code[literal + 4], np.int64(0), max(code[BODIES], 1)
+    kind, first, second = s.code[literal], s.code[literal + 1], s.code[literal + 2]
+    negated, found, bodies = s.code[literal + 4], np.int64(0), max(s.code[BODIES], 1)
     if kind == 2:
         if second == -1 or second != variable:
             # A universal test, or one of an object that is bound.
@@ -910,13 +935,13 @@ def allowed(code, numbers, s, literal, variable, context):
             for k in range(bodies):
                 if (second == -1 and context & (one << k)) or (second != -1 and k == s.value[second]):
                     value = s.told[k, first]
-                    if not passes(value, code[literal + 3], numbers[code[literal + 5]], negated):
+                    if not passes(value, s.code[literal + 3], s.numbers[s.code[literal + 5]], negated):
                         holds = False
             return np.int64(-1) if holds else np.int64(0)
         for k in range(bodies):
             if context & (one << k):
                 value = s.told[k, first]
-                if passes(value, code[literal + 3], numbers[code[literal + 5]], negated):
+                if passes(value, s.code[literal + 3], s.numbers[s.code[literal + 5]], negated):
                     found |= one << k
         return found
     if kind == 3:
@@ -924,7 +949,7 @@ def allowed(code, numbers, s, literal, variable, context):
             return context & (~first if negated else first)
         holds = (first & context) != 0 if second == -1 else (first & (one << s.value[second])) != 0
         return np.int64(-1) if holds != (negated != 0) else np.int64(0)
-    third = code[literal + 3]  # relation `first` of `second` and `third`
+    third = s.code[literal + 3]  # relation `first` of `second` and `third`
     if second == variable or third == variable:
         table = s.rows[first] if second == variable else s.columns[first]
         back = s.columns[first] if second == variable else s.rows[first]
@@ -951,32 +976,32 @@ def allowed(code, numbers, s, literal, variable, context):
 
 
 @compiled
-def open_to(code, numbers, s, level, context):
+def open_to(s, level, context):
     """Objects that the variable of a level may stand for; without one: -1 if its tests hold, 0 if not."""
-    variable = code[level]
+    variable = s.code[level]
     found = context if variable >= 0 else np.int64(-1)
-    for k in range(code[level + 1]):
-        found &= allowed(code, numbers, s, code[level + 2 + k], variable, context)
+    for k in range(s.code[level + 1]):
+        found &= allowed(s, s.code[level + 2 + k], variable, context)
         if found == 0:
             break
     return found
 
 
 @compiled
-def solve(code, numbers, s, clause, context, everything):
+def solve(s, clause, context, everything):
     """Whether objects make a clause true; what its first variables stand for is in `s.value`.
 
     With `everything` all solutions are found, and `s.found` says which objects each variable can stand for.
     """
-    one, levels = np.int64(1), code[clause + 2]
+    one, levels = np.int64(1), s.code[clause + 2]
     if everything:
         s.found[:] = 0
-    if open_to(code, numbers, s, code[clause + 3], context) == 0:
+    if open_to(s, s.code[clause + 3], context) == 0:
         return False
     if levels == 1:
         return True
     true, depth = False, 1
-    s.left[1] = open_to(code, numbers, s, code[clause + 4], context)
+    s.left[1] = open_to(s, s.code[clause + 4], context)
     while depth > 0:
         if s.left[depth] == 0:
             depth -= 1
@@ -986,68 +1011,68 @@ def solve(code, numbers, s, clause, context, everything):
         number = 0
         while lowest >> number != 1:
             number += 1
-        s.value[code[code[clause + 3 + depth]]] = number
+        s.value[s.code[s.code[clause + 3 + depth]]] = number
         if depth + 1 < levels:
             depth += 1
-            s.left[depth] = open_to(code, numbers, s, code[clause + 3 + depth], context)
+            s.left[depth] = open_to(s, s.code[clause + 3 + depth], context)
             continue
         true = True
         if not everything:
             return True
         for k in range(1, levels):
-            variable = code[code[clause + 3 + k]]
+            variable = s.code[s.code[clause + 3 + k]]
             s.found[variable] |= one << s.value[variable]
     return true
 
 
 @compiled
-def leaf(code, numbers, s, tree):
+def leaf(s, tree):
     """The leaf of a tree that a scene reaches; `s.found` says whom variables stand for."""
-    node, at, one, bodies = np.int64(0), code[tree + 1], np.int64(1), max(code[BODIES], 1)
+    node, at, one, bodies = np.int64(0), s.code[tree + 1], np.int64(1), max(s.code[BODIES], 1)
     while True:
         record = tree + 2 + 3 * node
-        sight = code[record]
+        sight = s.code[record]
         if sight == 0:
             return node
-        if code[sight] >= 0:
-            value = s.x[code[sight]]
-            if code[sight + 1] >= 0:
-                value -= s.x[code[sight + 1]]
+        if s.code[sight] >= 0:
+            value = s.x[s.code[sight]]
+            if s.code[sight + 1] >= 0:
+                value -= s.x[s.code[sight + 1]]
         else:
-            value, feature = math.inf, code[sight + 3]
+            value, feature = math.inf, s.code[sight + 3]
             for k in range(bodies):
-                if s.found[code[sight + 2]] & (one << k) and s.told[k, feature] < value:
+                if s.found[s.code[sight + 2]] & (one << k) and s.told[k, feature] < value:
                     value = s.told[k, feature]
             if value == math.inf:
                 value = math.nan
-        node = code[record + 1] if value <= numbers[at + node] else code[record + 2]
+        node = s.code[record + 1] if value <= s.numbers[at + node] else s.code[record + 2]
 
 
 @compiled
-def decide(code, numbers, s, contest, target):
+def decide(s, contest, target):
     """Number of the outcome of one contest."""
-    context = s.masks[code[contest + 2]]
-    for k in range(code[contest + 4]):
-        stage = code[contest + 5 + k]
-        clause, tests, tree = code[stage], code[stage + 2], code[stage + 3]
+    context = s.masks[s.code[contest + 2]]
+    for k in range(s.code[contest + 4]):
+        stage = s.code[contest + 5 + k]
+        clause, tests, tree = s.code[stage], s.code[stage + 2], s.code[stage + 3]
         holds = True
-        for t in range(code[stage + 1]):
+        for t in range(s.code[stage + 1]):
             at = tests + 5 * t
-            value = s.x[code[at]]
-            if code[at + 1] >= 0:
-                value -= s.x[code[at + 1]]
-            if not passes(value, code[at + 2], numbers[code[at + 4]], code[at + 3]):
+            value = s.x[s.code[at]]
+            if s.code[at + 1] >= 0:
+                value -= s.x[s.code[at + 1]]
+            if not passes(value, s.code[at + 2], s.numbers[s.code[at + 4]], s.code[at + 3]):
                 holds = False
                 break
         if not holds:
             continue
         if clause:
             s.value[0] = target
-            if not solve(code, numbers, s, clause, context, tree != 0):
+            if not solve(s, clause, context, tree != 0):
                 continue
         if tree == 0:
-            return code[code[stage + 4]]
-        outcome = code[code[stage + 4] + leaf(code, numbers, s, tree)]
+            return s.code[s.code[stage + 4]]
+        outcome = s.code[s.code[stage + 4] + leaf(s, tree)]
         if outcome >= 0:
             return outcome
     return np.int64(0)
@@ -1077,24 +1102,24 @@ def weight(k):
 
 
 @compiled
-def situation(code, s, used, target):
+def situation(s, used, target):
     """A number for what some relations say of a context (`relgym.logic.situations`)."""
     one = np.int64(1)
-    exists, n_rel, n_un = s.masks[code[used]], code[used + 1], code[used + 2]
+    exists, n_rel, n_un = s.masks[s.code[used]], s.code[used + 1], s.code[used + 2]
     described, around, whole = s.hashes[0], s.hashes[1], s.hashes[2]
     count = 0
-    bodies = max(code[BODIES], 1)
+    bodies = max(s.code[BODIES], 1)
     for k in range(bodies):
         if exists & (one << k) == 0:
             continue
         bits = ZERO64
         for u in range(n_un):
-            if code[used + 3 + n_rel + u] & (one << k):
+            if s.code[used + 3 + n_rel + u] & (one << k):
                 bits += weight(u)
         for r in range(n_rel):
-            if s.rows[code[used + 3 + r], k] & (one << target):
+            if s.rows[s.code[used + 3 + r], k] & (one << target):
                 bits += weight(n_un + r)
-            if s.columns[code[used + 3 + r], k] & (one << target):
+            if s.columns[s.code[used + 3 + r], k] & (one << target):
                 bits += weight(n_un + n_rel + r)
         if k == target:
             bits += weight(n_un + 2 * n_rel)
@@ -1108,7 +1133,7 @@ def situation(code, s, used, target):
                 continue
             bits = ZERO64
             for r in range(n_rel):
-                if s.rows[code[used + 3 + r], k] & (one << j):
+                if s.rows[s.code[used + 3 + r], k] & (one << j):
                     bits += weight(r)
             around[inner] = mixed(mixed(bits + GOLDEN) + described[j])
             inner += 1
@@ -1118,15 +1143,15 @@ def situation(code, s, used, target):
 
 
 @compiled
-def seen_before(code, s, experience, target):
+def seen_before(s, experience, target):
     """Whether the situation was seen in training."""
     number = ZERO64
-    for k in range(code[experience]):
-        number = mixed(number + situation(code, s, code[experience + 3 + k], target))
-    low, high = np.int64(0), code[experience + 1]
+    for k in range(s.code[experience]):
+        number = mixed(number + situation(s, s.code[experience + 3 + k], target))
+    low, high = np.int64(0), s.code[experience + 1]
     while low < high:
         middle = (low + high) // 2
-        value = np.uint64(code[code[experience + 2] + middle])
+        value = np.uint64(s.code[s.code[experience + 2] + middle])
         if value == number:
             return True
         if value < number:
@@ -1137,25 +1162,25 @@ def seen_before(code, s, experience, target):
 
 
 @compiled
-def rank(code, numbers, s, vote, count, target):
+def rank(s, vote, count, target):
     """Put the modes in order, `s.order[0]`, the winner first; its lead in the last count."""
     lead, totals, alive, order = s.votes, s.order[1], s.order[2], s.order[0]
     for i in range(count):
         for j in range(count):
             lead[i, j] = 0
-    for k in range(code[vote + 1]):
-        contest = code[vote + 4 + k]
-        a, b = code[contest], code[contest + 1]
-        at = code[contest + 3] + 2 * decide(code, numbers, s, contest, target)
-        lead[a, b] = code[at]
-        lead[b, a] = code[at + 1]
-    if not code[vote]:
+    for k in range(s.code[vote + 1]):
+        contest = s.code[vote + 4 + k]
+        a, b = s.code[contest], s.code[contest + 1]
+        at = s.code[contest + 3] + 2 * decide(s, contest, target)
+        lead[a, b] = s.code[at]
+        lead[b, a] = s.code[at + 1]
+    if not s.code[vote]:
         for i in range(count):
             totals[i] = 0
             for j in range(count):
                 totals[i] += lead[i, j]
         for k in range(count):
-            mode, j = code[code[vote + 2] + k], k
+            mode, j = s.code[s.code[vote + 2] + k], k
             while j > 0 and totals[order[j - 1]] < totals[mode]:
                 order[j] = order[j - 1]
                 j -= 1
@@ -1165,7 +1190,7 @@ def rank(code, numbers, s, vote, count, target):
         for j in range(i):
             lead[i, j], lead[j, i] = lead[i, j] - lead[j, i], lead[j, i] - lead[i, j]
     for i in range(count):
-        alive[i] = code[code[vote + 2] + i]
+        alive[i] = s.code[s.code[vote + 2] + i]
         totals[i] = 0
         for j in range(count):
             totals[i] += lead[i, j]
@@ -1189,12 +1214,12 @@ def rank(code, numbers, s, vote, count, target):
 
 # ---------------------------------------------------------------------------------------------- roles
 @compiled
-def line_up(code, numbers, s, t):
+def line_up(s, t):
     """Bodies in canonical order as t sees them (`relgym.scene.context.canonical_order`), t itself first.
 
     Returns whether some are alike in their relations to t, so that numbers decide.
     """
-    bodies, relations = code[BODIES], code[RELATIONS]
+    bodies, relations = s.code[BODIES], s.code[RELATIONS]
     toward, around = s.hashes[0], s.hashes[1]
     order = s.lineup[0]
     for k in range(bodies):
@@ -1202,7 +1227,9 @@ def line_up(code, numbers, s, t):
     tied = False
     for k in range(bodies):
         for j in range(k):
-            same = code[code[AT_BODIES] + BODY * k + GROUP] == code[code[AT_BODIES] + BODY * j + GROUP]
+            same = (
+                s.code[s.code[AT_BODIES] + BODY * k + GROUP] == s.code[s.code[AT_BODIES] + BODY * j + GROUP]
+            )
             if k != t and j != t and same and toward[k] == toward[j]:
                 tied = True
     for k in range(bodies):
@@ -1210,8 +1237,8 @@ def line_up(code, numbers, s, t):
         if tied and k != t:
             for j in range(bodies):
                 if j != k and j != t:
-                    group = np.uint64(code[code[AT_BODIES] + BODY * j + GROUP])
-                    kind = (group_rank(code, t, group) + ONE64) << np.uint64(2 * relations)
+                    group = np.uint64(s.code[s.code[AT_BODIES] + BODY * j + GROUP])
+                    kind = (group_rank(s, t, group) + ONE64) << np.uint64(2 * relations)
                     bits = both_ways(s, relations, k, j) + kind
                     around[k] += mixed(mixed(bits + GOLDEN) + toward[j] + GOLDEN)
     order[0], count = t, 1
@@ -1219,7 +1246,7 @@ def line_up(code, numbers, s, t):
         if k == t:
             continue
         j = count
-        while j > 1 and earlier(code, numbers, s, t, k, order[j - 1]):
+        while j > 1 and earlier(s, t, k, order[j - 1]):
             order[j] = order[j - 1]
             j -= 1
         order[j] = k
@@ -1228,13 +1255,13 @@ def line_up(code, numbers, s, t):
 
 
 @compiled
-def group_rank(code, t, group):
+def group_rank(s, t, group):
     """Number of a type among those of all bodies but t."""
     found = ZERO64
-    for g in range(code[BODIES]):
+    for g in range(s.code[BODIES]):
         there = False
-        for k in range(code[BODIES]):
-            if k != t and code[code[AT_BODIES] + BODY * k + GROUP] == g:
+        for k in range(s.code[BODIES]):
+            if k != t and s.code[s.code[AT_BODIES] + BODY * k + GROUP] == g:
                 there = True
         if there and np.uint64(g) < group:
             found += ONE64
@@ -1252,52 +1279,52 @@ def both_ways(s, relations, a, b):
 
 
 @compiled
-def earlier(code, numbers, s, t, a, b):
+def earlier(s, t, a, b):
     """Whether body a comes before b."""
-    first, second = code[AT_BODIES] + BODY * a, code[AT_BODIES] + BODY * b
-    if code[first + GROUP] != code[second + GROUP]:
-        return code[first + GROUP] < code[second + GROUP]
+    first, second = s.code[AT_BODIES] + BODY * a, s.code[AT_BODIES] + BODY * b
+    if s.code[first + GROUP] != s.code[second + GROUP]:
+        return s.code[first + GROUP] < s.code[second + GROUP]
     if s.hashes[0, a] != s.hashes[0, b]:
         return s.hashes[0, a] > s.hashes[0, b]
     if s.hashes[1, a] != s.hashes[1, b]:
         return s.hashes[1, a] < s.hashes[1, b]
-    near_a = np.round(measure(code, numbers, s, min(a, t), max(a, t)) / SAME_DISTANCE)
-    near_b = np.round(measure(code, numbers, s, min(b, t), max(b, t)) / SAME_DISTANCE)
+    near_a = np.round(measure(s, min(a, t), max(a, t)) / SAME_DISTANCE)
+    near_b = np.round(measure(s, min(b, t), max(b, t)) / SAME_DISTANCE)
     if near_a != near_b:
         return near_a < near_b
     for k in range(9):
-        x, y = s.x[code[first + POSE + k]], s.x[code[second + POSE + k]]
+        x, y = s.x[s.code[first + POSE + k]], s.x[s.code[second + POSE + k]]
         if x != y:
             return x < y
     return False
 
 
 @compiled
-def assign(code, numbers, s, casting, t):
+def assign(s, casting, t):
     """Bodies of the embodied roles, in `s.cast[0]`; whether they are found (`RoleClassifier.assign`)."""
-    bodies, roles, one = code[BODIES], code[casting + 1], np.int64(1)
+    bodies, roles, one = s.code[BODIES], s.code[casting + 1], np.int64(1)
     everyone = (one << bodies) - one
-    descriptions = code[casting]
+    descriptions = s.code[casting]
     # options of description d: rows of `s.options`, from d * (roles + 1) on
     counts, need, chosen, best = s.cast[1], s.cast[2], s.cast[3], s.cast[0]
     for d in range(descriptions):
-        record = code[casting + 3 + d]
-        need[d] = code[record + 4]
+        record = s.code[casting + 3 + d]
+        need[d] = s.code[record + 4]
         counts[d] = 0
         base = d * (roles + 1)
         for at in range(bodies):
             each = s.lineup[0, at]
-            if each == t or code[record] & (one << each) == 0:
+            if each == t or s.code[record] & (one << each) == 0:
                 continue
-            score = numbers[code[record + 1] + code[record + 3]]
-            for k in range(code[record + 3]):
+            score = s.numbers[s.code[record + 1] + s.code[record + 3]]
+            for k in range(s.code[record + 3]):
                 s.value[0], s.value[1] = t, each
-                if solve(code, numbers, s, code[record + 5 + k], everyone, False):
-                    score = numbers[code[record + 1] + k]
+                if solve(s, s.code[record + 5 + k], everyone, False):
+                    score = s.numbers[s.code[record + 1] + k]
                     break
             if score != score:
                 continue
-            typical = 1.0 if typically(code, s, code[record + 2], each, t) else 0.0
+            typical = 1.0 if typically(s, s.code[record + 2], each, t) else 0.0
             j = counts[d]
             while j > 0 and better(s.options, base + j - 1, score, typical):
                 if j <= roles:
@@ -1308,7 +1335,7 @@ def assign(code, numbers, s, casting, t):
                 row = s.options[base + j]
                 row[0], row[1], row[2], row[3] = score, typical, float(at), float(each)
                 counts[d] = min(counts[d] + 1, roles + 1)
-    return search(code, s, casting, descriptions, roles, chosen, counts, need, best)
+    return search(s, casting, descriptions, roles, chosen, counts, need, best)
 
 
 @compiled
@@ -1320,23 +1347,23 @@ def better(options, row, score, typical):
 
 
 @compiled
-def typically(code, s, common, each, t):
+def typically(s, common, each, t):
     """Whether a body has all that players so far had in common."""
     one = np.int64(1)
-    if common == 0 or code[common] & (one << each) == 0:
+    if common == 0 or s.code[common] & (one << each) == 0:
         return False
-    towards, back = code[common + 1], code[common + 2]
+    towards, back = s.code[common + 1], s.code[common + 2]
     for k in range(towards):
-        if s.rows[code[common + 3 + k], each] & (one << t) == 0:
+        if s.rows[s.code[common + 3 + k], each] & (one << t) == 0:
             return False
     for k in range(back):
-        if s.columns[code[common + 3 + towards + k], each] & (one << t) == 0:
+        if s.columns[s.code[common + 3 + towards + k], each] & (one << t) == 0:
             return False
     return True
 
 
 @compiled
-def search(code, s, casting, descriptions, roles, chosen, counts, need, best):
+def search(s, casting, descriptions, roles, chosen, counts, need, best):
     """All ways to fill all roles, of which the best is kept; whether there is one, and no doubt about it."""
     depth, found, single = 0, False, True
     best_score, best_typical = 0.0, -1.0
@@ -1375,14 +1402,14 @@ def search(code, s, casting, descriptions, roles, chosen, counts, need, best):
             single = False
         if not found or score > best_score or (score == best_score and typical > best_typical):
             found, single, best_score, best_typical = True, True, score, typical
-            keep(code, s, casting, roles, chosen, deep, of, best)
+            keep(s, casting, roles, chosen, deep, of, best)
     if not found:
         return False
-    return (single and best_typical == roles) or code[casting + 2] != 0
+    return (single and best_typical == roles) or s.code[casting + 2] != 0
 
 
 @compiled
-def keep(code, s, casting, roles, chosen, deep, of, best):
+def keep(s, casting, roles, chosen, deep, of, best):
     """Give the chosen bodies their roles: of alike roles the first goes to who comes first in order."""
     for k in range(deep):
         row = of[k] * (roles + 1) + chosen[k]
@@ -1391,44 +1418,44 @@ def keep(code, s, casting, roles, chosen, deep, of, best):
             other = of[j] * (roles + 1) + chosen[j]
             if of[j] == of[k] and s.options[other, 2] < s.options[row, 2]:
                 ahead += 1
-        record = code[casting + 3 + of[k]]
-        best[code[record + 5 + code[record + 3] + ahead]] = np.int64(s.options[row, 3])
+        record = s.code[casting + 3 + of[k]]
+        best[s.code[record + 5 + s.code[record + 3] + ahead]] = np.int64(s.options[row, 3])
 
 
 # ---------------------------------------------------------------------------------------------- answers
 @compiled
-def product(code, x, feature):
+def product(s, feature):
     """A product of columns, their sines and cosines."""
     value = 1.0
-    for k in range(code[feature + 1]):
+    for k in range(s.code[feature + 1]):
         at = feature + 2 + 3 * k
-        factor = x[code[at]]
-        if code[at + 1] == 1:
-            factor = math.sin(code[at + 2] * factor)
-        elif code[at + 1] == 2:
-            factor = math.cos(code[at + 2] * factor)
+        factor = s.x[s.code[at]]
+        if s.code[at + 1] == 1:
+            factor = math.sin(s.code[at + 2] * factor)
+        elif s.code[at + 1] == 2:
+            factor = math.cos(s.code[at + 2] * factor)
         value = factor if k == 0 else value * factor
     return value
 
 
 @compiled
-def clip(numbers, x, answer_numbers, present, value):
+def clip(s, answer_numbers, present, value):
     """A value, as far as changes may go."""
     if present < 0 or value != value:
         return value
-    low, high = x[present] + numbers[answer_numbers], x[present] + numbers[answer_numbers + 1]
+    low, high = s.x[present] + s.numbers[answer_numbers], s.x[present] + s.numbers[answer_numbers + 1]
     return min(max(value, low), high)
 
 
 @compiled
-def remembered(code, s, a):
+def remembered(s, a):
     """The place in the memory of what relations alone decide of an answer; -1: there is no room for it.
 
     A record holds flags (1: the situation was seen, 2: it wasn't, 4: ranked), the margin, the ranking, and for
     every mode whether its roles were filled (1, 2: they can't be) and by whom. States are told apart by 64 bits, as
     situations are (`relgym.classification.familiarity`).
     """
-    if code[code[a + 10]] > REMEMBERED_MODES:
+    if s.code[s.code[a + 10]] > REMEMBERED_MODES:
         return np.int64(-1)
     key = s.state[0] ^ mixed(np.uint64(a + 1))
     for k in range(3):
@@ -1442,14 +1469,14 @@ def remembered(code, s, a):
 
 
 @compiled
-def ranked(code, numbers, s, a, slot):
+def ranked(s, a, slot):
     """Rank the modes, or remember how they are ranked; the margin."""
-    vote, count = code[a + 11], code[code[a + 10]]
-    if slot < 0 or code[a + 23] == 0:
-        return rank(code, numbers, s, vote, count, max(code[a + 2], 0))
+    vote, count = s.code[a + 11], s.code[s.code[a + 10]]
+    if slot < 0 or s.code[a + 23] == 0:
+        return rank(s, vote, count, max(s.code[a + 2], 0))
     record = s.memory[slot]
     if record[0] & 4 == 0:
-        record[1] = rank(code, numbers, s, vote, count, max(code[a + 2], 0))
+        record[1] = rank(s, vote, count, max(s.code[a + 2], 0))
         record[0] |= 4
         for k in range(count):
             record[2 + k] = s.order[0, k]
@@ -1459,24 +1486,24 @@ def ranked(code, numbers, s, a, slot):
 
 
 @compiled
-def familiar(code, s, a, slot):
+def familiar(s, a, slot):
     """Whether the situation was seen in training, or what is remembered of that."""
-    experience, target = code[code[a + 11] + 3], max(code[a + 2], 0)
+    experience, target = s.code[s.code[a + 11] + 3], max(s.code[a + 2], 0)
     if slot < 0:
-        return seen_before(code, s, experience, target)
+        return seen_before(s, experience, target)
     record = s.memory[slot]
     if record[0] & 3 == 0:
-        record[0] |= 1 if seen_before(code, s, experience, target) else 2
+        record[0] |= 1 if seen_before(s, experience, target) else 2
     return record[0] & 1 == 1
 
 
 @compiled
-def players_of(code, numbers, s, a, mode, number, slot, tied):
+def players_of(s, a, mode, number, slot, tied):
     """Fill the roles of a mode: bodies in `s.cast[0]`; whether they can be, and whether numbers decide an order."""
-    casting = code[mode + 3]
+    casting = s.code[mode + 3]
     if casting == 0:
         return False, tied
-    roles = code[casting + 1]
+    roles = s.code[casting + 1]
     record = s.memory[max(slot, 0)]
     at = 2 + REMEMBERED_MODES + number * (1 + REMEMBERED_ROLES)
     if slot >= 0 and record[at]:
@@ -1484,8 +1511,8 @@ def players_of(code, numbers, s, a, mode, number, slot, tied):
             s.cast[0, k] = record[at + 1 + k]
         return record[at] == 1, tied
     if tied < 0:
-        tied = 1 if line_up(code, numbers, s, code[a + 2]) else 0
-    done = assign(code, numbers, s, casting, code[a + 2])
+        tied = 1 if line_up(s, s.code[a + 2]) else 0
+    done = assign(s, casting, s.code[a + 2])
     if slot >= 0 and tied == 0 and roles <= REMEMBERED_ROLES:
         record[at] = 1 if done else 2
         for k in range(roles):
@@ -1494,39 +1521,39 @@ def players_of(code, numbers, s, a, mode, number, slot, tied):
 
 
 @compiled
-def by_modes(code, numbers, s, a, players, told, answer):
+def by_modes(s, a, answer):
     """Value, outcome, mode and margin of an answer by modes (`relgym.model.answers`)."""
-    x, target = s.x, code[a + 2]
-    if code[a + 7] == 1:
+    x, target = s.x, s.code[a + 2]
+    if s.code[a + 7] == 1:
         return math.nan, UNEXPLAINED, np.int64(0), 0.0
-    if code[a + 7] == 2:
+    if s.code[a + 7] == 2:
         return math.nan, NO_MODE, np.int64(0), 0.0
-    if beyond(code, numbers, s, a):
+    if beyond(s, a):
         return math.nan, UNEXPLAINED, np.int64(0), 0.0
-    modes, count, vote = code[a + 10] + 1, code[code[a + 10]], code[a + 11]
+    modes, count, vote = s.code[a + 10] + 1, s.code[s.code[a + 10]], s.code[a + 11]
     for k in range(count):
-        mode = code[modes + k]
-        fixed = code[mode + 2] != 0 and code[mode + 4] == 0
-        x[code[mode + 1]] = total(code, numbers, x, code[mode + 2]) if fixed else math.nan
-    follows = code[a + 6]
-    for k in range(code[follows]):
+        mode = s.code[modes + k]
+        fixed = s.code[mode + 2] != 0 and s.code[mode + 4] == 0
+        x[s.code[mode + 1]] = total(s, s.code[mode + 2]) if fixed else math.nan
+    follows = s.code[a + 6]
+    for k in range(s.code[follows]):
         at = follows + 1 + 5 * k
-        if code[at + 4]:
-            x[code[at]] = x[code[at + 1]] * x[code[at + 2]]
+        if s.code[at + 4]:
+            x[s.code[at]] = x[s.code[at + 1]] * x[s.code[at + 2]]
         else:
-            x[code[at]] = x[code[at + 1]] + numbers[code[at + 3]] * x[code[at + 2]]
-    clipped = code[a + 15] if code[a + 14] else np.int64(-1)
+            x[s.code[at]] = x[s.code[at + 1]] + s.numbers[s.code[at + 3]] * x[s.code[at + 2]]
+    clipped = s.code[a + 15] if s.code[a + 14] else np.int64(-1)
     margin = math.inf
     s.order[0, 0] = 0
-    casts, slot = code[a + 22] != 0, np.int64(-1)
+    casts, slot = s.code[a + 22] != 0, np.int64(-1)
     if vote or casts:
         if target >= 0:
-            if code[a + 24]:
-                surroundings(code, numbers, s, target)
+            if s.code[a + 24]:
+                surroundings(s, target)
             else:  # nobody asks what is near
                 s.masks[0] = s.masks[1] = 0
-                s.masks[2], s.masks[3] = (np.int64(1) << code[BODIES]) - 1, -1
-            relate(code, numbers, s, s.masks[2] if code[EVERYTHING] else s.masks[0] | s.masks[1])
+                s.masks[2], s.masks[3] = (np.int64(1) << s.code[BODIES]) - 1, -1
+            relate(s, s.masks[2] if s.code[EVERYTHING] else s.masks[0] | s.masks[1])
         else:
             # What has no body stands alone: object 0 of one, in no relation to anything.
             s.masks[0] = s.masks[1] = s.masks[2] = 1
@@ -1535,103 +1562,105 @@ def by_modes(code, numbers, s, a, players, told, answer):
             s.rows[:, 0] = 0
             s.columns[:, 0] = 0
             s.state[0] = ZERO64
-        slot = remembered(code, s, a)
+        slot = remembered(s, a)
     if vote:
-        margin = ranked(code, numbers, s, a, slot) / VOTE_UNIT
-        if code[vote + 3] and not familiar(code, s, a, slot):
-            mode = code[modes + s.order[0, 0]]
-            value = x[code[mode + 1]]
-            return clip(numbers, x, code[a + 18], clipped, value), OUTSIDE, code[mode], 0.0
+        margin = ranked(s, a, slot) / VOTE_UNIT
+        if s.code[vote + 3] and not familiar(s, a, slot):
+            mode = s.code[modes + s.order[0, 0]]
+            value = x[s.code[mode + 1]]
+            return clip(s, s.code[a + 18], clipped, value), OUTSIDE, s.code[mode], 0.0
     tied = -1
     for rank_ in range(count):
-        mode = code[modes + s.order[0, rank_]]
-        if code[mode + 2] == 0:
+        mode = s.code[modes + s.order[0, rank_]]
+        if s.code[mode + 2] == 0:
             continue
-        value = x[code[mode + 1]]
-        if code[mode + 4]:
-            done, tied = players_of(code, numbers, s, a, mode, s.order[0, rank_], slot, tied)
+        value = x[s.code[mode + 1]]
+        if s.code[mode + 4]:
+            done, tied = players_of(s, a, mode, s.order[0, rank_], slot, tied)
             if not done:
-                if not code[a + 9]:
+                if not s.code[a + 9]:
                     continue
                 return math.nan, OUTSIDE, np.int64(0), 0.0
-            value = total(code, numbers, x, code[mode + 2])
-            for r in range(code[mode + 4]):
-                role = code[mode + 5 + r]
-                body = s.cast[0, code[role]]
-                players[told, answer, code[role + 3]] = body
-                for k in range(code[role + 1]):
-                    value += numbers[code[role + 2] + k] * x[code[role + 4 + k * code[BODIES] + body]]
-        value = clip(numbers, x, code[a + 18], clipped, value)
-        number, at = code[mode], code[a + 18]
-        if value < numbers[at + 2]:
-            value, number = numbers[at + 2], code[a + 19]
-        elif value > numbers[at + 3]:
-            value, number = numbers[at + 3], code[a + 20]
-        for k in range(code[code[a + 21]]):
-            stop = code[code[a + 21] + 1 + k]
-            n = code[stop + 3]
-            if code[stop] == 0:
-                reached = x[code[stop + 2]] + numbers[n + 1] * value - numbers[n + 2]
-                held = numbers[n + 3] * reached >= 0.0
+            value = total(s, s.code[mode + 2])
+            for r in range(s.code[mode + 4]):
+                role = s.code[mode + 5 + r]
+                body = s.cast[0, s.code[role]]
+                s.players[answer, s.code[role + 3]] = body
+                for k in range(s.code[role + 1]):
+                    value += s.numbers[s.code[role + 2] + k] * x[s.code[role + 4 + k * s.code[BODIES] + body]]
+        value = clip(s, s.code[a + 18], clipped, value)
+        number, at = s.code[mode], s.code[a + 18]
+        if value < s.numbers[at + 2]:
+            value, number = s.numbers[at + 2], s.code[a + 19]
+        elif value > s.numbers[at + 3]:
+            value, number = s.numbers[at + 3], s.code[a + 20]
+        for k in range(s.code[s.code[a + 21]]):
+            stop = s.code[s.code[a + 21] + 1 + k]
+            n = s.code[stop + 3]
+            if s.code[stop] == 0:
+                reached = x[s.code[stop + 2]] + s.numbers[n + 1] * value - s.numbers[n + 2]
+                held = s.numbers[n + 3] * reached >= 0.0
             else:
-                held = abs(x[code[stop + 2]] - numbers[n + 1]) <= numbers[n + 2] and math.isfinite(value)
+                held = abs(x[s.code[stop + 2]] - s.numbers[n + 1]) <= s.numbers[n + 2] and math.isfinite(
+                    value
+                )
             if held:
-                value, number = numbers[n], code[stop + 1]
-        return value, PREDICTED if code[a + 8] else UNEXPLAINED, number, margin if rank_ == 0 else 0.0
+                value, number = s.numbers[n], s.code[stop + 1]
+        return value, PREDICTED if s.code[a + 8] else UNEXPLAINED, number, margin if rank_ == 0 else 0.0
     return math.nan, NO_ROLES, np.int64(0), 0.0
 
 
 @compiled
-def beyond(code, numbers, s, a):
+def beyond(s, a):
     """Whether a scene lies out of the scope of an answer's modes."""
-    return code[a + 12] != 0 and code[code[a + 13] + leaf(code, numbers, s, code[a + 12])] == 0
+    return s.code[a + 12] != 0 and s.code[s.code[a + 13] + leaf(s, s.code[a + 12])] == 0
 
 
 @compiled
-def guessed(code, numbers, s, a):
+def guessed(s, a):
     """The fallback value of an answer; NaN if there is none."""
     value = math.nan
-    if code[a + 16]:
-        value = total(code, numbers, s.x, code[a + 16])
-    if code[a + 17]:
-        if beyond(code, numbers, s, a):
-            value = total(code, numbers, s.x, code[a + 17])
-    return clip(numbers, s.x, code[a + 18], code[a + 15], value)
+    if s.code[a + 16]:
+        value = total(s, s.code[a + 16])
+    if s.code[a + 17]:
+        if beyond(s, a):
+            value = total(s, s.code[a + 17])
+    return clip(s, s.code[a + 18], s.code[a + 15], value)
 
 
 @compiled
-def step(code, numbers, s, n, outcomes, modes, margins, told_at, players, touched):
+def step(s):
     """One step of the scene whose present values stand in `s.x`; 0, or why not."""
-    x, width = s.x, code[WIDTH]
-    if code[BODIES]:
-        bad = look(code, numbers, s)
+    x, width = s.x, s.code[WIDTH]
+    if s.code[BODIES]:
+        bad = look(s)
         if bad:
             return bad
         s.masks[3], s.masks[4] = -1, 0
-        if code[MOVERS] and move(code, numbers, s) < 0:
+        if s.code[MOVERS] and move(s) < 0:
             return TOO_MANY
-    for k in range(code[KEYS]):
+    for k in range(s.code[KEYS]):
         s.lost[k] = 0
-    for k in range(code[ANSWERS]):
-        a = code[code[AT_ANSWERS] + k]
-        column = code[a]
-        features = code[a + 5]
-        for f in range(code[features]):
-            x[code[code[features + 1 + f]]] = product(code, x, code[features + 1 + f])
-        if code[a + 3] >= 0:
-            body = code[a + 2]
+    for k in range(s.code[ANSWERS]):
+        a = s.code[s.code[AT_ANSWERS] + k]
+        column = s.code[a]
+        features = s.code[a + 5]
+        for f in range(s.code[features]):
+            x[s.code[s.code[features + 1 + f]]] = product(s, s.code[features + 1 + f])
+        if s.code[a + 3] >= 0:
+            body = s.code[a + 2]
             if s.body_flags[1, body]:
-                value, outcome, margin = s.velocity[2, code[a + 3], body], PREDICTED, math.inf
+                value, outcome, margin = s.velocity[2, s.code[a + 3], body], PREDICTED, math.inf
                 mode = np.int64(TOUCHING if s.body_flags[2, body] else FREE)
             else:
                 value, outcome, mode, margin = math.nan, OUTSIDE, np.int64(0), 0.0
-            touched[told_at, k] = hits(code, s, body)
+            s.touched[k] = hits(s, body)
         else:
-            value, outcome, mode, margin = by_modes(code, numbers, s, a, players, told_at, k)
-            touched[told_at, k] = mode
-        needs = code[a + 4]
-        for j in range(code[needs]):
-            if s.lost[code[needs + 1 + j]]:
+            value, outcome, mode, margin = by_modes(s, a, k)
+            s.touched[k] = mode
+        needs = s.code[a + 4]
+        for j in range(s.code[needs]):
+            if s.lost[s.code[needs + 1 + j]]:
                 outcome, margin = DEPENDS, 0.0
         told = math.isfinite(value)
         if told:
@@ -1639,45 +1668,43 @@ def step(code, numbers, s, n, outcomes, modes, margins, told_at, players, touche
         else:
             if outcome == PREDICTED:
                 outcome = OUTSIDE
-            value = guessed(code, numbers, s, a)
-            touched[told_at, k] = 0
+            value = guessed(s, a)
+            s.touched[k] = 0
             if math.isfinite(value):
-                touched[told_at, k] = -2 if beyond(code, numbers, s, a) else -1
+                s.touched[k] = -2 if beyond(s, a) else -1
                 x[width + column] = value
         known = told and outcome == PREDICTED
-        outcomes[n, k], margins[n, k] = outcome, margin
-        modes[n, k] = mode if known or (told and outcome == UNEXPLAINED) else 0
+        s.outcomes[k], s.margins[k] = outcome, margin
+        s.modes[k] = mode if known or (told and outcome == UNEXPLAINED) else 0
         if not known:
-            s.lost[code[a + 1]] = 1
-    for k in range(code[KINEMATICS]):
-        at = code[AT_KINEMATICS] + 3 * k
-        x[width + code[at]] = x[code[at]] + numbers[code[at + 2]] * x[code[at + 1]]
-    for k in range(code[ANGLES]):
-        column = width + code[code[AT_ANGLES] + k]
+            s.lost[s.code[a + 1]] = 1
+    for k in range(s.code[KINEMATICS]):
+        at = s.code[AT_KINEMATICS] + 3 * k
+        x[width + s.code[at]] = x[s.code[at]] + s.numbers[s.code[at + 2]] * x[s.code[at + 1]]
+    for k in range(s.code[ANGLES]):
+        column = width + s.code[s.code[AT_ANGLES] + k]
         x[column] -= TURN_AROUND * np.round(x[column] / TURN_AROUND)
     return 0
 
 
 @compiled
-def hits(code, s, body):
+def hits(s, body):
     """Whom a mover touches, as bits."""
     found, one = np.int64(0), np.int64(1)
-    for k in range(code[BODIES]):
+    for k in range(s.code[BODIES]):
         if k != body and s.known[1, min(k, body), max(k, body)] == s.masks[5] + 1:
             found |= one << k
     return found
 
 
 @entered
-def run(code, numbers, spaces, vectors, following, outcomes, modes, margins, players, touched):
+def run(spaces, vectors, following, outcomes, modes, margins, players, touched):
     """A step of n scenes.
 
     Parameters
     ----------
-    code, numbers
-        The tape.
     spaces
-        Work space, shape ``(1,)`` of `SPACE`.
+        Work space with the tape in it, shape ``(1,)`` of `SPACE`.
     vectors, following
         State vectors, finite, and copies of them, into which next values are written, shape ``(n, width)``.
     outcomes, modes, margins
@@ -1690,21 +1717,27 @@ def run(code, numbers, spaces, vectors, following, outcomes, modes, margins, pla
     -------
     0, or why some scene can't be.
     """
-    width = code[WIDTH]
     s = spaces[0]
+    width, reads, nexts = s.code[WIDTH], s.code[AT_READS], s.code[AT_NEXTS]
     s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
     for n in range(vectors.shape[0]):
-        for k in range(code[READS]):
-            column = code[code[AT_READS] + k]
+        for k in range(s.code[READS]):
+            column = s.code[reads + k]
             s.x[column] = vectors[n, column]
-        for k in range(code[NEXTS]):
-            column = code[code[AT_NEXTS] + k]
+        for k in range(s.code[NEXTS]):
+            column = s.code[nexts + k]
             s.x[width + column] = s.x[column]
-        told = n if n < len(players) else 0
-        bad = step(code, numbers, s, n, outcomes, modes, margins, told, players, touched)
+        bad = step(s)
         if bad:
             return bad
-        for k in range(code[NEXTS]):
-            column = code[code[AT_NEXTS] + k]
+        for k in range(s.code[NEXTS]):
+            column = s.code[nexts + k]
             following[n, column] = s.x[width + column]
+        for k in range(s.code[ANSWERS]):
+            outcomes[n, k], modes[n, k], margins[n, k] = s.outcomes[k], s.modes[k], s.margins[k]
+        if n < players.shape[0]:
+            for k in range(s.code[ANSWERS]):
+                touched[n, k] = s.touched[k]
+                for r in range(players.shape[2]):
+                    players[n, k, r] = s.players[k, r]
     return 0

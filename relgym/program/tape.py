@@ -56,6 +56,7 @@ RELATION_KINDS = {
 
 MOST_REGISTERS, MOST_CONTACTS, MOST_CORNERS, MOST_RELATIONS, MOST_FEATURES = 4096, 128, 16, 16, 64
 MOST_MODES, MOST_VARIABLES, MOST_ROLES, MOST_KEYS = 64, 12, 12, 256
+MOST_CODE, MOST_NUMBERS, MOST_ANSWERS = 65536, 16384, 512
 """What a work space has room for."""
 
 REMEMBERED, REMEMBERED_MODES, REMEMBERED_ROLES = 512, 8, 6
@@ -64,6 +65,8 @@ REMEMBERED, REMEMBERED_MODES, REMEMBERED_ROLES = 512, 8, 6
 _K = ir.MOST_BODIES
 SPACE = np.dtype(
     [
+        ("code", np.int64, (MOST_CODE,)),  # the tape
+        ("numbers", np.float64, (MOST_NUMBERS,)),
         ("x", np.float64, (MOST_REGISTERS,)),  # registers
         ("body", np.float64, (_K, 11)),  # place, bounding box, sizes for coarse numbers
         ("placed", np.int64, (_K,)),  # whether a body's edges are worked out
@@ -93,6 +96,11 @@ SPACE = np.dtype(
         ("lineup", np.int64, (1, _K)),  # bodies in canonical order
         ("options", np.float64, ((MOST_ROLES + 1) ** 2, 4)),  # candidates of roles
         ("cast", np.int64, (5, _K + 2)),
+        ("outcomes", np.int64, (MOST_ANSWERS,)),  # of each answer
+        ("modes", np.int64, (MOST_ANSWERS,)),
+        ("margins", np.float64, (MOST_ANSWERS,)),
+        ("players", np.int64, (MOST_ANSWERS, MOST_ROLES)),  # bodies that play its roles
+        ("touched", np.int64, (MOST_ANSWERS,)),  # whom a mover touches; or the mode that gave a value
         ("state", np.uint64, (1,)),  # all relations that are known, as a number
         ("memory_keys", np.uint64, (REMEMBERED,)),
         ("memory", np.int64, (REMEMBERED, 2 + REMEMBERED_MODES * (2 + REMEMBERED_ROLES))),
@@ -120,6 +128,12 @@ class Tape:
     numbers: NDArray[np.float64]
     roles: int
 
+    def space(self) -> NDArray[np.void]:
+        """A work space with the tape in it, shape ``(1,)``."""
+        found = np.zeros(1, dtype=SPACE)
+        found["code"][0, : len(self.code)], found["numbers"][0, : len(self.numbers)] = self.code, self.numbers
+        return found
+
 
 def encoded(program: ir.Program) -> Tape:
     """The tape of a program.
@@ -141,6 +155,9 @@ def encoded(program: ir.Program) -> Tape:
         "variables of a clause": (writer.variables, MOST_VARIABLES),
         "roles of a mode": (tape.roles, MOST_ROLES),
         "properties": (tape.code[KEYS], MOST_KEYS),
+        "whole numbers": (len(tape.code), MOST_CODE),
+        "constants": (len(tape.numbers), MOST_NUMBERS),
+        "answers": (len(program.answers), MOST_ANSWERS),
     }
     for what, (size, most) in sizes.items():
         if size > most:
