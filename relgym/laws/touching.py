@@ -46,6 +46,8 @@ class Cast:
         ``(d, K)`` or ``(d + 1, K)``; of a 0 where there is none.
     spins
         Whether a body's spin is learned, shape ``(K,)``.
+    pairs
+        `first` and `second` of each pair.
     """
 
     axes: Axes
@@ -58,6 +60,7 @@ class Cast:
     both: NDArray[np.bool_]
     velocities: NDArray[np.intp]
     spins: NDArray[np.bool_]
+    pairs: tuple[tuple[int, int], ...]
 
     @classmethod
     def of(cls, schema: SceneSchema, layout: SceneLayout, sources: Mapping[str, Sources]) -> Cast:
@@ -90,6 +93,7 @@ class Cast:
             np.isin(second, np.array(movers, dtype=np.intp)),
             np.where(columns < 0, layout.width + 1, columns),
             spin >= 0,
+            tuple(pairs),
         )
 
     @property

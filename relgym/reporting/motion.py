@@ -61,7 +61,7 @@ class MotionRules:
         rows: list[tuple[str, str, str]] = []
         for law in self.free:
             count = self._stats(law.examples, law.unexplained)
-            for number, (name, piece) in enumerate(zip(names[law.type], law.components, strict=True)):
+            for number, (name, piece) in enumerate(zip(names[law.type], law.components, strict=False)):
                 head = f"{law.type} touching nothing:" if not number else ""
                 rows.append((head, f"{name}' = {piece.formula(digits)}", count if not number else ""))
         for letter, laws in zip(self.letters, self.pair.axes if self.pair else (), strict=False):
