@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.errors import SlowWarning
+from relgym.model.calibration import EXPERTS, OWN, PERSISTENCE, Audit, key_of, keys_of
 from relgym.model.lowering import lowered
 from relgym.model.motion import TOUCHING
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
+from relgym.model.property_model import PropertyModel
 from relgym.model.spread import Spreads, action_columns
 from relgym.model.spread_split import place_of
 from relgym.program.records import Answer, BeyondError, Program
@@ -36,8 +38,8 @@ __all__ = ["Programs"]
 PATIENCE = 8
 """Scenes that arrays answer after each change of the model before a program is lowered: that takes about as long."""
 
-_PREDICTED, _UNEXPLAINED, _OUTSIDE = (
-    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.UNEXPLAINED, Outcome.OUTSIDE)
+_PREDICTED, _UNEXPLAINED, _DEPENDS, _UNSURE = (
+    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.UNEXPLAINED, Outcome.DEPENDS, Outcome.UNSURE)
 )
 _Bits = NDArray[np.int64]
 
@@ -132,21 +134,30 @@ class Runner:
     ----------
     parts, layout, program, kernel
         The model, the layout, the program for it, and the module that runs it.
+
+    Raises
+    ------
+    BeyondError
+        Others than modes and laws may give values, as far as anybody looked back: arrays know them.
     """
 
     def __init__(self, parts: Parts, layout: SceneLayout, program: Program, kernel: ModuleType) -> None:
-        self._parts, self._layout = parts, layout
+        self._layout = layout
         self.program = program
         tape = encoded(program)
         self._run = kernel.run
         self._roles, self._space = tape.roles, tape.space()
-        if self._space.dtype.fields is not None and not hasattr(kernel.run, "py_func"):
-            self._space = self._space.view(np.recarray)  # interpreted (NUMBA_DISABLE_JIT)
+        if not hasattr(kernel.run, "py_func"):  # interpreted (NUMBA_DISABLE_JIT)
+            self._space = self._space.view(np.recarray)
         pair = None if parts.laws is None else parts.laws.learner.book.pair
-        self._frame = "world" if pair is None else pair.frame
+        frame = "world" if pair is None else pair.frame
         self._keys = tuple((a.object, a.property) for a in program.answers)
-        self._frames = tuple(self._frame if a.component >= 0 else "world" for a in program.answers)
-        self._tellers = tuple(_Teller(parts, layout, a, self._frame) for a in program.answers)
+        self._frames = tuple(frame if a.component >= 0 else "world" for a in program.answers)
+        self._tellers = tuple(_Teller(parts, layout, a, frame) for a in program.answers)
+        self._needed = frozenset(key for a in program.answers for key in a.needs)
+        if not all(t.plain or not t.model.calibration.trials for t in self._tellers):
+            raise BeyondError("values that guesses, regressions or former modes may give")
+        self._plain = all(t.plain for t in self._tellers)
 
     def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """Predict what follows n scenes; None: arrays must, or can say why not."""
@@ -156,63 +167,113 @@ class Runner:
             not math.isfinite(total) and not np.isfinite(vectors).all()
         ):  # finite numbers may add up to infinity
             return None
-        told = self._told(vectors)
+        judged = any(t.model.calibration.trials for t in self._tellers)
+        told = self._told(vectors, len(vectors) if judged else 1)
         if told is None:
             return None
+        probabilities = intervals = np.full(told.margins.shape, np.nan)
+        if judged:
+            probabilities, intervals = probabilities.copy(), intervals.copy()
+            for k in range(len(self._tellers)):
+                if not self._judge(k, told, probabilities, intervals):
+                    return None
         return BatchPrediction(
-            self._layout, told.following, self._keys, told.modes, told.outcomes, told.margins, self._frames
+            self._layout,
+            told.following,
+            self._keys,
+            told.modes,
+            told.outcomes,
+            told.margins,
+            self._frames,
+            probabilities,
+            intervals,
         )
+
+    def _judge(
+        self, k: int, told: _Told, probabilities: NDArray[np.float64], intervals: NDArray[np.float64]
+    ) -> bool:
+        """How right an answer's predictions are, in place; False where that changes what others rest on."""
+        teller, outcomes, modes = self._tellers[k], told.outcomes[:, k], told.modes[:, k]
+        a, model = teller.answer, teller.model
+        if a.component >= 0 and (outcomes == _DEPENDS).any():
+            return False  # whether laws had a value isn't told
+        own = outcomes == _PREDICTED if a.component >= 0 else told.noted[:, k] > 0
+        values = np.full((len(own), len(EXPERTS)), np.nan)
+        values[own, OWN], values[:, PERSISTENCE] = 0.0, 0.0  # who has a value counts, not which
+        winners = -modes if a.component >= 0 else modes
+        kinds = np.where(modes != 0, np.int8(_PREDICTED), outcomes)
+        for key, part in keys_of(kinds, winners, told.margins[:, k]):
+            for rows, said in model.judge_many(key, values[part]):
+                some = part[rows]
+                if said.speaker != OWN and own[some].any():
+                    return False
+                probabilities[some, k], intervals[some, k] = said.probability, said.interval
+                before = outcomes[some]
+                changed = before == (_UNEXPLAINED if model.claims(said) and key.winner else _PREDICTED)
+                if model.claims(said) and not (model.calibration.trials and key.winner):
+                    continue
+                if changed.any() and a.key in self._needed:
+                    return False
+                outcomes[some[changed]] = _PREDICTED if model.claims(said) else _UNSURE
+        return True
 
     def one(self, scene: Scene) -> ScenePrediction | None:
         """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not."""
+        if not self._plain:
+            return None
         now = scene.vector
-        told = self._told(now[None])
+        told = self._told(now[None], 1)
         if told is None:
             return None
         after, players = told.following[0], told.players[0]
         outcomes, modes = told.outcomes[0].tolist(), told.modes[0].tolist()
         margins, noted = told.margins[0].tolist(), told.noted[0].tolist()
-        found = tuple(
-            teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
-            for k, teller in enumerate(self._tellers)
-        )
-        return ScenePrediction(Scene(scene.schema, self._layout, after), found)
+        found: list[Prediction] = []
+        for k, teller in enumerate(self._tellers):
+            one = teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
+            if one is None or (one.ok != (outcomes[k] == _PREDICTED) and teller.answer.key in self._needed):
+                return None
+            found.append(one)
+        return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
 
-    def _told(self, vectors: NDArray[np.float64]) -> _Told | None:
+    def _told(self, vectors: NDArray[np.float64], told: int) -> _Told | None:
         """Run the program. What it writes to is new each time: another thread may ask before this one has read it."""
         n, count = len(vectors), len(self._keys)
-        told = _Told(
+        found = _Told(
             vectors.copy(),
             np.empty((n, count), dtype=np.int8),
             np.empty((n, count), dtype=np.int64),
             np.empty((n, count)),
-            np.empty((1, count, self._roles), dtype=np.int64),
-            np.zeros((1, count), dtype=np.int64),
+            np.empty((told, count, self._roles), dtype=np.int64),
+            np.zeros((told, count), dtype=np.int64),
         )
-        return None if self._run(self._space, vectors, *told) else told
+        return None if self._run(self._space, vectors, *found) else found
 
 
 class _Teller:
-    """What is told of one answer to a single scene: who plays which role, and the spread."""
+    """What is told of one answer: who plays which role, the spread, and how right it is.
 
-    __slots__ = ("_answer", "_body_names", "_frame", "_modes", "_spreads", "_stand_ins")
+    Attributes
+    ----------
+    answer, model
+        The answer, and the model of its target.
+    plain
+        Whether none but modes, laws, and that nothing changes have values for it (`relgym.model.calibration`).
+    """
+
+    __slots__ = ("_body_names", "_frame", "_modes", "_spreads", "answer", "model", "plain")
 
     def __init__(self, parts: Parts, layout: SceneLayout, answer: Answer, frame: str) -> None:
-        self._answer, self._frame = answer, frame
+        self.answer, self._frame = answer, frame
         self._body_names = tuple(layout.names[i] for i in layout.bodies)
         self._modes = {mode.id: mode for mode in answer.modes}
         index = layout.index(answer.object)
-        model = parts.property_model(layout.types[index].name, answer.property)
+        model = self.model = parts.property_model(layout.types[index].name, answer.property)
         situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)  # type: ignore[arg-type]
         signature = situation.signature
         gather = parts.perception.gather(layout, signature, tuple(situation.plain.tolist())).tolist()
         self._spreads = _spreads(model.spreads, signature, gather) if answer.modes else {}
-        best, beyond = model.guess, model.guess_beyond
-        self._stand_ins = (
-            math.nan if best is None else best.mode.sigma,
-            math.nan if beyond is None else beyond.mode.sigma,
-            beyond is not None,
-        )
+        self.plain = _plain(model, governed=answer.component >= 0)
 
     def tell(
         self,
@@ -223,35 +284,72 @@ class _Teller:
         margin: float,
         noted: int,
         players: _Bits,
-    ) -> Prediction:
-        """The prediction of a scene; `noted` is the mode that gave the value, or of laws whom the body touches."""
-        a = self._answer
-        value = float(after[a.column])
+    ) -> Prediction | None:
+        """The prediction of a scene; `noted` is the mode that gave the value, or of laws whom the body touches.
+
+        None where it isn't the winner who gives the value, though it has one, or whether it has one isn't told.
+        """
+        a = self.answer
+        lawful = a.component >= 0
+        if lawful and outcome == _DEPENDS:
+            return None
+        own = outcome == _PREDICTED if lawful else noted > 0
+        value, present = float(after[a.column]), float(now[a.column])
         roles: tuple[str, ...] = ()
         spread = math.nan
-        if a.component >= 0:
-            if mode:
-                touched = (name for k, name in enumerate(self._body_names) if noted >> k & 1)
-                roles = (a.object, *touched)
-        elif noted > 0:
+        if lawful and mode:
+            roles = (a.object, *(name for k, name in enumerate(self._body_names) if noted >> k & 1))
+        elif own and not lawful:
             spread = self._spreads[noted](now) if noted in self._spreads else math.nan
-            if mode:
-                roles = self._roles(mode, players)
-        if noted < 0:  # a fallback value
-            spread = self._stand_ins[1] if noted == -2 and self._stand_ins[2] else self._stand_ins[0]
-        said = self._frame if mode == TOUCHING and a.component >= 0 else "world"
-        return Prediction(a.object, a.property, value, OUTCOMES[outcome], mode, roles, margin, said, spread)
+            roles = self._roles(mode, players) if mode else ()
+        nothing = math.nan
+        values = (value if own else nothing, nothing, nothing, nothing, nothing, present)
+        key = key_of(_PREDICTED if mode else outcome, -mode if lawful else mode, margin)
+        said = self.model.judge(key, values)
+        if own and said.speaker != OWN:
+            return None
+        claimed = self.model.claims(said)
+        if outcome == _PREDICTED and not claimed:
+            outcome = _UNSURE
+        elif outcome == _UNEXPLAINED and mode and claimed and self.model.calibration.trials:
+            outcome = _PREDICTED
+        frame = self._frame if lawful and mode == TOUCHING else "world"
+        return Prediction(
+            a.object,
+            a.property,
+            value,
+            OUTCOMES[outcome],
+            mode,
+            roles,
+            margin,
+            frame,
+            spread if own else nothing,
+            said.probability,
+            said.interval,
+            Audit(key, values, said.speaker),
+        )
 
     def _roles(self, mode: int, players: _Bits) -> tuple[str, ...]:
         known = self._modes.get(mode)
         if known is None:  # a limit, or a stop
-            return (self._answer.object,)
+            return (self.answer.object,)
         if not known.roles:
             return tuple(name for name in known.players if name is not None)
         names = list(known.players)
         for role in known.roles:
             names[role.number + 1] = self._body_names[int(players[role.number])]
         return tuple(name for name in names if name is not None)
+
+
+def _plain(model: PropertyModel, *, governed: bool) -> bool:
+    """Whether none but a target's modes or laws, and that nothing changes, have values for it."""
+    if model.guess is not None or model.guess_beyond is not None:
+        return False
+    if governed:
+        return True
+    former = model.latest in model.clusterer.clusters and not model.bounds(model.latest)
+    doubted = model._record.doubts(_PREDICTED, model.config.claim_probability)
+    return not model.rough and not (former and doubted and len(model.classifier.modes) > 1)
 
 
 def _spreads(

@@ -16,7 +16,7 @@ from relgym.program import records as ir
 
 __all__ = ["python_source"]
 
-_OUTCOMES = ("PREDICTED", "NO_MODE", "UNEXPLAINED", "NO_ROLES", "OUTSIDE", "DEPENDS")
+_OUTCOMES = ("PREDICTED", "NO_MODE", "UNEXPLAINED", "NO_ROLES", "OUTSIDE", "DEPENDS", "UNSURE")
 _GEOMETRY = ("disc_and_polygon", "separation", "nearest", "polygons", "discs", "boxes")
 
 

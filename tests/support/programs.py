@@ -52,6 +52,8 @@ def assert_alike(parts: Parts, layout: SceneLayout, vectors: Array, tolerance: f
     np.testing.assert_array_equal(said.outcomes, known.outcomes)
     np.testing.assert_array_equal(said.modes, known.modes)
     np.testing.assert_array_equal(said.margins, known.margins)
+    np.testing.assert_array_equal(said.probabilities, known.probabilities)
+    np.testing.assert_array_equal(said.intervals, known.intervals)
     scale = np.maximum(1.0, np.abs(known.vectors))
     assert (np.abs(said.vectors - known.vectors) <= tolerance * scale).all()
 
