@@ -80,7 +80,7 @@ class _Lowering:
         self.relation_numbers = {name: k for k, name in enumerate(names)}
         # Situations read only the layout of a percept, as far as they are asked here.
         nothing = np.empty((0, layout.width))
-        self._percept = Percept(self.perception, layout, nothing, None)  # type: ignore[arg-type]
+        self._percept = Percept(self.perception, layout, nothing, None)
 
     def _check(self) -> None:
         shapes = {type(self.layout.types[i].shape) for i in self.layout.bodies}

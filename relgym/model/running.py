@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.errors import SlowWarning
-from relgym.model.calibration import EXPERTS, OWN, PERSISTENCE, Audit, key_of, keys_of
+from relgym.model.calibration import OWN, Audit, key_of, lead_bins
 from relgym.model.lowering import lowered
 from relgym.model.motion import TOUCHING
 from relgym.model.parts import Parts
@@ -167,15 +167,15 @@ class Runner:
             not math.isfinite(total) and not np.isfinite(vectors).all()
         ):  # finite numbers may add up to infinity
             return None
-        judged = any(t.model.calibration.trials for t in self._tellers)
-        told = self._told(vectors, len(vectors) if judged else 1)
+        calibrated = any(t.model.calibration.trials for t in self._tellers)
+        told = self._told(vectors, len(vectors) if calibrated else 1)
         if told is None:
             return None
         probabilities = intervals = np.full(told.margins.shape, np.nan)
-        if judged:
+        if calibrated:
             probabilities, intervals = probabilities.copy(), intervals.copy()
             for k in range(len(self._tellers)):
-                if not self._judge(k, told, probabilities, intervals):
+                if not self._calibrate(k, told, probabilities, intervals):
                     return None
         return BatchPrediction(
             self._layout,
@@ -189,7 +189,7 @@ class Runner:
             intervals,
         )
 
-    def _judge(
+    def _calibrate(
         self, k: int, told: _Told, probabilities: NDArray[np.float64], intervals: NDArray[np.float64]
     ) -> bool:
         """How right an answer's predictions are, in place; False where that changes what others rest on."""
@@ -198,23 +198,23 @@ class Runner:
         if a.component >= 0 and (outcomes == _DEPENDS).any():
             return False  # whether laws had a value isn't told
         own = outcomes == _PREDICTED if a.component >= 0 else told.noted[:, k] > 0
-        values = np.full((len(own), len(EXPERTS)), np.nan)
-        values[own, OWN], values[:, PERSISTENCE] = 0.0, 0.0  # who has a value counts, not which
-        winners = -modes if a.component >= 0 else modes
         kinds = np.where(modes != 0, np.int8(_PREDICTED), outcomes)
-        for key, part in keys_of(kinds, winners, told.margins[:, k]):
-            for rows, said in model.judge_many(key, values[part]):
-                some = part[rows]
-                if said.speaker != OWN and own[some].any():
-                    return False
-                probabilities[some, k], intervals[some, k] = said.probability, said.interval
-                before = outcomes[some]
-                changed = before == (_UNEXPLAINED if model.claims(said) and key.winner else _PREDICTED)
-                if model.claims(said) and not (model.calibration.trials and key.winner):
-                    continue
-                if changed.any() and a.key in self._needed:
-                    return False
-                outcomes[some[changed]] = _PREDICTED if model.claims(said) else _UNSURE
+        for rows in _alike(kinds, modes, told.margins[:, k], own):
+            row, trusted = rows[0], bool(model.calibration.trials)
+            winner = int(-modes[row] if a.component >= 0 else modes[row])
+            key = key_of(int(kinds[row]), winner, float(told.margins[row, k]))
+            value = 0.0 if own[row] else math.nan  # who has a value counts, not which
+            said = model.judge(key, (value, math.nan, math.nan, math.nan, math.nan, 0.0))
+            if said.speaker != OWN and own[row]:
+                return False
+            probabilities[rows, k], intervals[rows, k] = said.probability, said.interval
+            claimed, before = model.claims(said), outcomes[rows]
+            if claimed and not (trusted and winner):
+                continue
+            changed = before == (_UNEXPLAINED if claimed else _PREDICTED)
+            if changed.any() and a.key in self._needed:
+                return False
+            outcomes[rows[changed]] = _PREDICTED if claimed else _UNSURE
         return True
 
     def one(self, scene: Scene) -> ScenePrediction | None:
@@ -251,7 +251,7 @@ class Runner:
 
 
 class _Teller:
-    """What is told of one answer: who plays which role, the spread, and how right it is.
+    """What is told of one answer: which bodies the roles are bound to, the spread, and how right it is.
 
     Attributes
     ----------
@@ -269,7 +269,7 @@ class _Teller:
         self._modes = {mode.id: mode for mode in answer.modes}
         index = layout.index(answer.object)
         model = self.model = parts.property_model(layout.types[index].name, answer.property)
-        situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)  # type: ignore[arg-type]
+        situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)
         signature = situation.signature
         gather = parts.perception.gather(layout, signature, tuple(situation.plain.tolist())).tolist()
         self._spreads = _spreads(model.spreads, signature, gather) if answer.modes else {}
@@ -339,6 +339,15 @@ class _Teller:
         for role in known.roles:
             names[role.number + 1] = self._body_names[int(players[role.number])]
         return tuple(name for name in names if name is not None)
+
+
+def _alike(
+    kinds: NDArray[np.int8], modes: _Bits, margins: NDArray[np.float64], own: NDArray[np.bool_]
+) -> list[NDArray[np.intp]]:
+    """Rows whose predictions are of one kind: of one outcome, mode and lead, with or without a value."""
+    codes = ((modes * 8 + lead_bins(margins)) * 16 + kinds) * 2 + own
+    order = np.argsort(codes, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(codes[order])) + 1) if len(order) else []
 
 
 def _plain(model: PropertyModel, *, governed: bool) -> bool:

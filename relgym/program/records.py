@@ -411,7 +411,7 @@ class Mode:
     roles, casting
         Roles that are cast in each scene, and how.
     players
-        Names of who plays each role, the target first; None for roles that are cast.
+        Names of the objects bound to the roles, the target first; None for roles that are bound in each scene.
     """
 
     id: int

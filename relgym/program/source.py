@@ -948,9 +948,9 @@ def move(scene):
         governed = 3 if point and SPINS else 2
         stated = {k: lawful and all(math.isfinite(after[d][k]) for d in range(governed)) for k in involved}
         sure = settled and lawful and precedented(law, contacts, after)
-        rivals = [compose(rival, contacts, now, whole)[0] for rival in LAWS[1:]]
+        others = [compose(other, contacts, now, whole)[0] for other in LAWS[1:]]
         for k in involved:
-            agreed = all(abs(r[d][k] - after[d][k]) <= SLACK for r in rivals for d in range(governed))
+            agreed = all(abs(r[d][k] - after[d][k]) <= SLACK for r in others for d in range(governed))
             known[k] = known[k] and stated[k] and sure and agreed
         v = [[after[d][k] if stated.get(k) else free[d][k] for k in range(count)] for d in range(3)]
     scene.motion, scene.told = v, [(known[k], k in involved) for k in range(count)]

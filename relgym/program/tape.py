@@ -99,7 +99,7 @@ SPACE = np.dtype(
         ("outcomes", np.int64, (MOST_ANSWERS,)),  # of each answer
         ("modes", np.int64, (MOST_ANSWERS,)),
         ("margins", np.float64, (MOST_ANSWERS,)),
-        ("players", np.int64, (MOST_ANSWERS, MOST_ROLES)),  # bodies that play its roles
+        ("players", np.int64, (MOST_ANSWERS, MOST_ROLES)),  # bodies bound to its roles
         ("touched", np.int64, (MOST_ANSWERS,)),  # whom a mover touches; or the mode that gave a value
         ("state", np.uint64, (1,)),  # all relations that are known, as a number
         ("memory_keys", np.uint64, (REMEMBERED,)),

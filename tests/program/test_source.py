@@ -46,7 +46,7 @@ def test_learned_models(name: str) -> None:
     assert_same(model.to_python(layout), vectors, arrays(model._parts, layout, vectors))
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(data=st.data(), shapes=st.integers(1, 3), balls=st.integers(1, 3), seed=st.integers(0, 10**6))
 def test_laws_of_any_form(data: st.DataObject, shapes: int, balls: int, seed: int) -> None:
     schema = room_schema(shapes, balls)
