@@ -111,7 +111,9 @@ class Judgement(NamedTuple):
 
 def key_of(outcome: int, winner: int, margin: float) -> Key:
     """The cell of a prediction."""
-    return Key(outcome, winner, int(lead_bins(np.array([margin]))[0]))
+    if not margin > 0.0:
+        return Key(outcome, winner, 0)
+    return Key(outcome, winner, 7 if math.isinf(margin) else min(max(math.frexp(margin)[1] + 2, 1), 6))
 
 
 def keys_of(
