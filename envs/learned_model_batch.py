@@ -73,7 +73,13 @@ class DreamStep:
     horizon: int | None
     min_margin: float
 
-    def __call__(self, before: Float2D, steps: NDArray[np.int64], actions: Any) -> Stepped:
+    def __call__(
+        self,
+        before: Float2D,
+        steps: NDArray[np.int64],
+        actions: Any,
+        among: NDArray[np.bool_] | None = None,
+    ) -> Stepped:
         """Step n dreams.
 
         Parameters
@@ -84,6 +90,8 @@ class DreamStep:
             How many steps the dreams have lasted, this one included, shape ``(n,)``.
         actions
             Checked actions, shape ``(n, …)``.
+        among
+            Which of them go on, shape ``(n,)``; what comes of the others means nothing. Default: all.
 
         Raises
         ------
@@ -93,15 +101,23 @@ class DreamStep:
         acting = self.actions.joined(before, actions)
         prediction = self.setting.model.predict_batch(self.actions.layout, acting)
         after = self.actions.parted(prediction.vectors)
-        why = causes(prediction, self.setting.shown.inside(after), self.min_margin, self.evaluator.overruled)
+        inside = self.setting.shown.still_inside(after, prediction.parts)
+        why = causes(prediction, inside, self.min_margin, self.evaluator.overruled)
+        if among is not None:
+            why[~among] = _HORIZON  # neither followed nor evaluated
         rewards, ended, success = self._evaluated(before, actions, after, why < 0)
         if (doubted := np.isnan(rewards)).any():
             why[doubted], rewards[doubted], ended[doubted] = _NO_REWARD, 0.0, False
         if self.horizon is not None:
             why[(why < 0) & (steps >= self.horizon)] = _HORIZON
         lost = (why >= 0) & (why != _HORIZON)
-        followed = np.where(lost[:, None], before, after)
-        followed[:, self.setting.brought] = 0.0  # what the next step will bring isn't known
+        if among is not None:
+            why[~among] = -1
+        followed = after.copy()
+        if lost.any():
+            followed[lost] = before[lost]
+        if len(self.setting.brought):
+            followed[:, self.setting.brought] = 0.0  # what the next step will bring isn't known
         return Stepped(followed, rewards, ended, why >= 0, why, success, after, prediction)
 
     def _evaluated(
@@ -112,6 +128,9 @@ class DreamStep:
         layout = self.setting.layout
         # Single dreams are frozen: a function that changes what it evaluates would change the dream.
         before, after = _read_only(before), _read_only(after)
+        if tells is None and not self.evaluator.asks:
+            rewards, ended = self.evaluator(before, actions, after)
+            return np.where(good, rewards, 0.0), ended & good, None
         if good.all():
             success = (
                 None if tells is None else np.asarray(tells(layout, before, actions, after), dtype=np.bool_)

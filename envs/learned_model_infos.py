@@ -13,31 +13,30 @@ from relgym.envs.learned_model_ends import CAUSES, Cause
 __all__ = ["masked", "told_of"]
 
 
-def told_of(step: DreamStep, stepped: Stepped, rows: NDArray[np.intp], count: int) -> dict[str, Any]:
-    """Infos of a step of some of `count` dreams; what happened to none is left out.
+def told_of(step: DreamStep, stepped: Stepped, going: NDArray[np.bool_] | None) -> dict[str, Any]:
+    """Infos of a step of many dreams; what happened to none is left out.
 
     Parameters
     ----------
     step, stepped
         The step function, and what it gave.
-    rows
-        Numbers of the dreams that were stepped.
-    count
-        Number of all dreams.
+    going
+        Which dreams went on, shape ``(n,)``; None: all.
     """
     infos: dict[str, Any] = {}
-    cut = np.flatnonzero(stepped.truncated)
+    cut, count = np.flatnonzero(stepped.truncated), len(stepped.truncated)
     if len(cut):
         reasons, names = (np.full(count, None, dtype=object) for _ in range(2))
         for k in cut.tolist():
-            reasons[rows[k]] = step.reason(stepped, k)
-            names[rows[k]] = CAUSES[stepped.causes[k]].name.lower()
-        mask = _placed(np.ones(len(cut), dtype=np.bool_), rows[cut], count)
+            reasons[k] = step.reason(stepped, k)
+            names[k] = CAUSES[stepped.causes[k]].name.lower()
+        mask = stepped.truncated.copy()
         infos |= {"reason": reasons, "_reason": mask, "cause": names, "_cause": mask.copy()}
     if stepped.success is not None:
         followed = (stepped.causes < 0) | (stepped.causes == CAUSES.index(Cause.HORIZON))
-        infos["is_success"] = _placed(stepped.success, rows, count)
-        infos["_is_success"] = _placed(followed, rows, count)
+        told = followed if going is None else followed & going
+        infos["is_success"] = stepped.success & told
+        infos["_is_success"] = told
     return infos
 
 
@@ -48,10 +47,3 @@ def masked(infos: dict[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:
         if (left := infos[f"_{name}"] & mask).any():
             found |= {name: infos[name], f"_{name}": left}
     return found
-
-
-def _placed(values: NDArray[Any], rows: NDArray[np.intp], count: int) -> NDArray[Any]:
-    """Values of some of the dreams among zeros for the others."""
-    whole = np.zeros(count, dtype=values.dtype)
-    whole[rows] = values
-    return whole

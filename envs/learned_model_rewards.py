@@ -270,6 +270,11 @@ class BatchStepEvaluator:
         )
 
     @property
+    def asks(self) -> bool:
+        """Whether a function is asked, of which nobody knows what it does with steps that can't be followed."""
+        return callable(self.reward) or callable(self.terminated)
+
+    @property
     def overruled(self) -> frozenset[tuple[str, str]]:
         """As of `StepEvaluator`."""
         return _overruled(self.reward, self.terminated)

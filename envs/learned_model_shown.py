@@ -75,6 +75,10 @@ class Shown(Protocol):
         """Which of n scenes lie in the observation space, shape ``(n,)``."""
         ...
 
+    def still_inside(self, vectors: Float2D, parts: tuple[tuple[str, str], ...]) -> NDArray[np.bool_]:
+        """Which of n scenes lie there that did one step before; (object, property) pairs may have changed since."""
+        ...
+
     def outside(self, scene: Scene) -> str:
         """What of a scene lies outside the observation space, as a sentence; empty if nothing does."""
         ...
@@ -114,9 +118,15 @@ class Boxes:
             least, most = limits_of(box.dtype)
             self._low[name], self._high[name] = np.maximum(box.low, least), np.minimum(box.high, most)
         self._whole = frozenset(name for name, dtype in self._dtypes.items() if is_whole(dtype))
+        self._as_they_are = all(dtype == np.float64 for dtype in self._dtypes.values())
 
     def shown(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-        """Property vectors by object, of one state vector or of n: arrays of their own."""
+        """Property vectors by object, of one state vector or of n: arrays that nobody else has."""
+        if self._as_they_are:
+            own = vectors.copy()
+            return {
+                name: own[..., layout.slice(k)] for k, name in enumerate(layout.names) if name in self._dtypes
+            }
         rounded = self.rounded(layout, vectors)
         return {
             name: rounded[..., layout.slice(k)].astype(self._dtypes[name])
@@ -129,6 +139,16 @@ class Boxes:
         low, high = self.limits(layout)
         rounded = self.rounded(layout, vectors)
         return np.asarray(((low <= rounded) & (rounded <= high)).all(axis=-1))
+
+    def inside_at(
+        self, layout: SceneLayout, vectors: NDArray[np.float64], columns: NDArray[np.intp]
+    ) -> NDArray[np.bool_]:
+        """Which of n state vectors lie within the limits of some columns, shape ``(n,)``; not those with NaN."""
+        if self._whole:
+            return self.inside(layout, vectors)
+        low, high = self.limits(layout)
+        some = vectors.take(columns, axis=1)
+        return np.asarray(((low[columns] <= some) & (some <= high[columns])).all(axis=1))
 
     def limits(self, layout: SceneLayout) -> tuple[Float1D, Float1D]:
         """Smallest and largest element of each column."""
@@ -176,6 +196,7 @@ class BoxesShown:
     ) -> None:
         seen = checked_boxes(observation_space, schema)
         self._schema, self._action_space, self._boxes = schema, action_space, Boxes(seen)
+        self._changing: dict[tuple[tuple[str, str], ...], NDArray[np.intp]] = {}
         self.layout = schema.layout([*seen, *(name for name in (TASK,) if name in schema.order)])
 
     def acting(self, scene: Scene, action: Any) -> Scene:
@@ -197,6 +218,16 @@ class BoxesShown:
     def inside(self, vectors: Float2D) -> NDArray[np.bool_]:
         """Which of n scenes lie in the observation space, shape ``(n,)``."""
         return self._boxes.inside(self.layout, vectors)
+
+    def still_inside(self, vectors: Float2D, parts: tuple[tuple[str, str], ...]) -> NDArray[np.bool_]:
+        """Which of n scenes lie there that did one step before: only what a step may change is looked at."""
+        if parts not in self._changing:
+            layout = self.layout
+            pairs = {(layout.index(name), prop) for name, prop in parts if name in layout.names}
+            pairs |= {(i, law.property) for law in self._schema.derivations for i in layout.of_type(law.type)}
+            pairs |= {(i, prop) for i, t in enumerate(layout.types) for prop in t.angles}
+            self._changing[parts] = np.array(sorted(layout.column(*pair) for pair in pairs), dtype=np.intp)
+        return self._boxes.inside_at(self.layout, vectors, self._changing[parts])
 
     def outside(self, scene: Scene) -> str:
         """Which properties lie outside the observation space."""
@@ -258,6 +289,10 @@ class ViewShown:
         if (found := shown_at_once(self._view, self.layout, vectors)) is not None:
             return found[1]
         return np.array([not self.outside(self._scene(vector)) for vector in vectors], dtype=np.bool_)
+
+    def still_inside(self, vectors: Float2D, parts: tuple[tuple[str, str], ...]) -> NDArray[np.bool_]:
+        """Which of n scenes lie in the observation space; views may show anything of what changed."""
+        return self.inside(vectors)
 
     def outside(self, scene: Scene) -> str:
         """The observation, if it lies outside the observation space."""

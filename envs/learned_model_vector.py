@@ -171,7 +171,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._over = np.zeros(self.num_envs, dtype=np.bool_)
         self._viewer: Any = None
         self._cameras: dict[int, Any] = {}
-        self.prediction: BatchPrediction | None = None
+        self._last: tuple[BatchPrediction, _Bools | None] | None = None
 
     # ------------------------------------------------------------------ the Gymnasium contract
     def reset(
@@ -224,20 +224,18 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
                 f"the episodes of {int(pending.sum())} dreams are over: call reset(options={{'reset_mask': mask}})"
             )
         taken = self._step.actions.checked(actions, self.num_envs)
-        rows, anew = np.flatnonzero(~pending), np.flatnonzero(pending)
-        rewards, infos = np.zeros(self.num_envs), {}
-        ended, cut = (np.zeros(self.num_envs, dtype=np.bool_) for _ in range(2))
-        stepped = self._stepped(rows, taken[rows]) if len(rows) else None
-        if stepped is not None:
-            rewards[rows], ended[rows], cut[rows] = stepped.rewards, stepped.terminated, stepped.truncated
-            infos = told_of(self._step, stepped, rows, self.num_envs)
+        anew = np.flatnonzero(pending)
+        # Those that begin anew are stepped, too, and what comes of it is left: cheaper than to pick the others.
+        going = None if not len(anew) else ~pending
+        stepped = self._stepped(taken, going)
+        rewards, ended, cut = stepped.rewards, stepped.terminated, stepped.truncated
+        infos = told_of(self._step, stepped, going)
         over = ended | cut
         same = self._mode is AutoresetMode.SAME_STEP and bool(over.any())
         begun = np.flatnonzero(over) if same else anew
         first = self._first(begun, None, {}) if len(begun) else None
         # Nothing can fail from here on; whatever did has left the dreams where they were.
-        if stepped is not None:
-            self._follow(rows, stepped)
+        self._follow(stepped, going)
         if same:
             infos = self._ended(infos, over)
         self._over = over
@@ -332,17 +330,27 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._over[rows] = False
 
     # ------------------------------------------------------------------ stepping
-    def _stepped(self, rows: _Rows, actions: Any) -> Stepped:
-        """A step of some of the dreams, which stay where they are."""
+    def _stepped(self, actions: Any, going: _Bools | None) -> Stepped:
+        """A step of all dreams, which stay where they are."""
         assert self._vectors is not None, "checked by the caller"
-        return self._step(self._vectors[rows], self._steps[rows] + 1, actions)
+        return self._step(self._vectors, self._steps + 1, actions, going)
 
-    def _follow(self, rows: _Rows, stepped: Stepped) -> None:
+    def _follow(self, stepped: Stepped, going: _Bools | None) -> None:
         """Go on to where a step has led."""
-        assert self._vectors is not None, "checked by the caller"
-        self._vectors[rows] = stepped.vectors
-        self._steps[rows] += 1
-        self.prediction = stepped.prediction
+        self._vectors = stepped.vectors
+        self._steps += 1
+        self._last = stepped.prediction, going
+
+    @property
+    def prediction(self) -> BatchPrediction | None:
+        """What the model said of the last step of those dreams that went on; None before the first one."""
+        if self._last is None:
+            return None
+        told, going = self._last
+        if going is None:
+            return told
+        columns = {name: getattr(told, name)[going] for name in ("vectors", "modes", "outcomes", "margins")}
+        return replace(told, **columns)
 
     def _ended(self, infos: dict[str, Any], over: _Bools) -> dict[str, Any]:
         """Infos in which last observations and infos of what is over stand under ``final_…``."""

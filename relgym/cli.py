@@ -205,6 +205,31 @@ def rules(
 
 
 @app.command()
+def export(
+    model: ModelFile,
+    out: Annotated[Path, typer.Argument(metavar="FILE", help="File to write.")],
+    to: Annotated[str, typer.Option(help="What to write: python.")] = "python",
+    steps: Annotated[int, typer.Option(help="Fresh steps on which to compare.", min=1)] = 24_000,
+    env_id: OtherEnv = None,
+    arg: Arguments = None,
+    view: ViewOption = None,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Write a model as Python that needs numpy alone, and say how often it says what the model says."""
+    from relgym.console.exporting import exported
+    from relgym.console.models import opened
+
+    if to != "python":
+        raise ConfigError(f"--to={to!r}: expected 'python'")
+    with _working("exporting"):
+        found = exported(
+            opened(model, env_id, pairs("--arg", arg), view), out, steps=steps, seed=_FRESH + seed
+        )
+    _echo_json(found) if as_json else typer.echo(found)
+
+
+@app.command()
 def explain(
     model: ModelFile,
     step: Annotated[int, typer.Option(help="Random steps to take before.", min=0)] = 0,

@@ -11,6 +11,7 @@ __all__ = [
     "RelgymError",
     "SchemaError",
     "ShapeError",
+    "SlowWarning",
     "StoreError",
 ]
 
@@ -57,3 +58,7 @@ class ClusterError(RelgymError, ConnectionError):
 
 class StoreError(RelgymError, OSError):
     """Raised when a kept result is damaged or missing, or can't be written (no space left, no permission)."""
+
+
+class SlowWarning(RuntimeWarning):
+    """Warns once that something that makes relgym fast is missing: results are the same, later."""

@@ -19,7 +19,7 @@ from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html", "scheduling"})
 ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ENGINES | {"clustering", "classification", "laws"}
-CORE = LEARNERS | {"reporting", "model"}
+CORE = LEARNERS | {"reporting", "program", "model"}
 
 MAY_IMPORT = {
     "errors": frozenset(),
@@ -35,7 +35,8 @@ MAY_IMPORT = {
     "classification": ENGINES,
     "laws": ENGINES | {"clustering"},
     "reporting": ENGINES | {"clustering", "laws"},
-    "model": LEARNERS | {"reporting"},
+    "program": frozenset({"errors"}),
+    "model": LEARNERS | {"program", "reporting"},
     "thesis": CORE,
     "baselines": CORE,
     "envs": CORE,
@@ -55,11 +56,14 @@ FACADE_USERS = frozenset({"experiments", "console", "cli"})
 CORE_LIBRARIES = frozenset({"msgspec", "numpy", "scipy"})
 FCL = "relgym.scene.geometry.fcl"
 """The only module that may import python-fcl."""
+KERNEL = "relgym.program.kernel"
+"""The only module that may import numba."""
 
 HEAVY = (
     "fcl",
     "matplotlib",
     "msgspec",
+    "numba",
     "pygame",
     "pymunk",
     "scipy.spatial",
@@ -100,20 +104,21 @@ def test_nobody_imports_from_the_root() -> None:
     assert not wrong, "import relgym.envs, relgym.wrappers; never tests or examples\n" + "\n".join(wrong)
 
 
-def test_the_core_needs_four_libraries_alone() -> None:
+def test_the_core_needs_five_libraries_alone() -> None:
     wrong = [
         _sentence(m, i)
         for m in modules()
         if m.package in CORE
         for i in m.imports
-        if _third_party(i) and not (m.name == FCL and _distribution(i) == "fcl")
+        if _third_party(i) and (m.name, _distribution(i)) not in {(FCL, "fcl"), (KERNEL, "numba")}
     ]
-    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, and fcl in {FCL}\n" + "\n".join(wrong)
+    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, fcl in {FCL}, numba in {KERNEL}\n" + "\n".join(wrong)
 
 
-def test_only_one_module_imports_fcl() -> None:
-    users = {module.name for module in modules() if any(_distribution(i) == "fcl" for i in module.imports)}
-    assert users == {FCL}
+@pytest.mark.parametrize(("library", "user"), [("fcl", FCL), ("numba", KERNEL)])
+def test_only_one_module_imports(library: str, user: str) -> None:
+    users = {module.name for module in modules() if any(_distribution(i) == library for i in module.imports)}
+    assert users == {user}
 
 
 def test_the_core_knows_no_world_by_name() -> None:

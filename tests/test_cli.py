@@ -73,6 +73,17 @@ def test_dyna_shows_both_agents_and_the_laws(tmp_path: Path) -> None:
         assert (tmp_path / name).stat().st_size > 5_000
 
 
+def test_export_writes_python_and_compares(folder: Path, tmp_path: Path) -> None:
+    file = tmp_path / "ball.py"
+    told = run("export", folder / "ball.json", file, "--steps", 60)
+    assert re.search(
+        r"on 60 fresh steps [\d.]+ % of the outcomes are the model's, values differ by at most 0\n", told
+    )
+    assert "def free_ball" in file.read_text(encoding="utf-8")
+    assert "several objects could play" in run("export", folder / "truck.json", file, "--steps", 5, code=2)
+    assert "expected 'python'" in run("export", folder / "ball.json", file, "--to", "c", code=2)
+
+
 def test_rules_print_a_model(folder: Path) -> None:
     model = WorldModel.load(folder / "ball.json")
     assert run("rules", folder / "ball.json").rstrip("\n") == model.describe()

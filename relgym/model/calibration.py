@@ -30,7 +30,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of"]
+__all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
 
 EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
 """Who may give a value: the winner of the vote (or the law); the guess; both regressions; the mode that held last,
@@ -115,23 +115,23 @@ class Assessment(NamedTuple):
 
 def key_of(outcome: int, winner: int, margin: float) -> Key:
     """The cell of a prediction."""
-    if margin == math.inf:
-        return Key(outcome, winner, 7)
-    return Key(outcome, winner, min(max(math.frexp(margin)[1] + 2, 1), 6) if margin > 0.0 else 0)
+    if not margin > 0.0:
+        return Key(outcome, winner, 0)
+    return Key(outcome, winner, 7 if math.isinf(margin) else min(max(math.frexp(margin)[1] + 2, 1), 6))
 
 
 def keys_of(
     outcomes: NDArray[np.int8], winners: NDArray[np.int64], margins: NDArray[np.float64]
 ) -> Iterator[tuple[Key, NDArray[np.intp]]]:
     """The cells of n predictions, and which of them lie in each."""
-    table = np.stack([outcomes.astype(np.int64), winners, _bins(margins)], axis=1)
+    table = np.stack([outcomes.astype(np.int64), winners, lead_bins(margins)], axis=1)
     cells, which = np.unique(table, axis=0, return_inverse=True)
     for number, cell in enumerate(cells.tolist()):
         yield Key(*cell), np.flatnonzero(which.reshape(-1) == number)
 
 
-def _bins(margins: NDArray[np.float64]) -> NDArray[np.int64]:
-    """0: no lead; else by octaves of the log-odds; 7: no runner-up."""
+def lead_bins(margins: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Bins of leads. 0: no lead; else by octaves of the log-odds; 7: no runner-up."""
     _, exponents = np.frexp(np.where(np.isfinite(margins), margins, 1.0))
     found = np.where(margins > 0.0, np.clip(exponents + 2, 1, 6), 0)
     return np.where(np.isposinf(margins), 7, found).astype(np.int64)

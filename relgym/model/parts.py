@@ -103,6 +103,25 @@ class Parts:
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_kin": {}, "_known": {}}  # keyed by identity, which a copy doesn't share
 
+    def admits(self, scene: object) -> bool:
+        """Whether a scene is known to follow the schema and holds finite numbers; sizes aren't asked."""
+        if not isinstance(scene, Scene):
+            return False
+        schema = scene.schema
+        if schema is not self.schema and self._kin.get(id(schema)) is not schema:
+            return False  # `check` looks at it once
+        return bool(np.isfinite(scene.vector).all())
+
+    def knows(self, layout: SceneLayout) -> bool:
+        """Whether it can predict scenes of a layout; `checked_batch` says why not."""
+        if self._known.get(id(layout)) is layout:
+            return True
+        own = {t.name: t for t in self.schema.types}
+        if any(own.get(t.name) != t for t in layout.types):
+            return False
+        self._known[id(layout)] = layout  # kept alive, so that its id stays its own
+        return True
+
     def check(self, scene: Scene) -> None:
         """Raise `ObservationError` for NaN, infinity, what is no scene, or one of another schema.
 

@@ -40,16 +40,20 @@ from relgym.model.locality import (
     predict_locally,
     predict_many_locally,
 )
+from relgym.model.lowering import lowered
 from relgym.model.merging import merge
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
-from relgym.model.prediction import BatchPrediction, ScenePrediction
+from relgym.model.prediction import BatchPrediction, Outcome, ScenePrediction
 from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
 from relgym.model.rules import doubted, of_laws, rule_list
+from relgym.model.running import Programs
 from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
 from relgym.model.storage import read_model, write_model
+from relgym.program.records import BeyondError
+from relgym.program.source import python_source
 from relgym.reporting.naming import named_text
 from relgym.reporting.parser import parse_rules
 from relgym.reporting.rules import RuleList
@@ -113,6 +117,7 @@ class WorldModel:
 
         self._neighbourhoods: tuple[Scene, Neighbourhoods] | None = None
         self._journal = Journal()
+        self._programs = Programs()
         self._damaged = False
 
     def __getstate__(self) -> dict[str, Any]:
@@ -124,6 +129,7 @@ class WorldModel:
             "_rules": None,
             "_advice": None,
             "_journal": Journal(),
+            "_programs": Programs(),
         }
 
     @property
@@ -138,6 +144,7 @@ class WorldModel:
         if self._damaged:
             self._roll_back()
         mark = self._journal.prepare(self._learned)
+        self._programs.changed()
         try:
             yield
             self._journal.add(name, arguments, numbers)
@@ -155,6 +162,7 @@ class WorldModel:
 
     def _roll_back(self) -> None:
         """Be what it was after the last step that was made as a whole."""
+        self._programs.changed()
         whole: WorldModel = self._journal.replayed(lambda model, name, given: getattr(model, name)(*given))
         # All at once, as far as interrupts go.
         self.__dict__.update(
@@ -477,6 +485,7 @@ class WorldModel:
         merge(whole, other._parts, follow_laws=other.seen > self.seen)
         seen = self.seen + other.seen
         finish(whole)
+        self._programs.changed()
         self.__dict__.update(_state=whole, seen=seen, _percept=None, _neighbourhoods=None, _journal=Journal())
 
     def untaught(self) -> WorldModel:
@@ -528,12 +537,32 @@ class WorldModel:
         ObservationError
             NaN or infinity somewhere, or another schema.
         """
+        if (found := self._run_one(scene)) is not None:
+            return found
         self._parts.check(scene)
         check_size(self._parts, scene.layout)
         with self._calm(scene.vector):
             if large(scene.layout):
                 return predict_locally(self._parts, self._near(scene), scene)
             return predict(self._parts, self._perceive(scene), scene)
+
+    def _run_one(self, scene: Scene) -> ScenePrediction | None:
+        """What the compiled program says of a scene; None where there is none, or the scene can't be."""
+        parts = self._parts
+        if not parts.admits(scene) or large(scene.layout):
+            return None
+        runner = self._programs.of(parts, scene.layout, 1)
+        return None if runner is None else runner.one(scene)
+
+    def _run_many(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> BatchPrediction | None:
+        """The same of n scenes; None too for what isn't an array of such."""
+        parts = self._parts
+        if not parts.knows(layout) or large(layout) or not isinstance(vectors, np.ndarray):
+            return None
+        if vectors.ndim != 2 or vectors.shape[1] != layout.width or vectors.dtype != np.float64:
+            return None
+        runner = self._programs.of(parts, layout, len(vectors))
+        return None if runner is None else runner.many(np.ascontiguousarray(vectors))
 
     def _near(self, scene: Scene) -> Neighbourhoods:
         """A large scene, taken apart; the last one is remembered."""
@@ -557,6 +586,8 @@ class WorldModel:
         vectors
             State vectors, shape ``(n, layout.width)``.
         """
+        if (found := self._run_many(layout, vectors)) is not None:
+            return found
         vectors = self._parts.checked_batch(layout, vectors)
         check_size(self._parts, layout)
         with self._calm(vectors):
@@ -645,6 +676,35 @@ class WorldModel:
         return describe(
             self, details=details, digits=digits, names=names, check=check, frame=frame, incline=incline
         )
+
+    @refusing(ConfigError)
+    def to_python(self, layout: SceneLayout | None = None) -> str:
+        """The model as the text of a Python module that needs numpy alone, for scenes with certain objects.
+
+        Its ``step(vector)`` predicts one scene, ``predict(vectors)`` many: next state vectors, outcomes (by the order
+        of `Outcome`), modes and margins, as `predict_batch` does. Every mode, law and choice between two modes is a
+        function of its own.
+
+        Parameters
+        ----------
+        layout
+            The scenes' layout; default: all objects of the schema.
+
+        Raises
+        ------
+        ConfigError
+            The model holds what isn't written as Python: roles that several objects could play, bodies in space,
+            functions that a user registered.
+        """
+        layout = self.schema.layout() if layout is None else layout
+        try:
+            program = lowered(self._parts, layout)
+            sentences = tuple(outcome.value for outcome in Outcome)
+            return python_source(program, self.describe() if self.has_rules else repr(self), sentences)
+        except BeyondError as beyond:
+            raise ConfigError(
+                f"this model can't be written as Python, since it holds {beyond}; predict_batch runs it"
+            ) from None
 
     @property
     def has_rules(self) -> bool:

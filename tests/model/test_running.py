@@ -1,0 +1,122 @@
+"""Programs follow the model: none answers for a model that isn't any more, and what has no program still answers."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from dreams import LINE_STEPS, cart_model, line_model, room_model
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from programs import arrays
+from worlds import LINE_TARGETS, learned, schema_of, transitions
+
+from relgym.config import ModelConfig
+from relgym.errors import SlowWarning
+from relgym.model import running
+from relgym.model.lowering import lowered
+from relgym.model.world_model import WorldModel
+from relgym.program.records import BeyondError
+from relgym.scene.objects import Scene
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs are lowered for the first scene that is asked."""
+    monkeypatch.setattr(running, "PATIENCE", 0)
+
+
+def assert_fresh(model: WorldModel, scene: Scene) -> None:
+    """One scene and a batch get what arrays say of the model as it is."""
+    known = arrays(model._parts, scene.layout, scene.vector[None])
+    one, many = model.predict_one(scene), model.predict_batch(scene.layout, scene.vector[None])
+    for vector in (one.scene.vector, many.vectors[0]):
+        np.testing.assert_array_equal(vector, known.vectors[0])
+    assert [p.mode for p in one.parts] == many.modes[0].tolist() == known.modes[0].tolist()
+    np.testing.assert_array_equal(many.outcomes, known.outcomes)
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.lists(st.booleans(), min_size=30, max_size=60), st.integers(0, 100))
+def test_learning_and_predicting_in_any_turn(turns: list[bool], start: int) -> None:
+    schema = schema_of(LINE_STEPS, LINE_TARGETS)
+    model = WorldModel(schema, ModelConfig(frames="world"))
+    stream = iter(transitions(schema, LINE_STEPS[start : start + len(turns) + 1]))
+    transition = next(stream)
+    for learns in turns:
+        if learns:
+            transition = next(stream)
+            model.learn_one(transition)
+        assert_fresh(model, transition.before)
+
+
+def test_laws_that_change_are_followed() -> None:
+    schema = schema_of(LINE_STEPS, LINE_TARGETS)
+    model = WorldModel(schema)
+    for transition in transitions(schema, LINE_STEPS[:150]):
+        model.learn_one(transition)
+        assert_fresh(model, transition.before)
+
+
+@pytest.mark.parametrize("change", ["finish", "merge"])
+def test_other_changes_are_followed(change: str) -> None:
+    schema = schema_of(LINE_STEPS, LINE_TARGETS)
+    model, other = (learned(schema, part) for part in (LINE_STEPS[:40], LINE_STEPS[40:200]))
+    scene = transitions(schema, LINE_STEPS[200:201])[0].before
+    model.predict_one(scene)
+    changes: dict[str, Callable[[], object]] = {"finish": model.finish, "merge": lambda: model.merge(other)}
+    changes[change]()
+    assert_fresh(model, scene)
+
+
+def test_hindsight_is_followed() -> None:
+    schema = schema_of(LINE_STEPS, LINE_TARGETS)
+    model = learned(schema, LINE_STEPS[:200], config=ModelConfig(frames="world"))
+    scene = transitions(schema, LINE_STEPS[200:201])[0].before
+    for _ in range(60):
+        found = model.predict_one(scene)
+        model.look_back(found, {(p.object, p.property): 1.0 for p in found.parts})
+    assert any(model.property_model(t.type, t.property).undecided for t in model.targets)
+    assert_fresh(model, scene)
+
+
+def test_a_program_is_lowered_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "PATIENCE", 3)
+    model = learned(schema := schema_of(LINE_STEPS, LINE_TARGETS), LINE_STEPS[:60])
+    scene = transitions(schema, LINE_STEPS[60:61])[0].before
+    calls: list[object] = []
+
+    def counted(*args: object) -> object:
+        calls.append(args)
+        return lowered(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(running, "lowered", counted)
+    for _ in range(5):
+        model.predict_one(scene)
+    assert len(calls) == 1
+
+
+def test_without_numba_arrays_answer_and_a_warning_says_so_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "_loaded", [])
+    monkeypatch.setitem(sys.modules, "relgym.program.kernel", None)
+    monkeypatch.delattr("relgym.program.kernel", raising=False)
+    model = learned(schema := schema_of(LINE_STEPS, LINE_TARGETS), LINE_STEPS[:60])
+    scene = transitions(schema, LINE_STEPS[60:61])[0].before
+    with pytest.warns(SlowWarning, match="pip install numba"):
+        model.predict_one(scene)
+    assert_fresh(model, scene)  # a second warning would be an error
+
+
+@pytest.mark.parametrize("make", [cart_model, line_model, room_model, lambda: room_model("auto")])
+def test_small_worlds_have_programs(make: Callable[[], WorldModel]) -> None:
+    model = make()
+    assert lowered(model._parts, model.schema.layout()).answers
+
+
+def test_what_has_no_program_says_why() -> None:
+    schema = schema_of(LINE_STEPS, LINE_TARGETS)
+    fcl = WorldModel(schema, ModelConfig(geometry="fcl"))
+    with pytest.raises(BeyondError, match="geometry 'fcl'"):
+        lowered(fcl._parts, schema.layout())

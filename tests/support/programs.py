@@ -1,0 +1,184 @@
+"""Compiled programs beside arrays: do both say the same of some scenes?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from dreams import cart_model, flat_model, line_model, lost_model, room_model
+from hypothesis import strategies as st
+from law_streams import Stream, taught
+from numpy.typing import NDArray
+
+from relgym.config import ModelConfig
+from relgym.envs.learned_model_setting import recorded
+from relgym.experiments.law_trials import Trial, trial_rooms
+from relgym.laws.book import LawBook
+from relgym.laws.columns import Sources
+from relgym.laws.frames import FRAMES, POINT, axis_names
+from relgym.laws.learner import LawLearner
+from relgym.laws.records import ONE, AxisLaw, FreeLaw, PairLaw, Piece, Share
+from relgym.model.lowering import lowered
+from relgym.model.parts import Parts
+from relgym.model.prediction import BatchPrediction
+from relgym.model.querying import predict_many
+from relgym.model.running import Runner
+from relgym.model.world_model import WorldModel
+from relgym.program import kernel
+from relgym.scene.objects import POSE, Kinematics, ObjectType, SceneLayout, Target
+from relgym.scene.schema import SceneSchema
+from relgym.scene.shapes import Box, Prism, Sphere, Wedge
+
+Array = NDArray[np.float64]
+
+
+def runner(parts: Parts, layout: SceneLayout) -> Runner:
+    """What runs the program of a model."""
+    return Runner(parts, layout, lowered(parts, layout), kernel)
+
+
+def arrays(parts: Parts, layout: SceneLayout, vectors: Array) -> BatchPrediction:
+    """What arrays say."""
+    with np.errstate(all="ignore"):
+        return predict_many(parts, parts.perception.percept(layout, vectors), layout, vectors)
+
+
+def assert_alike(parts: Parts, layout: SceneLayout, vectors: Array, tolerance: float = 1e-12) -> None:
+    """The program of a model says of some scenes what arrays say."""
+    vectors = np.ascontiguousarray(vectors)
+    said, known = runner(parts, layout).many(vectors), arrays(parts, layout, vectors)
+    assert said is not None
+    assert said.parts == known.parts and said.frames == known.frames
+    np.testing.assert_array_equal(said.outcomes, known.outcomes)
+    np.testing.assert_array_equal(said.modes, known.modes)
+    np.testing.assert_array_equal(said.margins, known.margins)
+    np.testing.assert_array_equal(said.probabilities, known.probabilities)
+    np.testing.assert_array_equal(said.intervals, known.intervals)
+    scale = np.maximum(1.0, np.abs(known.vectors))
+    assert (np.abs(said.vectors - known.vectors) <= tolerance * scale).all()
+
+
+def lawful(trial: Trial, *, seed: int = 1, count: int = 3) -> tuple[Parts, SceneLayout, Array]:
+    """Parts of a model that knows the laws of a trial world, and scenes of others of its rooms."""
+
+    def streams(seed: int, rooms: int) -> Iterable[Stream]:
+        found = trial_rooms(trial.world, rooms, seed=seed, steps=150)
+        return [Stream(r.schema, r.layout, r.vectors) for r in found]
+
+    learner = taught(streams(seed, count))
+    shown = list(streams(seed + 1, 2))
+    parts = with_laws(shown[0].schema, learner)
+    return parts, shown[0].layout, np.concatenate([s.vectors for s in shown])
+
+
+def with_laws(schema: SceneSchema, learner: LawLearner) -> Parts:
+    """Parts of a model whose laws govern everything that moves."""
+    parts = Parts(schema, ModelConfig(), schema.targets)
+    assert parts.laws is not None
+    parts.laws.learner = learner
+    parts.laws.governed = frozenset(learner.types)
+    return parts
+
+
+MODELS = {
+    "cart": cart_model,
+    "cart with a lost velocity": lost_model,
+    "flat numbers": flat_model,
+    "room by laws": lambda: room_model("auto"),
+    "room by modes": room_model,
+    "line with roles": line_model,
+}
+
+
+def scenes_of(model: WorldModel, count: int, seed: int = 0) -> tuple[SceneLayout, Array]:
+    """Scenes near those that a model has seen, some of them far off."""
+    table = next(iter(model._parts.tables.values()))
+    assert len(table)
+    starts = recorded(model).starts
+    names = [name for name in model.schema.order if name not in starts[0].layout.names]
+    layout = model.schema.layout([*starts[0].layout.names, *names])
+    rng = np.random.default_rng(seed)
+    rows = []
+    for k in range(count):
+        start = starts[k % len(starts)]
+        parts = {o.name: o.values.copy() for o in start}
+        for name in names:
+            parts[name] = rng.uniform(0.0, 5.0, len(model.schema.type_of(name).properties))
+        rows.append(np.concatenate([parts[name] for name in layout.names]))
+    vectors = np.array(rows)
+    moved = np.ones(layout.width, dtype=bool)
+    for index in layout.bodies:
+        sizes = [layout.offsets[index] + k for k in layout.types[index].pose_columns()[3:] if k >= 0]
+        moved[sizes] = False
+    noise = rng.normal(size=vectors.shape) * moved * rng.choice([0.0, 1e-3, 0.3], size=(count, 1))
+    return layout, vectors + noise
+
+
+# ---------------------------------------------------------------------- worlds that hypothesis makes up
+_MOVING = ("vx", "vy", "spin", "mass")
+_SHAPES = (Box(), Wedge(), Prism(((-0.5, -0.3), (0.4, -0.5), (0.5, 0.2), (-0.1, 0.5))))
+_NUMBERS = st.floats(-2.0, 2.0).map(lambda x: round(x, 3))
+
+
+def room_schema(shapes: int, balls: int) -> SceneSchema:
+    """Balls and some bodies of other shapes, in the plane."""
+    types = [
+        ObjectType("ball", (*POSE, *_MOVING), Sphere(), velocity=("vx", "vy", None)),
+        *(ObjectType(f"body{k}", POSE, _SHAPES[k]) for k in range(shapes)),
+    ]
+    objects = [(f"ball{k}", "ball") for k in range(balls)] + [(f"b{k}", f"body{k}") for k in range(shapes)]
+    rates = (("px", "vx"), ("py", "vy"), ("rz", "spin"))
+    laws = tuple(Kinematics("ball", place, rate) for place, rate in rates)
+    targets = tuple(Target("ball", name) for name in _MOVING[:3])
+    return SceneSchema(tuple(types), tuple(objects), kinematics=laws, targets=targets)
+
+
+@st.composite
+def books(draw: st.DrawFn, schema: SceneSchema) -> LawBook:
+    """Laws of any form."""
+    frame = draw(st.sampled_from(FRAMES))
+    letters = axis_names(frame, 2)
+    kinds = tuple(("ball", t.name) for t in schema.types)
+    names = [f"{what}_{letter}" for letter in letters for what in "uv"]
+
+    def piece(able: list[str]) -> Piece:
+        terms = draw(st.lists(st.tuples(st.sampled_from(able), _NUMBERS), max_size=3))
+        return Piece(tuple(terms))
+
+    def rule(axis: int, some: tuple[tuple[str, str], ...]) -> AxisLaw:
+        able = [*names, ONE, *(f"J_{letter}" for letter in letters[:axis])]
+        pieces = tuple(piece(able) for _ in range(draw(st.integers(1, 3))))
+        others = ((draw(st.sampled_from(("max", "min"))), (piece(able),)),) if draw(st.booleans()) else ()
+        signs = draw(st.booleans()), draw(st.booleans())
+        operator = draw(st.sampled_from(("max", "min")))
+        return AxisLaw(pieces, operator, some, others, signs, 100, draw(st.sampled_from((0, 0, 50))))
+
+    cut = draw(st.integers(1, len(kinds)))
+    groups = [some for some in (kinds[:cut], kinds[cut:]) if some]
+    axes = tuple(tuple(rule(axis, some) for some in groups) for axis in range(2))
+    grips = tuple((kind, draw(st.floats(0.1, 1.0))) for kind in kinds) if frame == POINT else ()
+    sources = {"ball": Sources.of(schema, schema.types[0], schema.targets or ())}
+    book = LawBook(schema, sources)
+    book.pair = PairLaw(frame, axes, 10.0, grips) if draw(st.integers(0, 9)) else None
+    columns = [*_MOVING, ONE]
+    book.free["ball"] = FreeLaw("ball", tuple(piece(columns) for _ in _MOVING[:3]))
+    shares = (Share(), Share("mass", 2), Share("extent"), Share(constant=0.25), None)
+    if (share := draw(st.sampled_from(shares))) is not None:
+        book.shares["ball", "ball"] = share
+    book.tolerance = draw(st.sampled_from((1e-12, 1e-3, 0.1)))
+    return book
+
+
+def crowded(schema: SceneSchema, count: int, seed: int) -> Array:
+    """State vectors of rooms in which bodies lie about anyhow, many of them touching."""
+    rng, layout = np.random.default_rng(seed), schema.layout()
+    vectors = rng.normal(size=(count, layout.width))
+    for k, t in enumerate(layout.types):
+        at = layout.offsets[k]
+        vectors[:, at : at + 2] *= 0.4
+        vectors[:, at + 5] *= rng.random(count) < 0.5
+        sizes = rng.uniform(0.2, 1.5, (count, 3))
+        vectors[:, at + 6 : at + 9] = sizes[:, :1] if isinstance(t.shape, Sphere) else sizes
+        if t.name == "ball":
+            vectors[:, at + 12] = rng.uniform(0.5, 2.0, count)
+    return vectors
