@@ -84,7 +84,18 @@ class PolyhedronRecord(Record, tag_field="kind", tag="polyhedron"):
     vertices: Annotated[list[Point3], Meta(min_length=4, max_length=1_000)]
 
 
-ShapeRecord: TypeAlias = SphereRecord | BoxRecord | WedgeRecord | PrismRecord | PolyhedronRecord
+class CompoundRecord(Record, tag_field="kind", tag="compound"):
+    """Convex polygons that hang together, extruded along the depth axis."""
+
+    parts: Annotated[
+        list[Annotated[list[Point2], Meta(min_length=3, max_length=1_000)]],
+        Meta(min_length=1, max_length=100),
+    ]
+
+
+ShapeRecord: TypeAlias = (
+    SphereRecord | BoxRecord | WedgeRecord | PrismRecord | PolyhedronRecord | CompoundRecord
+)
 
 
 class TypeRecord(Record):
