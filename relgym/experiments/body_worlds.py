@@ -75,8 +75,8 @@ class Setting:
     gravity
         Downward acceleration in units / s^2.
     masses
-        ``"seen"``: mass and moment are properties, and mass is drawn; ``"uniform"``: they follow from one density, and are
-        not seen; ``"own"``: every object has a density of its own, the same in all episodes.
+        ``"seen"``: mass and moment are properties, and mass is drawn; ``"uniform"``: they follow from one density,
+        and are not seen; ``"own"``: every object has a mass of its own, the same in all episodes.
     damping
         Share of its velocity that a body keeps in a second.
     drag
@@ -180,25 +180,39 @@ def _episode(setting: Setting, densities: Array, steps: int, *, rng: np.random.G
 
 def _bodies(setting: Setting, densities: Array, *, rng: np.random.Generator) -> list[Body]:
     shapes = [Sphere(), *(SHAPES[name] for name in setting.bodies)]
-    rough = {"elasticity": math.sqrt(setting.elasticity), "friction": math.sqrt(setting.friction)}
+    elasticity, friction = math.sqrt(setting.elasticity), math.sqrt(setting.friction)
     found = []
     for k, shape in enumerate(shapes):
         size = float(rng.uniform(0.2, 0.35)) if not k else 0.0
         extents = (size, size) if not k else tuple(rng.uniform(0.3, 0.7, 2).tolist())
         if isinstance(shape, Sphere):
             extents = (extents[0], extents[0])
-        body = Body(shape, extents, **rough)
-        density = {"seen": float(rng.uniform(2.0, 8.0)), "uniform": 4.0, "own": float(densities[k])}[setting.masses]
+        body = Body(shape, extents, elasticity=elasticity, friction=friction)
+        density = {"seen": float(rng.uniform(2.0, 8.0)), "uniform": 4.0, "own": float(densities[k])}[
+            setting.masses
+        ]
         # What has a constant of its own has it as its mass, whatever its size.
         mass = 0.1 * density if setting.masses == "own" else density * body.area
-        found.append(Body(shape, extents, mass, **rough))
-    still = Body(Box(), (2.0 * ROOM + 2.0, 1.0), math.inf, **rough)
-    belt = Body(Box(), (2.0 * ROOM + 2.0, 1.0), math.inf, surface=setting.conveyor, **rough)
+        found.append(Body(shape, extents, mass, elasticity=elasticity, friction=friction))
+    still = Body(Box(), (2.0 * ROOM + 2.0, 1.0), math.inf, elasticity=elasticity, friction=friction)
+    belt = Body(
+        Box(),
+        (2.0 * ROOM + 2.0, 1.0),
+        math.inf,
+        surface=setting.conveyor,
+        elasticity=elasticity,
+        friction=friction,
+    )
     return [*found, belt, still, still, still]
 
 
 _WALLS: Final = np.array(
-    [[0.0, -ROOM - 0.5, 0.0], [0.0, ROOM + 0.5, 0.0], [-ROOM - 0.5, 0.0, math.pi / 2.0], [ROOM + 0.5, 0.0, math.pi / 2.0]]
+    [
+        [0.0, -ROOM - 0.5, 0.0],
+        [0.0, ROOM + 0.5, 0.0],
+        [-ROOM - 0.5, 0.0, math.pi / 2.0],
+        [ROOM + 0.5, 0.0, math.pi / 2.0],
+    ]
 )
 
 

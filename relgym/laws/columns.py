@@ -30,8 +30,8 @@ def vector_types(schema: SceneSchema, targets: tuple[Target, ...]) -> tuple[Obje
 def spin_of(schema: SceneSchema, t: ObjectType, targets: tuple[Target, ...]) -> str | None:
     """Name of the property that says how fast a type spins in the plane; None where none is learned.
 
-    It is the one that is declared as the rate of the rotation about the depth axis. The points at which bodies touch are
-    known, and so is, with the spin, how fast they move.
+    It is the one that is declared as the rate of the rotation about the depth axis. The points at which bodies touch
+    are known, and so is, with the spin, how fast they move.
     """
     axes = Axes.of(schema)
     if not axes.planar or t.shape is None:

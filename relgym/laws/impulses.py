@@ -3,9 +3,9 @@
 At every point there is a law along the normal and one along the slip direction: two *rows*. A row's own impulse x
 changes its own velocity by the yield g of the two bodies there, and through them that of every other row; v = b + G x.
 The free motion of a row is everything except itself, u = v - g x, and its law says v' from u. Laws are maxima or minima
-of linear pieces, so that the impulses which satisfy all of them solve a linear system as soon as it is known which piece
-holds where: that is found by trying (a semismooth Newton method; Qi and Sun, *A nonsmooth version of Newton's method*,
-1993), and else by sweeps over the rows (Gauss-Seidel).
+of linear pieces, so that the impulses which satisfy all of them solve a linear system as soon as it is known which
+piece holds where: that is found by trying (a semismooth Newton method; Qi and Sun, *A nonsmooth version of Newton's
+method*, 1993), and else by sweeps over the rows (Gauss-Seidel).
 """
 
 from __future__ import annotations
@@ -140,9 +140,7 @@ def _times(gain: FloatArray, x: FloatArray) -> FloatArray:
     return total
 
 
-def _tried(
-    rows: Rows, start: FloatArray
-) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
+def _tried(rows: Rows, start: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     """Solve with the pieces that hold, until they are those that held before."""
     m = len(start)
     x, done, fit = start.copy(), np.zeros(m, dtype=bool), np.zeros(m, dtype=bool)
@@ -167,15 +165,13 @@ def _obeyed(rows: Rows, x: FloatArray) -> NDArray[np.bool_]:
     reached = sense * (rows.free + _times(rows.gain, x))
     yields = np.diagonal(rows.gain, axis1=1, axis2=2)
     size = np.maximum(np.abs(rows.free), np.abs(rows.now)) + np.abs(yields * x)
-    obeyed: NDArray[np.bool_] = (
-        np.abs(demanded - reached) <= SLACK * size.max(axis=1, keepdims=True)
-    ).all(axis=1)
+    obeyed: NDArray[np.bool_] = (np.abs(demanded - reached) <= SLACK * size.max(axis=1, keepdims=True)).all(
+        axis=1
+    )
     return obeyed & np.isfinite(x).all(axis=1)
 
 
-def _solved(
-    rows: Rows, choice: NDArray[np.intp], sense: FloatArray
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _solved(rows: Rows, choice: NDArray[np.intp], sense: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Impulses at which these pieces hold, of equals the smallest; and whether velocities are the only ones."""
     m, r = rows.free.shape
     c = r // 2
@@ -209,7 +205,7 @@ def _solved(
 
 def _swept(rows: Rows, start: FloatArray) -> FloatArray:
     """Let every row respond to all others, one after the other, a number of times."""
-    m, r = start.shape
+    r = start.shape[1]
     x = start.copy()
     yields = np.diagonal(rows.gain, axis1=1, axis2=2)
     for _ in range(SWEEPS):

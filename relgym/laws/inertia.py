@@ -1,10 +1,10 @@
 """How hard bodies are to move and to turn, found in what single contacts did to them.
 
-A contact in one point pushes both bodies with equal and opposite impulses, whatever its law. So ``m_A dv_A = - m_B dv_B``
-tells the ratio of two masses, and ``r x dv = g ds`` of one body the mean square distance g of its mass from its position
-(moment over mass), with the arm r and the change ds of its turning rate. Both are stated as functions of what can be
-seen of a body, or else as constants: of types, or of objects. Of all that explain the contacts the shortest wins.
-Only ratios of masses can be found.
+A contact in one point pushes both bodies with equal and opposite impulses, whatever its law. So
+``m_A dv_A = - m_B dv_B`` tells the ratio of two masses, and ``r x dv = g ds`` of one body the mean square distance g of
+its mass from its position (moment over mass), with the arm r and the change ds of its turning rate. Both are stated as
+functions of what can be seen of a body, or else as constants: of types, or of objects. Of all that explain the contacts
+the shortest wins. Only ratios of masses can be found.
 """
 
 from __future__ import annotations
@@ -21,7 +21,19 @@ from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import ONE, Piece
 from relgym.scene.geometry.vectors import FloatArray, dot
 
-__all__ = ["AREA", "SQUARE", "Gyration", "Inertia", "Mass", "Pushes", "find_gyrations", "find_mass"]
+__all__ = [
+    "AREA",
+    "NOTHING",
+    "SQUARE",
+    "By",
+    "Gyration",
+    "Inertia",
+    "Mass",
+    "Pushes",
+    "find_gyrations",
+    "find_mass",
+    "ratios",
+]
 
 AREA: Final = "shape.area"
 """Name of a body's area among what inertia may be a function of."""
@@ -78,12 +90,6 @@ class Mass:
         constant = np.array([known.get(name, np.nan) if self.by else 1.0 for name in names])
         return constant * _product(self.factors, features, len(names))
 
-    def formula(self) -> str:
-        """Such as ``shape.area mass^2``."""
-        parts = [name if power == 1 else f"{name}^{power}" for name, power in self.factors]
-        constant = {"": [], "type": ["a constant of the type"], "object": ["a constant of the object"]}[self.by]
-        return " ".join([*constant, *parts]) or ONE
-
 
 @dataclass(frozen=True, slots=True)
 class Gyration:
@@ -121,6 +127,22 @@ class Inertia:
         )  # fmt: skip
         return mass, tuple((g.types, g.piece and g.piece.formula(9), g.whole) for g in self.gyrations)
 
+    def sentences(self, digits: int = 7) -> tuple[str, ...]:
+        """What is known, a sentence each; `parse_inertia` reads them back."""
+        found = []
+        if (m := self.mass) is not None:
+            constants = ", ".join(f"{name}: {value:.{digits}g}" for name, value in m.constants)
+            found.append(
+                f"masses go as {_factors_text(m.factors)}"
+                + (f"; by {m.by}, times {constants}" if m.by else "")
+            )
+        for g in self.gyrations:
+            whom = "" if g.whole else f" of {', '.join(g.types)}"
+            found.append(
+                f"moment over mass{whom}: {'infinite' if g.piece is None else g.piece.formula(digits)}"
+            )
+        return tuple(found)
+
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
         m = self.mass
@@ -155,6 +177,14 @@ class Inertia:
             for g in data["gyrations"]
         )  # fmt: skip
         return cls(mass, gyrations)
+
+
+NOTHING: Final = Inertia()
+"""What is known before anything was learned."""
+
+
+def _factors_text(factors: Iterable[tuple[str, int]]) -> str:
+    return " ".join(name if power == 1 else f"{name}^{power}" for name, power in factors) or ONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +231,9 @@ def ratios(features: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     for a, b in combinations(own, 2):
         for top, bottom in ((a, b), (b, a)):
             below = features[bottom]
-            found[f"{top}/{bottom}"] = np.where(below == 0.0, np.nan, features[top] / np.where(below == 0.0, 1.0, below))
+            found[f"{top}/{bottom}"] = np.where(
+                below == 0.0, np.nan, features[top] / np.where(below == 0.0, 1.0, below)
+            )
     return found
 
 
@@ -308,7 +340,9 @@ def _forms(
             continue
         y0, y1 = pushes.torque[picks[0]][solved], pushes.torque[picks[1]][solved]
         one, other, determinant = one[:, solved], other[:, solved], determinant[solved]
-        weights = np.stack([(y0 * other[1] - y1 * one[1]) / determinant, (one[0] * y1 - other[0] * y0) / determinant])
+        weights = np.stack(
+            [(y0 * other[1] - y1 * one[1]) / determinant, (one[0] * y1 - other[0] * y0) / determinant]
+        )
         middle = [_middle(w) for w in weights]
         yield ((a, middle[0]), (b, middle[1])), 2.0 * (naming + constant)
 
@@ -335,18 +369,25 @@ def find_mass(a: Pushes, b: Pushes, tolerance: float) -> Mass | None:
     if n < FEWEST:
         return None
     constant = CONSTANT_BITS + 0.5 * float(np.log2(n))
-    shared = [name for name in a.features if np.isfinite(a.features[name]).all() and np.isfinite(b.features[name]).all()]
+    shared = [
+        name
+        for name in a.features
+        if np.isfinite(a.features[name]).all() and np.isfinite(b.features[name]).all()
+    ]
     best: tuple[float, Mass] | None = None
     # m_A / m_B as the contacts tell it.
     seen = -dot(b.change, b.change) / dot(a.change, b.change)
     for factors in _factors(shared):
         for by in ("", "type", "object"):
-            named = [[""] * n] * 2 if not by else [side.types if by == "type" else side.objects for side in (a, b)]
+            named = [_names(side, by) for side in (a, b)]
             sides = [_product(factors, side.features, n) for side in (a, b)]
             constants = _constants(np.log(np.abs(seen)) - np.log(sides[0] / sides[1]), *named) if by else {}
             if by and len(constants) < 2:
                 continue
-            masses = [side * np.array([constants.get(str(k), 1.0) for k in own]) for side, own in zip(sides, named, strict=True)]
+            masses = [
+                side * np.array([constants.get(str(k), 1.0) for k in own])
+                for side, own in zip(sides, named, strict=True)
+            ]
             left = np.abs(masses[0] * a.change + masses[1] * b.change).max(axis=0)
             wrong = int((left > 4.0 * tolerance * np.maximum(*masses)).sum())
             bits = sum(np.log2(max(2, len(shared))) + 2.0 for _ in factors) + EXCEPTION_BITS * wrong
@@ -354,6 +395,14 @@ def find_mass(a: Pushes, b: Pushes, tolerance: float) -> Mass | None:
             if wrong <= (1.0 - EXPLAINS) * n and (best is None or bits < best[0] - 1e-6):
                 best = bits, Mass(factors, by, tuple(sorted(constants.items())), n, wrong)
     return None if best is None else best[1]
+
+
+def _names(side: Pushes, by: By) -> list[str]:
+    """Whose constant each body has."""
+    if not by:
+        return [""] * len(side.turn)
+    names: list[str] = (side.types if by == "type" else side.objects).tolist()
+    return names
 
 
 def _factors(names: Iterable[str]) -> Iterator[tuple[tuple[str, int], ...]]:

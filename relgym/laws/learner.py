@@ -123,7 +123,9 @@ class LawLearner:
         numbers += count * self._ledger.unlearned(type_name)
         if pair is None:
             return free.bits + EXCEPTION_BITS * (numbers + count * self._store.seen)
-        numbers += pair.unexplained * max(0.0, self._store.seen / max(1, pair.examples) - 1.0) + count * self._news
+        numbers += (
+            pair.unexplained * max(0.0, self._store.seen / max(1, pair.examples) - 1.0) + count * self._news
+        )
         return free.bits + pair.bits + EXCEPTION_BITS * numbers
 
     # ------------------------------------------------------------------ learning
@@ -316,6 +318,11 @@ class LawLearner:
     def store_shape(self) -> tuple[int, int]:
         """Width of a stored contact, and most of them that are kept."""
         return self._store.shape
+
+    @property
+    def object_columns(self) -> tuple[int, ...]:
+        """Columns of a stored contact that hold numbers of objects: none unless bodies turn."""
+        return self._store.object_columns if isinstance(self._store, PushStore) else ()
 
     def free_shape(self, type_name: str) -> tuple[int, int]:
         """The same of a type's free examples."""

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.laws.columns import Sources
 from relgym.laws.description import EXCEPTION_BITS
 from relgym.laws.frames import POINT, axis_names, turned
 from relgym.laws.free import free_motion
-from relgym.laws.columns import Sources
+from relgym.laws.impulses import Rows, Solved, table_of
 from relgym.laws.inertia import AREA, SQUARE, Inertia, Pushes, find_gyrations, find_mass, ratios
-from relgym.laws.impulses import Rows, Solved, solve, table_of
 from relgym.laws.kinds import fit_apart, fit_together
 from relgym.laws.pair import PairFit
 from relgym.laws.pieces import AxisExamples
@@ -153,7 +153,9 @@ def rows_of(
     for moving in (free, now):
         relative = across(moving[:, scene, bodies[0]], points.arms[0])
         relative = relative - across(moving[:, scene, bodies[1]], points.arms[1])
-        velocities.append(np.concatenate([dot(relative, points.normal), dot(relative, turned(points.normal))], axis=1))
+        velocities.append(
+            np.concatenate([dot(relative, points.normal), dot(relative, turned(points.normal))], axis=1)
+        )
     numbers = chosen[:, points.pair]
     tables, signs = _tables(law, numbers)
     known = (numbers >= 0).all(axis=(0, 2)) & np.isfinite(gain).all(axis=(1, 2))
@@ -208,8 +210,10 @@ def push(
         total = solved.impulse[:, k] * normal + solved.impulse[:, k + c] * turned(normal)
         for side, (bodies, sign) in enumerate(((cast.first, 1.0), (cast.second, -1.0))):
             body, scene = bodies[points.pair[:, k]], points.scene[:, k]
-            light = np.where(alone, 1.0, yields.light[scene, body]) if not side else np.where(
-                cast.both[points.pair[:, k]], yields.light[scene, body], 0.0
+            light = (
+                np.where(alone, 1.0, yields.light[scene, body])
+                if not side
+                else np.where(cast.both[points.pair[:, k]], yields.light[scene, body], 0.0)
             )
             turn = light * yields.nimble[scene, body] * lever(points.arms[side][:, :, k], total)
             change = sign * np.concatenate([light * total, turn[None]])
@@ -254,6 +258,11 @@ class PushStore:
         return self._store.shape
 
     @property
+    def object_columns(self) -> tuple[int, ...]:
+        """Columns of a row that hold numbers of objects."""
+        return tuple(self._at[f"object_{side}"].start for side in "ab")
+
+    @property
     def seen(self) -> int:
         """Number of contacts so far, those no longer kept included."""
         return self._store.seen
@@ -287,7 +296,9 @@ class PushStore:
             row[self._at[f"now_{side}"]] = now = state[cast.velocities[:, body]]
             row[self._at[f"after_{side}"]] = after[:, body] if body in cast.sources else now
             row[self._at[f"arm_{side}"]] = points.arms["ab".index(side), :, at]
-            row[self._at[f"shape_{side}"]] = [v[0] for v in shape_features(cast, contacts.pose, body).values()]
+            row[self._at[f"shape_{side}"]] = [
+                v[0] for v in shape_features(cast, contacts.pose, body).values()
+            ]
             if body in cast.sources:
                 start = self._at[f"x_{side}"].start
                 places = cast.sources[body][1]
@@ -301,9 +312,7 @@ class PushStore:
         return self.objects.index(name)
 
     # ------------------------------------------------------------------ deriving
-    def inertia(
-        self, free: Mapping[str, FreeLaw], tolerance: float, *, rng: np.random.Generator
-    ) -> Inertia:
+    def inertia(self, free: Mapping[str, FreeLaw], tolerance: float, *, rng: np.random.Generator) -> Inertia:
         """What the contacts tell of masses and moments."""
         kinds = self._column("kind")[0].astype(np.intp)
         sides = []
@@ -353,8 +362,8 @@ class PushStore:
     ) -> PairFit | None:
         """The law of pairs, and which contacts it explains; None where nothing is known of any contact.
 
-        Both rows of a point: ``u`` is what the velocity would be without that row's own impulse, which is what the first
-        body's change of velocity tells, and ``J_n`` the normal impulse times how far it would go along the slip direction.
+        Both rows of a point: ``u`` is what the velocity would be without that row's own impulse, which is what the
+        first body's change of velocity tells, and ``J_n`` is what the normal impulse would change along t.
         """
         kinds = self._column("kind")[0].astype(np.intp)
         normal = self._column("normal")
@@ -381,7 +390,9 @@ class PushStore:
         wanted = (after[0][part], (sense * after[1])[part])
         laws, explained, bits = [], np.ones(len(part), dtype=bool), 0.0
         for names, y in zip(order, wanted, strict=True):
-            examples = AxisExamples(names, np.stack([rows[n] for n in names], axis=1), y, names[0], ERRORS * tolerance)
+            examples = AxisExamples(
+                names, np.stack([rows[n] for n in names], axis=1), y, names[0], ERRORS * tolerance
+            )
             together = fit_together(examples, kinds[part], self.kinds, rng=rng)
             fit = fit_apart(examples, kinds[part], self.kinds, together, np.inf, rng=rng)
             laws.append(fit.laws)
@@ -402,7 +413,9 @@ class PushStore:
         mass = []
         for side, sign in (("a", 1.0), ("b", -1.0)):
             pushes = self._pushes(free, kinds, side)
-            moves = np.array([kind["ab".index(side)] in self.sources for kind in self.kinds], dtype=bool)[kinds]
+            moves = np.array([kind["ab".index(side)] in self.sources for kind in self.kinds], dtype=bool)[
+                kinds
+            ]
             nimble = np.zeros(count)
             for name in np.unique(pushes.types).tolist():
                 sources, part = self.sources.get(name), pushes.types == name
@@ -467,7 +480,8 @@ def _joined(parts: Sequence[Pushes]) -> Pushes:
     """Pushes of several kinds of bodies."""
     names = {name: None for part in parts for name in part.features}
     features = {
-        name: np.concatenate([p.features.get(name, np.full(len(p.turn), np.nan)) for p in parts]) for name in names
+        name: np.concatenate([p.features.get(name, np.full(len(p.turn), np.nan)) for p in parts])
+        for name in names
     }
     change, turn, torque, reach, types, objects = (
         np.concatenate([getattr(p, field) for p in parts], axis=-1)

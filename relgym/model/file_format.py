@@ -459,6 +459,33 @@ class PairLawRecord(Record):
     grips: list[tuple[Name, Name, Finite]]
 
 
+class MassRecord(Record):
+    """Masses up to a common factor: a product of powers, times a constant of each type or object."""
+
+    factors: Annotated[list[tuple[str, Literal[1, 2, 3]]], Meta(max_length=4)]
+    by: Literal["", "type", "object"]
+    constants: list[tuple[str, Finite]]
+    examples: Count
+    unexplained: Count
+
+
+class GyrationRecord(Record):
+    """Moment over mass of some types, or of all: a linear function; null where contacts don't turn them."""
+
+    types: list[Name]
+    whole: bool
+    terms: Terms | None
+    examples: Count
+    unexplained: Count
+
+
+class InertiaRecord(Record):
+    """How hard bodies are to move and to turn."""
+
+    mass: MassRecord | None = None
+    gyrations: list[GyrationRecord] = []
+
+
 class StoreRecord(Record):
     """How many examples ever came, and how those kept are chosen; the examples are arrays."""
 
@@ -467,10 +494,11 @@ class StoreRecord(Record):
 
 
 class ContactsRecord(Record):
-    """Kinds of contacts (types of the two bodies), and their store."""
+    """Kinds of contacts (types of the two bodies), names of the objects if bodies turn, and their store."""
 
     kinds: list[Pair]
     store: StoreRecord
+    objects: list[str] = []
 
 
 class LearnedLawsRecord(Record):
@@ -484,6 +512,7 @@ class LearnedLawsRecord(Record):
     stored_wrong: Count
     news: Count
     seen: Count
+    inertia: InertiaRecord = field(default_factory=InertiaRecord)
     random: Random | None = None
     store: ContactsRecord | None = None
     learners: list[tuple[Name, Count, Random, StoreRecord]] | None = None
