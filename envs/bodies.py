@@ -80,6 +80,9 @@ class BodyWorld:
         Downward acceleration in units / s^2.
     damping
         Share of its velocity that a body keeps in a second.
+    memoryless
+        Whether each step begins without what the engine remembers of contacts, so that poses and velocities are all of
+        the world's state. The engine then begins from no impulses: where contacts don't settle, what it gives differs.
     iterations
         How often the engine goes over all contacts of a step. Pushing takes hundreds; stacks with friction thousands.
 
@@ -94,15 +97,18 @@ class BodyWorld:
         *,
         gravity: float = 0.0,
         damping: float = 1.0,
+        memoryless: bool = False,
         iterations: int = 500,
     ) -> None:
         self.bodies = tuple(bodies)
         self._space = pymunk.Space()
+        self._numbers: dict[pymunk.Shape, int] = {}
         self._space.gravity, self._space.damping = (0.0, -gravity), damping
         # As in `relgym.envs.physics`: overlaps aren't pushed out, and nothing is remembered from earlier contacts.
         self._space.collision_slop, self._space.collision_persistence = 1.0, 1
         self._space.iterations = iterations
         self._made = [self._make(body) for body in bodies]
+        self._memoryless = memoryless
 
     def _make(self, body: Body) -> pymunk.Body:
         if math.isinf(body.mass):
@@ -121,6 +127,7 @@ class BodyWorld:
             # Parts of one body never touch each other.
             shape.filter = pymunk.ShapeFilter(group=id(made) % 2**31 + 1)
         self._space.add(made, *shapes)
+        self._numbers |= {shape: len(self._numbers) + k for k, shape in enumerate(shapes)}
         return made
 
     def place(self, poses: Float2D, velocities: Float2D) -> None:
@@ -158,6 +165,20 @@ class BodyWorld:
             ]
         ).reshape(-1, 3)
 
+    def state(self) -> Float2D:
+        """The engine's own state: position, angle, velocities in units / s, turning rate in radians / s; ``(n, 6)``."""
+        return np.array(
+            [(*made.position, made.angle, *made.velocity, made.angular_velocity) for made in self._made]
+        )
+
+    def resume(self, state: Float2D) -> None:
+        """Go on from what `state` gave."""
+        for made, (x, y, angle, vx, vy, rate) in zip(self._made, state.tolist(), strict=True):
+            made.position, made.angle = (x, y), angle
+            made.velocity, made.angular_velocity = (vx, vy), rate
+            if made.body_type == pymunk.Body.KINEMATIC:
+                self._space.reindex_shapes_for_body(made)
+
     def step(self, accelerations: Float2D | None = None, spins: Sequence[float] | None = None) -> None:
         """Advance by one example.
 
@@ -174,6 +195,10 @@ class BodyWorld:
                 made.force = (made.mass * ax, made.mass * ay)
             if spins is not None and math.isfinite(made.moment):
                 made.torque = made.moment * spins[k]
+        if self._memoryless:
+            shapes = [shape for made in self._made for shape in made.shapes]
+            self._space.remove(*shapes)
+            self._space.add(*sorted(shapes, key=self._numbers.__getitem__))
         self._space.step(TIME_STEP)
 
     def contacts(self) -> list[tuple[int, int]]:
