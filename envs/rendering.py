@@ -31,6 +31,8 @@ _INK: Colour = (45, 52, 60)
 _GOAL: Colour = (255, 214, 92)
 _COLOURS: dict[str, Colour] = {
     "ball": (230, 126, 34),
+    "pusher": (230, 126, 34),
+    "rail": (188, 190, 193),
     "box": (93, 142, 190),
     "ramp": (106, 168, 121),
     "truck": (196, 84, 77),

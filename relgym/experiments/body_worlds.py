@@ -124,8 +124,10 @@ def body_schema(setting: Setting) -> SceneSchema:
         for name in dict.fromkeys(setting.bodies)
     ]
     types = [*moving, ObjectType("wall", POSE, Box())]
+    if setting.conveyor:
+        types.append(ObjectType("belt", POSE, Box()))
     objects = [("disc", "disc"), *((f"body{k + 1}", name) for k, name in enumerate(setting.bodies))]
-    objects += [(f"wall{k + 1}", "wall") for k in range(4)]
+    objects += [("wall1", "belt" if setting.conveyor else "wall"), *((f"wall{k}", "wall") for k in (2, 3, 4))]
     if setting.driven:
         types.append(ObjectType(ACTION, ("fx", "fy"), exogenous=("fx", "fy")))
         objects.append((ACTION, ACTION))

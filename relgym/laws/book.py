@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.html import html_table
-from relgym.laws.columns import Sources
+from relgym.laws.columns import Sources, vector_types
 from relgym.laws.composition import Engaged, compose, within
 from relgym.laws.frames import POINT
 from relgym.laws.free import free_motion
@@ -17,12 +17,12 @@ from relgym.laws.impulses import Solved, solve
 from relgym.laws.inertia import Inertia
 from relgym.laws.joints import Joints
 from relgym.laws.points import Points
-from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
+from relgym.laws.records import ONE, FreeLaw, Kind, PairLaw, Share
 from relgym.laws.shares import EXTENT, share_values
 from relgym.laws.touching import Cast, Contacts, Group
 from relgym.laws.turning import eases, precedented, push, rows_of
 from relgym.scene.geometry.vectors import FloatArray
-from relgym.scene.objects import SceneLayout
+from relgym.scene.objects import SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LawBook", "Motion"]
@@ -207,11 +207,35 @@ class LawBook:
         for body in cast.movers:
             sources, places = cast.sources[body]
             columns[body] = state[places]
-            law = self.free.get(sources.type.name)
+            law = self.free_law(sources.type.name)
             velocity[: len(sources.moving), :, body] = np.nan
             if law is not None:
                 velocity[: len(law.components), :, body] = free_motion(law, sources.names, columns[body])
         return now, velocity, columns
+
+    def free_law(self, type_name: str) -> FreeLaw | None:
+        """The free law of a type; of one never seen that of its kin, if all types with the same parent agree."""
+        if type_name in self.free:
+            return self.free[type_name]
+        parent = self.schema.type(type_name).parent
+        kin = [
+            law
+            for t in self.schema.types
+            if t.parent == parent and (law := self.free.get(t.name)) is not None
+        ]
+        stated = {tuple(piece.formula(9) for piece in law.components) for law in kin}
+        read = {name for law in kin for piece in law.components for name, _ in piece.terms if name != ONE}
+        known = read <= set(self.sources[type_name].names)
+        return kin[0] if parent is not None and len(stated) == 1 and known else None
+
+    def on(self, schema: SceneSchema, targets: tuple[Target, ...]) -> LawBook:
+        """The same laws for scenes of another schema, of which `targets` are predicted."""
+        book = LawBook(
+            schema, {t.name: Sources.of(schema, t, targets) for t in vector_types(schema, targets)}
+        )
+        book.free, book.pair, book.shares = dict(self.free), self.pair, dict(self.shares)
+        book.inertia, book.tolerance = self.inertia, self.tolerance
+        return book
 
     def _count(self, cast: Cast, body: int) -> int:
         """Number of components that the laws predict of a mover."""
