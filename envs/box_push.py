@@ -101,8 +101,8 @@ class BoxPushEnv(SceneEnv):
     The pusher's diameter is 0.16–0.24. The parcel is 0.35–0.5 long and wide (as a T 0.5–0.6 both ways), boxes
     0.25–0.45; all are turned any way and lie at rest, apart from each other. A number of the boxes, drawn too, lies on
     the table, the others on a shelf beside it. The parcel and the goal are at least 0.6 from the rails, and 0.5–1.4
-    from each other; pusher and boxes lie anywhere on the table, boxes at least 0.45 from the goal. All uniform, drawn again until
-    all that holds.
+    from each other; pusher and boxes lie anywhere on the table, boxes at least 0.45 from the goal. All uniform, drawn
+    again until all that holds.
 
     Reset options, all optional: ``count`` (boxes on the table), ``pusher_size``, ``parcel_width``, ``parcel_height``,
     ``box1_width``, ``box1_height``, …; `reset_options` lists them. ``info["configuration"]`` holds what was drawn of

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from relgym.laws.book import LawBook, Motion
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
+from relgym.laws.drift import Drift
 from relgym.laws.encounters import EncounterStore
 from relgym.laws.free import FreeLearner
 from relgym.laws.inertia import Inertia
@@ -84,6 +85,7 @@ class LawLearner:
         self._store: EncounterStore | PushStore = EncounterStore(schema, self.sources, seed=seed)
         if self.book.turning:
             self._store = PushStore(schema, self.sources, seed=seed)
+        self._drift = {name: Drift() for name in self.sources}
         self._rng = np.random.default_rng([seed, 3])
         self._ledger = Ledger(self.sources)
         self._news = 0
@@ -195,10 +197,13 @@ class LawLearner:
     ) -> bool:
         name = cast.sources[body][0].type.name
         learner = self._free[name]
+        d = len(learner.sources.velocity)
+        now = motion.columns[body][:d, 0]
+        self._drift[name].add(cast.layout.names[cast.layout.bodies[body]], now, after[:d])
         after = after[: len(learner.sources.moving)]
         changed = learner.learn_one(motion.columns[body][:, 0], after, right, self.book.tolerance)
         if learner.seen in ESTIMATE_AT and self._noise is None:
-            changed |= self._estimate(learner)
+            changed |= self._estimate(learner, self._drift[name])
         if learner.law is not None:  # more examples may have changed its last digits
             self.book.free[name] = learner.law
         return changed
@@ -302,9 +307,11 @@ class LawLearner:
         floor = STDS * ROUNDINGS * float(np.finfo(np.float64).eps) * largest
         self.book.tolerance = max(self.book.tolerance, floor)
 
-    def _estimate(self, learner: FreeLearner) -> bool:
+    def _estimate(self, learner: FreeLearner, drift: Drift) -> bool:
         """Estimate the noise where the free law holds for few examples only; whether that gave a law."""
         law = learner.law
+        if not drift.noisy():
+            return False
         if law is not None and law.unexplained <= 0.02 * law.examples:
             return False
         spread = learner.spread()
@@ -347,6 +354,7 @@ class LawLearner:
             data |= {
                 "random": self._rng.bit_generator.state,
                 "store": self._store.to_json(),
+                "drift": [[name, *d.to_json()] for name, d in sorted(self._drift.items())],
                 "learners": [[name, *f.to_json()] for name, f in sorted(self._free.items())],
             }
         return data
@@ -376,6 +384,8 @@ class LawLearner:
             return
         self._rng.bit_generator.state = data["random"]
         self._store.restore(data["store"], _part(arrays, "contacts"))
+        for name, *sums in data.get("drift") or ():
+            self._drift[name].restore(sums)
         for k, (name, *state) in enumerate(data["learners"]):
             self._free[name].restore(state, _part(arrays, f"free{k}"))
 

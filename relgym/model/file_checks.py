@@ -602,6 +602,9 @@ def _check_kept(laws: LearnedLawsRecord, learner: LawLearner, arrays: _Arrays) -
     _distinct(laws.store.kinds, "laws.store.kinds")
     names = sorted(learner.sources)
     _require([name for name, *_ in laws.learners] == names, "laws.learners", f"expected {names}")
+    _require(
+        laws.drift is None or [name for name, *_ in laws.drift] == names, "laws.drift", f"expected {names}"
+    )
     width, limit = learner.store_shape
     rows = _stored(arrays, "laws.contacts", width, limit, laws.store.store.seen, 2 * len(laws.store.kinds))
     if rows.size:

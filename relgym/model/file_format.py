@@ -502,7 +502,7 @@ class ContactsRecord(Record):
 
 
 class LearnedLawsRecord(Record):
-    """The laws; the last three fields only with history."""
+    """The laws; the last four fields only with history."""
 
     tolerance: Amount
     free: list[FreeLawRecord]
@@ -516,6 +516,7 @@ class LearnedLawsRecord(Record):
     random: Random | None = None
     store: ContactsRecord | None = None
     learners: list[tuple[Name, Count, Random, StoreRecord]] | None = None
+    drift: list[tuple[Name, Count, Count, tuple[Finite, Finite, Finite], Amount, Amount]] | None = None
 
 
 class LawsRecord(Record):
