@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 __all__ = ["Drift"]
 
 INDEPENDENT = 1.0
-"""Least ratio of the variances of e and d at which changes count as noise: halfway from the same to independent ones."""
+"""Least ratio of the variances of e and d at which changes count as noise: halfway from equal to independent ones."""
 
 FEWEST = 16
 """Pairs of consecutive changes below which nothing is known."""
