@@ -62,9 +62,8 @@ class Tally:
         return 100.0 * (self.wrong + self.free_wrong) / max(1, self.contacts + self.free)
 
 
-def learned(rooms: Iterable[Room], *, seed: int = 0) -> LawLearner:
-    """Laws learned from rooms, transition by transition."""
-    learner: LawLearner | None = None
+def learned(rooms: Iterable[Room], *, seed: int = 0, learner: LawLearner | None = None) -> LawLearner:
+    """Laws learned from rooms, transition by transition; by a new learner unless one is handed in."""
     for room in rooms:
         learner = learner or LawLearner(room.schema, room.schema.targets or (), seed=seed)
         cast = learner.book.cast(room.layout)

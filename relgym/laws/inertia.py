@@ -50,6 +50,9 @@ EXPLAINS = 0.98
 TOLD = 100.0
 """A change of more than this many tolerances tells something."""
 
+ROUGHLY = 1e-4
+"""Relative error up to which contacts count as obeying a first estimate: then all of them together sharpen it."""
+
 POWERS = (1, 2, 3)
 DRAWS = 64
 
@@ -322,11 +325,10 @@ def _forms(
     rng: np.random.Generator,
 ) -> Iterator[tuple[tuple[tuple[str, float], ...], float]]:
     """Linear functions worth a look, and the bits of stating them."""
-    safe = np.where(pushes.turn == 0.0, np.inf, pushes.turn)
     for name, values in features.items():
         if name != ONE:
             yield ((name, 1.0),), naming
-        weight = _middle(pushes.torque / (safe * np.where(values == 0.0, np.inf, values)))
+        weight = _weight((pushes.turn * values)[None], pushes.torque[None])
         if np.isfinite(weight) and weight > 0.0:
             yield ((name, weight),), naming + constant
     n = len(pushes.turn)
@@ -343,13 +345,11 @@ def _forms(
         weights = np.stack(
             [(y0 * other[1] - y1 * one[1]) / determinant, (one[0] * y1 - other[0] * y0) / determinant]
         )
-        middle = [_middle(w) for w in weights]
-        yield ((a, middle[0]), (b, middle[1])), 2.0 * (naming + constant)
-
-
-def _middle(values: FloatArray) -> float:
-    finite = values[np.isfinite(values) & (values != 0.0)]
-    return float(np.median(finite)) if len(finite) else float("nan")
+        rough = np.median(weights, axis=1)
+        near = np.abs(pushes.torque - rough @ x) <= ROUGHLY * np.abs(pushes.torque)
+        if near.sum() > 2:
+            rough = np.linalg.lstsq(x[:, near].T, pushes.torque[near], rcond=None)[0]
+        yield ((a, float(rough[0])), (b, float(rough[1]))), 2.0 * (naming + constant)
 
 
 # ------------------------------------------------------------------ masses
@@ -375,13 +375,11 @@ def find_mass(a: Pushes, b: Pushes, tolerance: float) -> Mass | None:
         if np.isfinite(a.features[name]).all() and np.isfinite(b.features[name]).all()
     ]
     best: tuple[float, Mass] | None = None
-    # m_A / m_B as the contacts tell it.
-    seen = -dot(b.change, b.change) / dot(a.change, b.change)
     for factors in _factors(shared):
         for by in ("", "type", "object"):
             named = [_names(side, by) for side in (a, b)]
             sides = [_product(factors, side.features, n) for side in (a, b)]
-            constants = _constants(np.log(np.abs(seen)) - np.log(sides[0] / sides[1]), *named) if by else {}
+            constants = _constants(a, b, sides, named) if by else {}
             if by and len(constants) < 2:
                 continue
             masses = [
@@ -424,24 +422,38 @@ def _product(
     return total
 
 
-def _constants(left: FloatArray, a: Sequence[str], b: Sequence[str]) -> dict[str, float]:
-    """Constants whose ratios are as the logarithms in `left` say, for names that contacts tie together.
+def _constants(
+    a: Pushes, b: Pushes, sides: Sequence[FloatArray], names: Sequence[Sequence[str]]
+) -> dict[str, float]:
+    """Constants that make the impulses of both bodies opposite, for names that contacts tie together.
 
-    The median of what each pair of names says is taken at its word: exact data need no more. Names that aren't tied to
-    the most frequent one get none.
+    Names that aren't tied to the first one get none.
     """
-    pairs: dict[tuple[str, str], list[float]] = {}
-    for value, one, other in zip(left.tolist(), a, b, strict=True):
-        if one != other:
-            key, sign = ((str(one), str(other)), 1.0) if one < other else ((str(other), str(one)), -1.0)
-            pairs.setdefault(key, []).append(sign * value)
-    ratio = {key: float(np.median(values)) for key, values in pairs.items() if len(values) >= 2}
-    names = sorted({str(k) for k in a} | {str(k) for k in b})
-    found = {names[0]: 0.0}
-    for _ in names:
-        for (one, other), value in sorted(ratio.items()):
-            if other in found and one not in found:
-                found[one] = found[other] + value
-            elif one in found and other not in found:
-                found[other] = found[one] - value
-    return {name: float(np.exp(value)) for name, value in found.items()}
+    ratio: dict[tuple[str, str], float] = {}
+    one, other = (np.array(each) for each in names)
+    for first, second in sorted({(min(p, q), max(p, q)) for p, q in zip(*names, strict=True) if p != q}):
+        rows = [np.flatnonzero((one == p) & (other == q)) for p, q in ((first, second), (second, first))]
+        p = np.concatenate([(sides[0] * a.change)[:, rows[0]], (sides[1] * b.change)[:, rows[1]]], axis=1)
+        q = np.concatenate([(sides[1] * b.change)[:, rows[0]], (sides[0] * a.change)[:, rows[1]]], axis=1)
+        if p.shape[1] >= 2:
+            ratio[first, second] = _weight(p, -q)
+    known = sorted({*names[0], *names[1]})
+    found = {known[0]: 1.0}
+    for _ in known:
+        for (first, second), value in sorted(ratio.items()):
+            if second in found and first not in found:
+                found[first] = found[second] * value
+            elif first in found and second not in found and value > 0.0:
+                found[second] = found[first] / value
+    return found
+
+
+def _weight(x: FloatArray, y: FloatArray) -> float:
+    """The weight w of ``y = w x`` for vectors, shape ``(d, n)``: what most say, then as exactly as those can tell."""
+    size = (x * x).sum(axis=0)
+    told = size > 0.0
+    if not told.any():
+        return float("nan")
+    rough = float(np.median((x * y).sum(axis=0)[told] / size[told]))
+    near = told & (((y - rough * x) ** 2).sum(axis=0) <= ROUGHLY**2 * (y * y).sum(axis=0))
+    return float((x * y)[:, near].sum() / size[near].sum()) if near.any() else rough
