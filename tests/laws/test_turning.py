@@ -8,10 +8,12 @@ import pytest
 from relgym.experiments.bodies import learned, rolled, tally
 from relgym.experiments.body_worlds import Setting, body_rooms
 from relgym.laws.account import accounts
-from relgym.laws.inertia import Inertia
+from relgym.laws.inertia import Gyration, Inertia, Mass
 from relgym.laws.learner import LawLearner
+from relgym.laws.records import Piece
 from relgym.laws.text import law_rows
 from relgym.laws.touching import Contacts
+from relgym.reporting.motion import MotionRules, parse_motion
 from relgym.scene.relations import Extractor
 
 TWO = Setting(("box", "box"), friction=0.5)
@@ -138,6 +140,28 @@ def test_it_goes_on_as_if_never_saved() -> None:
     again.restore(first.to_json(history=True), first.to_arrays())
     one = learned(rooms[2:], learner=again)
     assert one.to_json(history=True) == whole.to_json(history=True)
+
+
+def test_what_is_printed_is_read_back(rough: LawLearner) -> None:
+    book = rough.book
+    names = sorted(book.free)
+    rules = MotionRules(
+        tuple(book.free[name] for name in names),
+        tuple((name, book.components(name)) for name in names),
+        book.pair,
+        "nt",
+        (),
+        book.tolerance,
+        Inertia(
+            Mass((("sx", 1), ("sy", 2)), "object", (("body1", 1.0), ("disc", 0.25))),
+            (Gyration(("box",), Piece((("sx^2", 0.0625), ("1", 0.5)))), Gyration(("disc",), None)),
+        ),
+    )
+    text = rules.text()
+    assert "masses go as sx sy^2; by object, times body1: 1, disc: 0.25" in text
+    assert "moment over mass of disc: infinite" in text
+    lines = [line for line in text.split("\n") if not line.strip().startswith("#")]
+    assert parse_motion(lines).text() == text
 
 
 @pytest.mark.slow
