@@ -25,6 +25,7 @@ class Cause(enum.Enum):
     NO_ROLES = Outcome.NO_ROLES.value
     OUTSIDE = Outcome.OUTSIDE.value
     DEPENDS = Outcome.DEPENDS.value
+    UNSURE = Outcome.UNSURE.value
     LOW_MARGIN = "the winning mode leads its runner-up by too little"
     LEFT = "left the observation space"
     HORIZON = "the horizon is reached"

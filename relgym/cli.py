@@ -187,19 +187,21 @@ def rules(
 ) -> None:
     """Print a model as rules: if, elif, else."""
     from relgym.console.models import loaded, opened
+    from relgym.model.report import checked_rules, report
     from relgym.wrappers.follower import scenes_of
 
-    if as_json:
-        _echo_json(_report(loaded(model), digits))
-        return
     if not check:
-        typer.echo(loaded(model).describe(details=details, digits=digits))
-        return
-    with _working("checking"):
-        found = opened(model, env_id, pairs("--arg", arg), view)
-        fresh = scenes_of(found.env, found.view, steps, seed=seed)
-        text = found.model.describe(details=details, digits=digits, check=fresh)
-    typer.echo(text)
+        found, fresh = loaded(model), None
+    else:
+        subject = opened(model, env_id, pairs("--arg", arg), view)
+        found, fresh = subject.model, scenes_of(subject.env, subject.view, steps, seed=seed)
+    with _working("checking" if check else "writing"):
+        if not as_json:
+            typer.echo(found.describe(details=details, digits=digits, check=fresh))
+        elif details or not found.has_rules:
+            _echo_json(report(found, digits=digits))
+        else:
+            _echo_json(checked_rules(found, digits, check=fresh).plain(digits))
 
 
 @app.command()
@@ -391,12 +393,6 @@ def _show_reproduction(request: Any) -> None:
                 head = f"{event.name}: {event.title} ({event.source})"
                 typer.echo(f"{head}\n{'=' * len(head)}\n{event.text}\n")
     typer.echo(f"Written to {request.out}")
-
-
-def _report(model: Any, digits: int = 7) -> Any:
-    from relgym.model.report import report
-
-    return report(model, digits=digits)
 
 
 def _progress(*more: ProgressColumn) -> Progress:

@@ -16,7 +16,7 @@ from typing import TypeGuard
 import pytest
 from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 
-FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html"})
+FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html", "scheduling"})
 ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ENGINES | {"clustering", "classification", "laws"}
 CORE = LEARNERS | {"reporting", "model"}
@@ -27,6 +27,7 @@ MAY_IMPORT = {
     "config": frozenset({"errors", "arguments"}),
     "files": frozenset({"errors"}),
     "html": frozenset(),
+    "scheduling": frozenset(),
     "scene": FOUNDATION,
     "numeric": FOUNDATION,
     "logic": FOUNDATION,

@@ -76,8 +76,22 @@ def test_dyna_shows_both_agents_and_the_laws(tmp_path: Path) -> None:
 def test_rules_print_a_model(folder: Path) -> None:
     model = WorldModel.load(folder / "ball.json")
     assert run("rules", folder / "ball.json").rstrip("\n") == model.describe()
+    tables = json.loads(run("rules", folder / "modes.json", "--json", "--details"))
+    assert [t["target"] for t in tables["targets"]] == ["ball.vx", "ball.vy"]
+
+
+def test_rules_as_json_are_those_that_are_printed(folder: Path) -> None:
+    rules = WorldModel.load(folder / "modes.json").rules()
     told = json.loads(run("rules", folder / "modes.json", "--json"))
-    assert [t["target"] for t in told["targets"]] == ["ball.vx", "ball.vy"]
+    assert [p["property"] for p in told["properties"]] == [p.target for p in rules.properties]
+    for part, printed in zip(told["properties"], rules.properties, strict=True):
+        text = printed.text()
+        assert len(part["branches"]) == len(printed.branches) > 1
+        assert part["branches"][-1]["if"] is None, "else"
+        assert all(branch["name"] in text for branch in part["branches"])
+    laws = json.loads(run("rules", folder / "ball.json", "--json", "--check", "--steps", 50))
+    assert laws["motion"] in WorldModel.load(folder / "ball.json").describe()
+    assert "of 50" in laws["agreement"] or "50 " in laws["agreement"]
 
 
 def test_explain_a_scene_of_the_models_env(folder: Path) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,9 @@ from relgym.logic.clause import Clause, Definition
 from relgym.logic.csp import matches
 from relgym.logic.foil import FoilConfig, learn, learn_both
 from relgym.numeric.tree import DecisionTree, learn_tree
+from relgym.scheduling.work import CALL, Steps, resumable
 
-__all__ = ["SHORT", "Draft", "Lesson", "foil_config", "learn_pair"]
+__all__ = ["SHORT", "Lesson", "foil_config", "learn_pair"]
 
 SHORT: Final = 3
 """A faultless definition of so few literals isn't challenged by a wider context, nor by more examples that agree."""
@@ -46,6 +47,10 @@ class Lesson:
     rows: _Rows
     is_i: Bools
     weights: Floats
+
+    def alone(self) -> Lesson:
+        """The same lesson with examples of its own, that nobody changes."""
+        return Lesson(self.view.take(self.rows), np.arange(len(self.rows)), self.is_i, self.weights)
 
     @property
     def counts(self) -> tuple[float, float]:
@@ -76,63 +81,28 @@ def foil_config(config: ClassificationConfig) -> FoilConfig:
     )
 
 
+@resumable
 def learn_pair(
     i: int, j: int, lesson: Lesson, scope: Scope, config: ClassificationConfig
-) -> BinaryClassifier:
-    """Learn to tell mode `i` from mode `j`; see `Draft`, which does it piece by piece."""
-    draft = Draft()
-    while (found := draft.advance(i, j, lesson, scope, config)) is None:
-        pass
-    return found
+) -> Steps[BinaryClassifier]:
+    """Learn to tell mode `i` from mode `j`: in one context after the other, until a definition settles it.
 
-
-@dataclass(slots=True)
-class Draft:
-    """A pair that is being learned, one context at a time, so that a single time step can't cost much.
-
-    Parameters
-    ----------
-    definitions
-        What was found so far, by context.
-    work
-        Work spent so far, in FOIL's units.
+    With examples of one mode only there is nothing to tell: the result has no clause and votes for that mode.
     """
-
-    definitions: dict[Context, Definition] = field(default_factory=dict)
-    work: int = 0
-
-    def advance(
-        self, i: int, j: int, lesson: Lesson, scope: Scope, config: ClassificationConfig
-    ) -> BinaryClassifier | None:
-        """Learn in the next context; the classifier of modes `i` and `j` when that was the last one.
-
-        With examples of one mode only there is nothing to tell: the result has no clause and votes for that mode.
-        """
-        if not all(lesson.counts):
-            return majority(i, j, scope, lesson.counts)
-        taught = lesson.balanced(config.class_balance)
-        contexts = _contexts(lesson) if config.context == "auto" else [config.context]
-        context = next((each for each in contexts if each not in self.definitions), contexts[-1])
-        found = self.definitions[context] = _define(taught, context, scope, config)
-        self.work += found.work
-        if context != contexts[-1] and not _settles(found, context):
-            return None
-        # as between polarities, errors count first; the narrowest context wins ties
-        best = min(
-            self.definitions.items(), key=lambda each: (round(each[1].errors, 7), round(each[1].bits, 7))
-        )
-        classifier = _with_trees(BinaryClassifier(i, j, scope, *best, work=self.work), taught, config)
-        classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
-        return classifier
-
-    def to_list(self) -> list[list[Any]]:
-        """Plain data; the work isn't kept."""
-        return [[context, definition.to_dict()] for context, definition in self.definitions.items()]
-
-    @classmethod
-    def from_list(cls, data: list[list[Any]]) -> Draft:
-        """Inverse of `to_list`."""
-        return cls({context: Definition.from_dict(plain) for context, plain in data})
+    if not all(lesson.counts):
+        return majority(i, j, scope, lesson.counts)
+    taught = lesson.balanced(config.class_balance)
+    definitions: dict[Context, Definition] = {}
+    for context in _contexts(lesson) if config.context == "auto" else [config.context]:
+        found = definitions[context] = yield from _define(taught, context, scope, config)
+        if _settles(found, context):
+            break
+    # as between polarities, errors count first; the narrowest context wins ties
+    best = min(definitions.items(), key=lambda each: (round(each[1].errors, 7), round(each[1].bits, 7)))
+    work = sum(each.work for each in definitions.values())
+    classifier = yield from _with_trees(BinaryClassifier(i, j, scope, *best, work=work), taught, config)
+    classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
+    return classifier
 
 
 def _settles(found: Definition, context: Context) -> bool:
@@ -154,11 +124,14 @@ def _contexts(lesson: Lesson) -> list[Context]:
     return found if np.array_equal(usual, wide) else [*found, CONTEXTS[2]]
 
 
-def _define(lesson: Lesson, context: Context, scope: Scope, config: ClassificationConfig) -> Definition:
+def _define(
+    lesson: Lesson, context: Context, scope: Scope, config: ClassificationConfig
+) -> Steps[Definition]:
     facts = lesson.view.facts(context, scope)
     tuples, is_i, weights = lesson.view.tuples(lesson.rows), lesson.is_i, lesson.weights
     method = learn_both if config.both_polarities else learn
-    found: Definition = method(
+    yield CALL
+    found: Definition = yield from method.steps(
         facts,
         tuples[is_i],
         tuples[~is_i],
@@ -169,7 +142,9 @@ def _define(lesson: Lesson, context: Context, scope: Scope, config: Classificati
     return found
 
 
-def _with_trees(found: BinaryClassifier, lesson: Lesson, config: ClassificationConfig) -> BinaryClassifier:
+def _with_trees(
+    found: BinaryClassifier, lesson: Lesson, config: ClassificationConfig
+) -> Steps[BinaryClassifier]:
     """Add decision trees where clauses, or the fall-through, err too often (§3.4.4)."""
     view, facts = lesson.view, lesson.view.facts(found.context, found.scope)
     positive = lesson.is_i != found.definition.negated
@@ -181,7 +156,7 @@ def _with_trees(found: BinaryClassifier, lesson: Lesson, config: ClassificationC
         wrong = here[~positive[here]]
         tree = None
         if _rate(lesson, wrong, here, ~positive, config) > config.clause_tree_threshold:
-            tree = _tree(found, clause, lesson, here, positive, config)
+            tree = yield from _tree(found, clause, lesson, here, positive, config)
         if tree is not None:
             features = tree_features(view, found.scope, found.context, clause, lesson.rows[here])
             here = here[tree.predict_batch(features)]
@@ -189,7 +164,7 @@ def _with_trees(found: BinaryClassifier, lesson: Lesson, config: ClassificationC
         open_ = np.setdiff1d(open_, here)
     last = None
     if _rate(lesson, open_[positive[open_]], open_, positive, config) > config.fall_through_tree_threshold:
-        last = _tree(found, None, lesson, open_, positive, config)
+        last = yield from _tree(found, None, lesson, open_, positive, config)
     return BinaryClassifier(
         found.i, found.j, found.scope, found.context, found.definition, tuple(trees), last, work=found.work
     )
@@ -213,12 +188,12 @@ def _tree(
     here: _Rows,
     positive: Bools,
     config: ClassificationConfig,
-) -> DecisionTree | None:
+) -> Steps[DecisionTree | None]:
     """A tree for the examples at one stage; none if it would always give the same answer."""
     columns = tree_columns(found.scope, 1 if clause is None else clause.variables)
     if not columns:
         return None
-    tree = learn_tree(
+    tree = yield from learn_tree.steps(
         tree_features(lesson.view, found.scope, found.context, clause, lesson.rows[here]),
         positive[here],
         weights=lesson.weights[here],

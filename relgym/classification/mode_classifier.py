@@ -229,13 +229,14 @@ class ModeClassifier:
         """Learn stale pairs anew, the most contradicted first, until the budget is spent; the work spent.
 
         Work is counted in FOIL's units (tuples x candidate literals), never in time: the result is the same
-        on any machine. A pair is learned in pieces (`Draft`), and a piece is finished once begun: one call can
+        on any machine. A pair is learned in pieces (`Task`), and a piece is finished once begun: one call can
         overdraw the budget, and a pair may be finished by a later call.
         """
         spent, changed = 0, False
         for pair in sorted((p for p in self._pairs.values() if p.stale), key=lambda p: p.urgency):
             while pair.stale and spent < budget:
-                spent += pair.refresh(self._lessons([pair.modes])[pair.modes], self.config)
+                lesson = self._lessons([pair.modes])[pair.modes]
+                spent += pair.refresh(lesson, self.config, budget - spent)
                 changed |= not pair.stale
         if changed:
             self._pairs_changed()

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from relgym.classification.binary import BinaryClassifier, majority
 from relgym.classification.examples import NOISE
-from relgym.classification.learning import SHORT, Draft, Lesson
+from relgym.classification.learning import SHORT, Lesson, learn_pair
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
+from relgym.logic.search import BLOCK, LITERAL
+from relgym.scheduling.work import Task
 
 __all__ = ["PairState", "covered_by", "pair_labels"]
 
@@ -42,7 +44,7 @@ class PairState:
     stale
         Whether it waits to be learned anew.
     draft
-        What has been learned anew so far, if that was begun.
+        The classifier that is being learned anew, if that was begun; files don't keep it.
     """
 
     classifier: BinaryClassifier
@@ -52,7 +54,8 @@ class PairState:
     contradictions: float = 0.0
     mended: bool = False
     stale: bool = False
-    draft: Draft | None = None
+    draft: Task[BinaryClassifier] | None = None
+    _taught: tuple[float, float] = (0.0, 0.0)  # what it is taught by
 
     @classmethod
     def new(cls, i: int, j: int, scope: Scope, lesson: Lesson) -> PairState:
@@ -94,23 +97,24 @@ class PairState:
         self.contradictions = max(self.contradictions, errors - self.errors)
         self.stale = self.stale or errors > self.errors or (self.unlearned and min(self.seen) > 0)
 
-    def refresh(self, lesson: Lesson, config: ClassificationConfig) -> int:
-        """One step of mending the classifier or learning it anew; the work spent. Not `stale`: done."""
+    def refresh(self, lesson: Lesson, config: ClassificationConfig, budget: float) -> int:
+        """Mend the classifier or learn it anew as far as a budget goes; the work spent. Not `stale`: done."""
         if self.draft is None:
-            self.draft = Draft()
             grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
-            if config.repair and not grown and all(lesson.counts):
-                work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses))
-                mended = mend(self.classifier, lesson, self.errors, config)
-                if mended is not None:
-                    self._adopt(mended, lesson, mended=True)
-                    work += mended.work
+            mendable = config.repair and not grown and all(lesson.counts)
+            mended = mend(self.classifier, lesson, self.errors, config) if mendable else None
+            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + BLOCK // LITERAL
+            if mended is not None:
+                self._adopt(mended, lesson, mended=True)
+                return work + mended.work
+            self.draft = Task(learn_pair, *self.modes, lesson.alone(), self.classifier.scope, config)
+            self._taught = lesson.counts
+            if mendable:
                 return work
-        before = self.draft.work
-        found = self.draft.advance(*self.modes, lesson, self.classifier.scope, config)
-        work = self.draft.work - before + len(lesson.rows)
-        if found is not None:
-            self.learned = lesson.counts
+        work = self.draft.advance(int(min(budget * LITERAL, 2**62))) // LITERAL + 1
+        if self.draft.done:
+            found = self.draft.result
+            self.learned = self._taught
             right = np.array(found.for_i)[found.decide_batch(lesson.view, lesson.rows)] == lesson.is_i
             self.errors = float(lesson.weights[~right].sum())
             self._adopt(found, lesson, mended=False)
@@ -124,12 +128,7 @@ class PairState:
         """Plain JSON-able dictionary."""
         names = ("seen", "errors", "contradictions", "mended", "stale")
         plain = {name: getattr(self, name) for name in names}
-        draft = None if self.draft is None else self.draft.to_list()
-        return plain | {
-            "learned": list(self.learned),
-            "classifier": self.classifier.to_dict(),
-            "draft": draft,
-        }
+        return plain | {"learned": list(self.learned), "classifier": self.classifier.to_dict(), "draft": None}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], scope: Scope) -> PairState:
@@ -137,10 +136,9 @@ class PairState:
         names = ("seen", "errors", "contradictions", "mended", "stale")
         plain = {name: data[name] for name in names}
         plain["seen"] = list(plain["seen"])
-        draft = None if data["draft"] is None else Draft.from_list(data["draft"])
         first, second = data["learned"]
         classifier = BinaryClassifier.from_dict(data["classifier"], scope)
-        return cls(classifier, learned=(first, second), draft=draft, **plain)
+        return cls(classifier, learned=(first, second), **plain)
 
 
 def pair_labels(

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from relgym.clustering.discovery import likeness
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, forward_stepwise
+from relgym.scheduling.work import CALL, Steps, resumable
 
 __all__ = [
     "EQUAL",
@@ -88,6 +89,7 @@ def reach(errors: NDArray[np.float64], floor: float = 0.0) -> float:
     return max(float(np.quantile(errors, NEARLY_ALL)), NORMAL * floor)
 
 
+@resumable
 def approximate(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -99,7 +101,7 @@ def approximate(
     left: float,
     noisy: int = 0,
     lines: bool = True,
-) -> Approximation | None:
+) -> Steps[Approximation | None]:
     """The best sparse function of nearly all rows, if it leaves little of the change; else None.
 
     Parameters
@@ -132,7 +134,8 @@ def approximate(
     best: Approximation | None = None
     for width in widths:
         search = _Search(x[:, :width], y, change, floor, terms, stds, left, noisy)
-        for found in (*search.run(y), *search.run(tamed)):
+        first = yield from search.run(y)
+        for found in (*first, *(yield from search.run(tamed))):
             if best is None or _shorter(found, best):
                 best = found
     return best
@@ -156,12 +159,12 @@ class _Search:
     left: float
     noisy: int
 
-    def run(self, first: NDArray[np.float64]) -> list[Approximation]:
+    def run(self, first: NDArray[np.float64]) -> Steps[list[Approximation]]:
         """What is found from these responses to begin with, and what is left of it without terms that are no laws."""
         every = counted = np.ones(len(self.y), dtype=np.bool_)
-        fit = self._fit(first, every)
+        fit = yield from self._fit(first, every)
         for _ in range(ROUNDS - 1):
-            fit = self._fit(self.y, self._explained(fit))
+            fit = yield from self._fit(self.y, self._explained(fit))
         whole = fit
         for _ in range(CLEANED):
             lawless = counted & self._lawless(fit, self._explained(fit))
@@ -169,13 +172,18 @@ class _Search:
                 break
             counted = counted & ~lawless
             for _ in range(ROUNDS - 1):
-                fit = self._fit(self.y, self._explained(fit) & counted)
+                fit = yield from self._fit(self.y, self._explained(fit) & counted)
         fits = [(whole, every)] if fit is whole else [(whole, every), (fit, counted)]
-        return [found for each in fits if (found := self._approximation(*each)) is not None]
+        found = []
+        for each in fits:
+            if (one := (yield from self._approximation(*each))) is not None:
+                found.append(one)
+        return found
 
-    def _approximation(self, fit: LinearFit, counted: NDArray[np.bool_]) -> Approximation | None:
+    def _approximation(self, fit: LinearFit, counted: NDArray[np.bool_]) -> Steps[Approximation | None]:
         """A function as an approximation, of which some rows count; None if it leaves too much, or too many."""
         explained = self._explained(fit)
+        yield CALL
         if explained.mean() < NEARLY_ALL:
             return None
         kept = explained & counted
@@ -183,11 +191,11 @@ class _Search:
         share = sigma / max(float(self.change[kept].std()), self.floor)
         if share > self.left and not (self.noisy and share <= NOISY and self._is_noise(fit, kept)):
             return None
-        shorter = eliminate_backward(self.x[kept], self.y[kept], fit, sigma=sigma)
+        shorter = yield from eliminate_backward.steps(self.x[kept], self.y[kept], fit, sigma=sigma)
         return Approximation(shorter, explained, sigma, reach(self._errors(shorter), self.floor))
 
-    def _fit(self, y: NDArray[np.float64], rows: NDArray[np.bool_]) -> LinearFit:
-        return forward_stepwise(
+    def _fit(self, y: NDArray[np.float64], rows: NDArray[np.bool_]) -> Steps[LinearFit]:
+        return forward_stepwise.steps(
             self.x[rows], y[rows], sigma=self.floor, max_terms=self.terms, eliminate=False
         )
 

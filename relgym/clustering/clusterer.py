@@ -12,20 +12,23 @@ from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import least_examples
 from relgym.clustering.em import Cluster, refit
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.last_resort import last_resort, timely
+from relgym.clustering.last_resort import Resort, timely
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport
-from relgym.clustering.prospecting import Prospector
+from relgym.clustering.prospecting import Prospector, Search
 from relgym.clustering.suspects import review_due
-from relgym.clustering.turn import Search, Turn
 from relgym.config import ClusteringConfig
 from relgym.scene.objects import Target
+from relgym.scheduling.agenda import Budget
 
 __all__ = ["ClusterReport", "ModeClusterer"]
 
 ESTIMATE_AT = (64, 512, 4096)
 """Numbers of examples after which the noise is estimated anew."""
+
+ESTIMATE = 1_500_000
+"""What an estimate costs, in cells."""
 
 LESS = 0.5
 """Where most is unexplained, noise was overrated by the first few examples if more of them show so much less."""
@@ -51,7 +54,7 @@ class ModeClusterer(Prospector):
     floor
         Rounding noise, the least that is possible, in units of the target.
     due
-        Whether an approximation is to be sought at the next opportunity.
+        Whether an approximation is to be sought at the next opportunity, or is being sought.
 
     Notes
     -----
@@ -64,12 +67,16 @@ class ModeClusterer(Prospector):
         super().__init__(target, config, seed=seed)
         self.floor = 1e-12
         self.due = False
+        self._resort: Resort | None = None  # the search for an approximation, under way
+        self._estimating = False  # whether the noise is to be estimated anew
         self._largest = 0.0  # number among the columns and the target's values
         self._reach = 0.0  # value of the target
         self._spread = 0.0  # noise found in the data, rounding apart
 
     # ------------------------------------------------------------------ one example (Figure 3.2)
-    def learn_one(self, table: ExampleTable, row: int, y: float, turn: Turn | None = None) -> ClusterReport:
+    def learn_one(
+        self, table: ExampleTable, row: int, y: float, budget: Budget | None = None
+    ) -> ClusterReport:
         """Take up one example: assign it, and where it is news, look for modes.
 
         Parameters
@@ -78,22 +85,21 @@ class ModeClusterer(Prospector):
             The rows of the target's type, and the number of the example's.
         y
             The property's next value.
-        turn
-            Leave for a search among non-linear features, which is dear; default: given.
+        budget
+            What may be spent on searches; those that take more are gone on with (`go_on`). Default: all they take.
         """
-        turn = Turn() if turn is None else turn
+        budget = Budget() if budget is None else budget
         before = set(self.clusters)
-        example = self._append(table, row, y)
+        example = self._append(table, row, y, budget)
         errors = self._errors_of(table, example)
         if (mode := self._choose(table, example, errors)) != NOISE:
             self.labels[example] = mode
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
-            self._discover(table, example, turn)
+            self._discover(table, example, budget)
         reassigned = review_due(self._log.seen) and self._review(table)
         self.due |= self._hopeless(table)
-        if self.due and (not self._dear(table) or turn.take()):
-            self.approximate_now(table)
+        self.approximate_now(table, budget)
         after = set(self.clusters)
         fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
         if reassigned or after != set(errors):
@@ -104,13 +110,25 @@ class ModeClusterer(Prospector):
             int(self.labels[example]), tuple(sorted(fitting)), created, removed, reassigned=reassigned
         )
 
-    def _append(self, table: ExampleTable, row: int, y: float) -> int:
+    @property
+    def searching(self) -> bool:
+        """Whether a search for modes is under way."""
+        return self._hunt is not None
+
+    def go_on(self, table: ExampleTable, budget: Budget) -> bool:
+        """Go on with the search for modes, as far as the budget goes; whether they are others than before."""
+        before = set(self.clusters)
+        self._pursue(table, budget)
+        return before != set(self.clusters)
+
+    def _append(self, table: ExampleTable, row: int, y: float, budget: Budget) -> int:
         example = self._log.append(row, y)
+        self._estimating |= self._log.seen in ESTIMATE_AT
         core = table.signatures[table.signature_ids[row]].core
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
-        if largest > self._largest or abs(y) > self._reach or self._log.seen in ESTIMATE_AT:
+        if largest > self._largest or abs(y) > self._reach or self._estimating:
             self._largest, self._reach = max(largest, self._largest), max(abs(y), self._reach)
-            self._rescale(table)
+            self._rescale(table, budget)
         return example
 
     def _grow(self, table: ExampleTable, mode: int) -> None:
@@ -143,7 +161,7 @@ class ModeClusterer(Prospector):
         self.labels[idle] = bare.id
 
     # ------------------------------------------------------------------ noise scale
-    def _rescale(self, table: ExampleTable) -> None:
+    def _rescale(self, table: ExampleTable, budget: Budget) -> None:
         if self.config.noise_std != "auto":
             self.scale = replace(self.scale, sigma=float(self.config.noise_std))
             return
@@ -151,7 +169,10 @@ class ModeClusterer(Prospector):
         own = table.x[recent][:, : table.signatures[table.signature_ids[recent[-1]]].core]
         floor = rounding_noise(np.array([[self._largest]]), np.append(self.y[-256:], self._reach), own)
         self.floor = floor
-        if self._log.seen in ESTIMATE_AT and 2 * self.noise_examples > self._log.seen:
+        estimating = self._estimating and budget.left > 0  # of many targets not all in the same step
+        self._estimating &= not estimating
+        if estimating and 2 * self.noise_examples > self._log.seen:
+            budget.spend(ESTIMATE)
             estimate = self._estimate(table, floor)
             if estimate is not None and self._refutes(estimate):
                 self._spread, self.approximate = estimate if estimate > floor else 0.0, False
@@ -193,6 +214,7 @@ class ModeClusterer(Prospector):
 
     def _start_over(self) -> None:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""
+        self._hunt = None
         self.clusters.clear()
         self._searches.clear()
         self._chancy = False  # the next review tells, of the scale then assumed
@@ -204,7 +226,7 @@ class ModeClusterer(Prospector):
     def retarget(self, target: Target) -> None:
         """Be given other next values: the examples stay, modes are searched again."""
         self.target = target
-        self._spread, self.approximate, self.due = 0.0, False, False
+        self._spread, self.approximate, self.due, self._resort = 0.0, False, False, None
         self._assume(self.floor)
         self._start_over()
 
@@ -217,20 +239,26 @@ class ModeClusterer(Prospector):
         # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
         return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
 
-    def _dear(self, table: ExampleTable) -> bool:
-        """Whether searches of the newest example's columns are dear."""
-        return bool(table.signatures[int(table.signature_ids[self.rows[-1]])].features)
+    def approximate_now(self, table: ExampleTable, budget: Budget) -> bool:
+        """Look for an approximation, the law of last resort, if one is due; whether it is found and taken.
 
-    def approximate_now(self, table: ExampleTable) -> None:
-        """Look for an approximation, the law of last resort."""
-        self.due = False
-        found = last_resort(self, table, floor=self.floor, again=self.approximate)
+        As far as the budget goes: it is called again until `due` no longer holds.
+        """
+        if not self.due:
+            return False
+        if self._resort is None:
+            self._resort = Resort.of(self, table, floor=self.floor)
+        if not budget.work(self._resort.task):
+            return False
+        found = self._resort.judged(self, table, floor=self.floor, again=self.approximate)
+        self._resort, self.due = None, False
         if found is None:
-            return
+            return False
         self._spread, self.approximate = found.sigma, True
         self._assume(max(self.floor, found.sigma))
         self._start_over()
         self._adopt(table, found.signature, found.fit)
+        return True
 
     def absorb(
         self, other: ModeClusterer, table: ExampleTable, rows: NDArray[np.int64], *, functions: bool
@@ -282,6 +310,7 @@ class ModeClusterer(Prospector):
             "approximate": self.approximate,
             **({"due": True} if self.due else {}),
             **({"chancy": True} if self._chancy else {}),
+            **({"estimating": True} if self._estimating else {}),
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
@@ -299,6 +328,7 @@ class ModeClusterer(Prospector):
         self._largest, self._reach = float(data["largest"]), float(data["reach"])
         self.approximate, self.due = bool(data["approximate"]), bool(data.get("due", False))
         self._chancy = bool(data.get("chancy", False))
+        self._estimating = bool(data.get("estimating", False))
         self._assume(float(data["sigma"]))
         self._spread, self.floor = float(data["spread"]), float(data["rounding"])
         self._known_noise = int(data["noise"])

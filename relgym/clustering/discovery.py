@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +10,28 @@ from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus, consensus, refine
-from relgym.numeric.stepwise import PIVOT, LinearFit, forward_stepwise, least_squares, varying_columns
+from relgym.numeric.stepwise import (
+    PIVOT,
+    LinearFit,
+    fitting_cells,
+    forward_stepwise,
+    least_squares,
+    varying_columns,
+)
+from relgym.scheduling.work import CALL, Steps, resumable
 
-__all__ = ["EXACT", "SEARCH", "Scale", "find_mode", "identified", "least_examples", "plans", "verifying_bits"]
+__all__ = [
+    "EXACT",
+    "SEARCH",
+    "Scale",
+    "find_mode",
+    "identified",
+    "law_cells",
+    "least_examples",
+    "plans",
+    "searched",
+    "verifying_bits",
+]
 
 SEARCH = 400
 """At most this many rows are searched at a time."""
@@ -101,6 +119,7 @@ def counts(y: NDArray[np.float64], scale: Scale, most: int = COUNTED) -> bool:
     return bool(np.abs(ratio - np.round(ratio)).max() < 1e-6)
 
 
+@resumable
 def find_mode(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -113,8 +132,9 @@ def find_mode(
     rng: np.random.Generator,
     needed: int | None = None,
     counting: bool = False,
-    differences: Callable[[NDArray[np.intp]], NDArray[np.integer]] | None = None,
-) -> Consensus | None:
+    rows: NDArray[np.intp] | None = None,
+    apart: NDArray[np.integer] | None = None,
+) -> Steps[Consensus | None]:
     """Search rows of one slot signature for a function that enough of them obey.
 
     Parameters
@@ -130,21 +150,21 @@ def find_mode(
         Examples that found a mode; default: `least_examples` of these responses.
     counting
         Whether the target counts something (`counts`).
-    differences
-        Gives in how many facts the relational states of some rows differ, for states with few rows.
+    rows
+        Those that are searched; default: `searched`.
+    apart
+        In how many facts the relational states of these rows differ, shape ``(rows, rows)``, for states with few rows.
     """
     needed = least_examples(y, scale, config) if needed is None else needed
-    rows = _recent(len(y), fresh, rng)
+    rows = searched(len(y), fresh, rng) if rows is None else rows
     simple = [SIMPLE] if counting else []
-    several = differences is not None and len(np.unique(strata[rows])) > 1
-    apart = differences(rows) if differences is not None and several else None
     completed = 0  # columns among which terms that were missing have been looked for
     for number, (columns, terms, size) in enumerate([*simple, *plans(stages, config)]):
         if simple and number:
             needed = max(needed, WORDY)
         if len(rows) < max(needed, size):
             continue
-        found = consensus(
+        found = yield from consensus.steps(
             x[rows][:, :columns],
             y[rows],
             sigma=scale.sigma,
@@ -161,15 +181,18 @@ def find_mode(
         )
         if found is None or found.size < min(needed, 6):
             continue
-        found = identified(x, y, found.fit, scale=scale, support=config.support)
+        found = yield from identified.steps(x, y, found.fit, scale=scale, support=config.support)
         if found is None or found.size < needed:
             continue
+        yield law_cells(found, stages[0])
         if is_law(x, y, found, stages[0], scale):
             return found
         if number >= len(simple) and columns > completed:
             completed = columns
-            fit = _complete(x[rows][:, :columns], y[rows], found.fit, scale=scale, terms=config.max_terms)
-            found = identified(x, y, fit, scale=scale, support=config.support)
+            fit = yield from _complete(
+                x[rows][:, :columns], y[rows], found.fit, scale=scale, terms=config.max_terms
+            )
+            found = yield from identified.steps(x, y, fit, scale=scale, support=config.support)
             if found is not None and found.size >= needed and is_law(x, y, found, stages[0], scale):
                 return found
     return None
@@ -177,7 +200,7 @@ def find_mode(
 
 def _complete(
     x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, *, scale: Scale, terms: int
-) -> LinearFit:
+) -> Steps[LinearFit]:
     """A function with the small terms that another one lacks, from rows that it misses by less and less.
 
     A few rows don't show a term that is small beside their function's: what they leave of it is within what the
@@ -188,7 +211,7 @@ def _complete(
         near = np.abs(y - fit.predict(x)) <= reach
         if near.sum() <= terms + 1:
             return fit
-        fit = forward_stepwise(x[near], y[near], sigma=scale.sigma, max_terms=terms)
+        fit = yield from forward_stepwise.steps(x[near], y[near], sigma=scale.sigma, max_terms=terms)
         if reach <= scale.tolerance:
             return fit
         reach = max(0.5 * reach, scale.tolerance)
@@ -261,8 +284,8 @@ def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, 
     return found
 
 
-def _recent(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """The newest rows and a random choice of older ones, ascending."""
+def searched(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """The rows that are searched of so many: the newest and a random choice of older ones, ascending."""
     if n <= SEARCH:
         return np.arange(n)
     # Fresh ones may outnumber the rows: some of them have become a mode's tail in the meantime.
@@ -275,9 +298,15 @@ def _recent(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
     return np.concatenate([np.sort(older), newest])
 
 
+def law_cells(found: Consensus, own: int) -> int:
+    """What `is_law` costs, in cells."""
+    return CALL + 2 * own * min(found.size, SEARCH) ** 2
+
+
+@resumable
 def identified(
     x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, *, scale: Scale, support: int
-) -> Consensus | None:
+) -> Steps[Consensus | None]:
     """The part of a function that its inliers really determine, with those inliers; None if nothing is left.
 
     Two things are refused. A weight that fewer than `support` examples determine (a leverage point fixes it
@@ -285,7 +314,7 @@ def identified(
     law from a look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations.
     """
     for _ in range(len(fit.columns) + 1):
-        found = refine(
+        found = yield from refine.steps(
             x,
             y,
             Consensus(fit, np.abs(y - fit.predict(x)) <= scale.tolerance),
@@ -295,7 +324,7 @@ def identified(
         rows = np.flatnonzero(found.inliers)
         if len(rows) < 4:
             return None
-        weak, kept = _unsupported(x[rows], found.fit, scale, support)
+        weak, kept = yield from _unsupported(x[rows], found.fit, scale, support)
         if weak is None:
             return found if _enough_combinations(x[rows], y[rows], found.fit, scale.tolerance) else None
         columns = tuple(c for c in found.fit.columns if c != weak)
@@ -305,7 +334,7 @@ def identified(
 
 def _unsupported(
     x: NDArray[np.float64], fit: LinearFit, scale: Scale, support: int
-) -> tuple[int | None, NDArray[np.bool_]]:
+) -> Steps[tuple[int | None, NDArray[np.bool_]]]:
     """A column that fewer than `support` rows determine, and the rows without those; (None, all) if none."""
     everything = np.ones(len(x), dtype=bool)
     for column, weight in zip(fit.columns, fit.weights, strict=True):
@@ -318,6 +347,7 @@ def _unsupported(
             stake = np.abs(left) / np.maximum(1.0 - _leverage(x[kept], fit, column), PIVOT)
             kept[np.flatnonzero(kept)[np.argmax(stake)]] = False
         remaining = np.square(weight * _own_part(x[kept], fit, column))
+        yield 2 * support * fitting_cells(len(x), len(fit.columns))
         much = (10.0 * scale.tolerance) ** 2
         # Through noise, many rows that say little each determine a weight as well as a few that say much.
         together = remaining.sum() > support * much and remaining.mean() > QUIET * scale.tolerance**2

@@ -7,13 +7,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.approximation import EQUAL, LEFT, LEFT_LINEAR, approximate, reach, terms_of
+from relgym.clustering.approximation import (
+    EQUAL,
+    LEFT,
+    LEFT_LINEAR,
+    Approximation,
+    approximate,
+    reach,
+    terms_of,
+)
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.population import Population
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit
+from relgym.scheduling.work import Task
 
-__all__ = ["LastResort", "last_resort", "timely"]
+__all__ = ["LastResort", "Resort", "last_resort", "timely"]
 
 APPROXIMATE_AT = (256, 1024, 4096, 16384)
 """Numbers of examples after which an approximation is sought, if most of them are unexplained."""
@@ -63,23 +72,60 @@ def last_resort(
     again
         Whether the present modes are approximations too.
     """
+    resort = Resort.of(population, table, floor=floor)
+    resort.task.advance(2**62)
+    return resort.judged(population, table, floor=floor, again=again)
+
+
+@dataclass(frozen=True, slots=True)
+class Resort:
+    """The search for an approximation, under way: of which signature, with its columns in this order."""
+
+    signature: int
+    order: NDArray[np.intp]
+    task: Task[Approximation | None]
+
+    @classmethod
+    def of(cls, population: Population, table: ExampleTable, *, floor: float) -> Resort:
+        """Begin one among a target's newest examples."""
+        signature, recent = _recent(population, table)
+        slots, rows, y = table.signatures[signature], population.rows[recent], population.y[recent]
+        order, stages = slots.preference(population.target)
+        order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
+        task = Task(
+            approximate,
+            slots.matrix(table.x[rows], order),
+            y,
+            slots.present(table.x[rows], population.target),
+            floor=floor,
+            terms=terms_of(len(order), population.config),
+            stds=population.scale.inlier_stds,
+            left=LEFT if slots.features else LEFT_LINEAR,
+            noisy=stages[0] if slots.features else 0,
+        )
+        return cls(signature, order, task)
+
+    def judged(
+        self, population: Population, table: ExampleTable, *, floor: float, again: bool
+    ) -> LastResort | None:
+        """What was found, if it is better than what there is by now; parameters as of `last_resort`."""
+        found = self.task.result
+        return None if found is None else _judged(self, found, population, table, floor=floor, again=again)
+
+
+def _judged(
+    resort: Resort,
+    found: Approximation,
+    population: Population,
+    table: ExampleTable,
+    *,
+    floor: float,
+    again: bool,
+) -> LastResort | None:
     signature, recent = _recent(population, table)
-    slots, rows, y = table.signatures[signature], population.rows[recent], population.y[recent]
-    order, stages = slots.preference(population.target)
-    order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
-    x = slots.matrix(table.x[rows], order)
-    found = approximate(
-        x,
-        y,
-        slots.present(table.x[rows], population.target),
-        floor=floor,
-        terms=terms_of(len(order), population.config),
-        stds=population.scale.inlier_stds,
-        left=LEFT if slots.features else LEFT_LINEAR,
-        noisy=stages[0] if slots.features else 0,
-    )
-    if found is None:
-        return None
+    slots, rows, y = table.signatures[resort.signature], population.rows[recent], population.y[recent]
+    if signature != resort.signature:
+        return None  # examples look otherwise by now
     if again and slots.features:  # few examples choose among many features badly
         modes = list(population.clusters.values())
         errors = [c.errors(table, rows, y, population.scale)[0] for c in modes]
@@ -92,7 +138,7 @@ def last_resort(
         count = len(population.clusters)
         if found.sigma > (count if count > 1 else 0.5) * population.scale.sigma:
             return None
-    return LastResort(signature, reordered(found.fit, order), found.sigma)
+    return LastResort(resort.signature, reordered(found.fit, resort.order), found.sigma)
 
 
 def _recent(population: Population, table: ExampleTable) -> tuple[int, NDArray[np.intp]]:

@@ -101,10 +101,10 @@ class Population:
         """All modes but noise, by id."""
         if not len(self._log):
             return tuple(c.mode for _, c in sorted(self.clusters.items()))
-        counts = np.bincount(self.labels, minlength=self._next_id)
-        dropped = self._log.forgotten
+        labels, dropped = self.labels, self._log.forgotten
         return tuple(
-            c.mode.with_examples(int(counts[i]) + dropped[i]) for i, c in sorted(self.clusters.items())
+            c.mode.with_examples(int(np.count_nonzero(labels == i)) + dropped[i])
+            for i, c in sorted(self.clusters.items())
         )
 
     @property

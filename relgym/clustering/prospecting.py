@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import EXACT, counts, find_mode, least_examples, verifying_bits
+from relgym.clustering.discovery import (
+    EXACT,
+    SEARCH,
+    counts,
+    find_mode,
+    least_examples,
+    searched,
+    verifying_bits,
+)
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.extension import extended
@@ -16,13 +24,15 @@ from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
 from relgym.clustering.suspects import Evidence, likeliest, suspects
-from relgym.clustering.turn import Search, Turn
 from relgym.clustering.unification import reordered
 from relgym.config import ClusteringConfig
+from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import Target
+from relgym.scheduling.agenda import Budget
+from relgym.scheduling.work import CALL, Task
 
-__all__ = ["Prospector"]
+__all__ = ["Prospector", "Search"]
 
 HOPELESS = 200
 """Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
@@ -35,6 +45,54 @@ SURPRISING = 2.0
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
+
+
+MOST_CELLS = 1_000_000
+"""A search looks at the newest unexplained examples, no more numbers than this; at twice `SEARCH` examples at least."""
+
+
+@dataclass(slots=True)
+class Search:
+    """When to search the noise of one slot signature next.
+
+    Attributes
+    ----------
+    waiting
+        Unexplained examples since the last search.
+    failures
+        Searches in a row that found nothing.
+    """
+
+    waiting: int = 0
+    failures: int = 0
+
+
+@dataclass(slots=True)
+class Hunt:
+    """A search for modes that is under way.
+
+    Attributes
+    ----------
+    signature
+        Whose noise is searched.
+    fresh
+        How many of its examples no search had seen when it began.
+    left
+        New modes that it may still look for.
+    task
+        The search for one of them; None between two.
+    order
+        The columns that it looks at.
+    late
+        Whether it has taken more than one step, so that modes may have changed in the meantime.
+    """
+
+    signature: int
+    fresh: int
+    left: int = MOST_DISCOVERIES
+    task: Task[Consensus | None] | None = None
+    order: NDArray[np.intp] | None = None
+    late: bool = False
 
 
 class Prospector(Population):
@@ -58,38 +116,88 @@ class Prospector(Population):
         self.approximate = False
         self._rng = np.random.default_rng(seed)
         self._searches: dict[int, Search] = {}
+        self._hunt: Hunt | None = None
 
     @property
     def _needed(self) -> int:
         """Examples that found a mode: each verifies it by as many bits as tell it from all values seen."""
         return least_examples(self.y, self.scale, self.config)
 
-    def _discover(self, table: ExampleTable, example: int, turn: Turn) -> None:
+    def _discover(self, table: ExampleTable, example: int, budget: Budget) -> None:
+        """An example is news: search for modes among its like, unless that is in vain, or one is under way."""
         signature = int(table.signature_ids[self.rows[example]])
         search = self._searches.setdefault(signature, Search())
         search.waiting += 1
         slots = table.signatures[signature]
-        dear, more = bool(slots.features), False
-        patience = self._patience(search, dear, dear or bool(slots.chained))
-        waits = search.waiting <= patience or (dear and not turn.take())
-        if waits or (
-            len(self._pool(table, signature)) >= self._needed and not turn.afford(len(slots.columns))
-        ):
+        patience = self._patience(search, bool(slots.features), bool(slots.features or slots.chained))
+        if search.waiting <= patience or self._hunt is not None or not budget.left:
             self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)  # costs little
             return
-        for _ in range(1 if dear else MOST_DISCOVERIES):
-            pool = self._pool(table, signature)
-            if len(pool) < self._needed:
-                break  # not a failure: nothing was searched
-            if not self._search_once(table, signature, pool, fresh=search.waiting):
+        self._hunt = Hunt(signature, search.waiting)
+        self._pursue(table, budget)
+
+    def _pursue(self, table: ExampleTable, budget: Budget) -> None:
+        """Go on with the search that is under way, as far as the budget goes."""
+        while (hunt := self._hunt) is not None:
+            search = self._searches.setdefault(hunt.signature, Search())
+            if hunt.task is None:
+                pool = self._pool(table, hunt.signature)
+                if not hunt.left or len(pool) < self._needed:  # not a failure: nothing was searched
+                    self._give_up(table, search, pool)
+                    return
+                self._begin(table, hunt, pool, budget)
+            assert hunt.task is not None and hunt.order is not None
+            if not budget.work(hunt.task):
+                hunt.late = True
+                return
+            found, self._rng, hunt.task = hunt.task.result, hunt.task.rng, None
+            hunt.left -= 1
+            if found is None:
                 search.failures += 1
-                break
+                self._give_up(table, search, self._pool(table, hunt.signature))
+                return
             search.failures = 0
-        else:
-            pool = self._pool(table, signature)  # the last search left fewer
-            more = dear  # there may be further modes, but one search is enough for one step
-        self._extend(table, signature, pool, fresh=search.waiting)
-        search.waiting = search.waiting if more else 0
+            fit = reordered(found.fit, hunt.order)
+            if not hunt.late or self._wanted(table, hunt.signature, fit):
+                self._adopt(table, hunt.signature, fit)
+
+    def _give_up(self, table: ExampleTable, search: Search, pool: NDArray[np.intp]) -> None:
+        """End the search that is under way; what has come since it began is news to the next one."""
+        hunt, self._hunt = self._hunt, None
+        assert hunt is not None
+        self._extend(table, hunt.signature, pool, fresh=search.waiting)
+        search.waiting = max(0, search.waiting - hunt.fresh)
+
+    def _begin(self, table: ExampleTable, hunt: Hunt, pool: NDArray[np.intp], budget: Budget) -> None:
+        """Begin to search unexplained examples for one mode, as they now are."""
+        slots = table.signatures[hunt.signature]
+        order, stages = slots.preference(self.target)
+        pool = pool[-max(2 * SEARCH, MOST_CELLS // max(1, len(order))) :]
+        rows = self.rows[pool]
+        part = searched(len(pool), hunt.fresh, self._rng)
+        several = len(np.unique(table.strata[rows[part]])) > 1
+        hunt.order = order
+        hunt.task = Task(
+            find_mode,
+            slots.matrix(table.x[rows], order),
+            self.y[pool],
+            table.strata[rows],
+            stages=stages,
+            fresh=hunt.fresh,
+            scale=self.scale,
+            config=self.config,
+            rng=self._rng,
+            needed=self._needed,
+            counting=counts(self.y, self.scale),
+            rows=part,
+            apart=table.differences(rows[part]) if several else None,
+        )
+        budget.spend(CALL + len(rows) * len(order) + several * len(part) ** 2)
+
+    def _wanted(self, table: ExampleTable, signature: int, fit: LinearFit) -> bool:
+        """Whether a function still explains enough of what none explains."""
+        cluster = self._known(table).cluster(fit, signature)
+        return len(self._explained(table, cluster, self._noise())) >= self._needed
 
     def _extend(
         self,
@@ -126,30 +234,6 @@ class Prospector(Population):
         if len(pool) and self.clusters:
             pool = pool[self._least_errors(table, pool) > self.scale.tail]
         return pool
-
-    def _search_once(
-        self, table: ExampleTable, signature: int, pool: NDArray[np.intp], *, fresh: int
-    ) -> bool:
-        slots = table.signatures[signature]
-        order, stages = slots.preference(self.target)
-        rows = self.rows[pool]
-        found = find_mode(
-            slots.matrix(table.x[rows], order),
-            self.y[pool],
-            table.strata[rows],
-            stages=stages,
-            fresh=fresh,
-            scale=self.scale,
-            config=self.config,
-            rng=self._rng,
-            needed=self._needed,
-            counting=counts(self.y, self.scale),
-            differences=lambda chosen: table.differences(rows[chosen]),
-        )
-        if found is None:
-            return False
-        self._adopt(table, signature, reordered(found.fit, order))
-        return True
 
     def _review(self, table: ExampleTable) -> bool:
         """Where noise is large, look for modes whose examples others explain by chance, and assign all anew."""

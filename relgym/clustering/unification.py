@@ -78,6 +78,8 @@ def unified(
     own = slots.column(0, target.property)
     if own in order and _persist(table.x[:, own], rows, y, everyone, scale, config):
         return signature, LinearFit((own,), (1.0,), 0.0, 0.0)
+    if min((np.abs(y[side]) > scale.tolerance).mean() for side in sides) < 0.5:
+        return None  # on one side whatever is multiplied by nothing would do
     for width in stages[:1] if config.own_only else stages:
         x = slots.matrix(table.x[rows[pooled]], order[:width])
         fit = forward_stepwise(x, y[pooled], sigma=scale.sigma, max_terms=min(config.max_terms, allowed))
@@ -89,8 +91,7 @@ def unified(
         if found is None or found.fit.terms >= allowed:
             continue
         shares = [part.mean() for part in np.split(found.inliers, [len(everyone[0])])]
-        acts = [np.abs(y[side]) > scale.tolerance for side in sides]
-        if min(shares) >= config.unify_ratio and min(a.mean() for a in acts) >= 0.5:
+        if min(shares) >= config.unify_ratio:
             return signature, reordered(found.fit, order)
     return None
 

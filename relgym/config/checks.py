@@ -10,10 +10,13 @@ import numpy as np
 
 from relgym.errors import ConfigError
 
-__all__ = ["at_least", "checked_count", "one_of", "plain", "unit"]
+__all__ = ["GREATEST_NOISE", "LEAST_NOISE", "at_least", "at_most", "checked_count", "one_of", "plain", "unit"]
 
 LARGEST = 2**63 - 1
 """Whole numbers beyond this fit no file, and no seed."""
+
+LEAST_NOISE, GREATEST_NOISE = 1e-100, 1e100
+"""A noise beyond these can't be reckoned with: squares of some deviations would be zero or infinite."""
 
 
 def plain(config: Any) -> None:
@@ -58,6 +61,13 @@ def at_least(config: object, low: float, *names: str) -> None:
     for name in names:
         if not getattr(config, name) >= low:
             raise ConfigError(f"{name} must be at least {low}, got {getattr(config, name)!r}")
+
+
+def at_most(config: object, **most: float) -> None:
+    """Raise `ConfigError` unless each of these fields is no greater than what is given."""
+    for name, limit in most.items():
+        if not getattr(config, name) <= limit:
+            raise ConfigError(f"{name} must be at most {limit:,}, got {getattr(config, name)!r}")
 
 
 def unit(config: object, *names: str) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from relgym.arguments import refusing_fields
-from relgym.config.checks import at_least, one_of, plain, unit
+from relgym.config.checks import at_least, at_most, one_of, plain, unit
 from relgym.errors import ConfigError
 
 __all__ = ["ClassificationConfig"]
@@ -52,15 +52,15 @@ class ClassificationConfig:
         What ChooseLiteral maximises (Algorithm 2): ``"gain"`` (default): FOIL's information gain, as in the
         original system; ``"negatives"``: the negatives filtered out, as printed.
     max_literals
-        Longest clause, in literals. Default 5 (as the original), range >= 1. Raising it admits finer
+        Longest clause, in literals. Default 5 (as the original), range 1 to 64. Raising it admits finer
         distinctions at a cost that grows linearly.
     max_clauses
-        Most clauses of one definition. Default 8, range >= 1.
+        Most clauses of one definition. Default 8, range 1 to 256.
     max_new_variables
-        Most existential variables of one clause. Default 2, range >= 0. Cost grows with objects to this
+        Most existential variables of one clause. Default 2, range 0 to 4. Cost grows with objects to this
         power.
     beam
-        Clauses grown at the same time. Default 4, range >= 1; 1 is the greedy search of Algorithm 2. Raising
+        Clauses grown at the same time. Default 4, range 1 to 256; 1 is the greedy search of Algorithm 2. Raising
         it finds conjunctions whose first literal gains nothing alone, at proportional cost.
     mdl
         Whether a clause must pay for its bits in exceptions explained. Default true.
@@ -79,27 +79,29 @@ class ClassificationConfig:
         the class that suffers, whichever share is larger, so that a rare mode's errors count. ``"stage"``: of the
         examples decided there, as in the original; 99 bounces taken for slides among 5,223 call for no tree then.
     tree_min_leaf
-        Fewest examples on either side of a split. Default 3, range >= 1 (the original: no split of 3 or
-        fewer).
+        Fewest examples on either side of a split. Default 3, range 1 to a million (the original: no split of
+        3 or fewer).
     tree_max_depth
-        Deepest tree, in splits. Default 6, range >= 1.
+        Deepest tree, in splits. Default 6, range 1 to 64.
     class_balance
         Exponent in [0, 1] by which classes are balanced: each is weighted by (its share) ** -class_balance.
         Default 0: description length gives a rare class' examples weight already; 1 gives both classes equal
         say, which makes frequent modes suffer where the data are noisy.
     exemplars_per_state
         Examples kept per mode and relational state, those that contradicted a classifier first. Default 10,
-        range >= 1. Raising it makes early thresholds sharper and costs time and memory in proportion; on the
+        range 1 to 10,000,000. Raising it makes early thresholds sharper and costs time and memory in proportion; on the
         ball data 6, 12 and 30 end equally well, because contradictions stay.
     exemplars_alone
         The same where objects have no bodies, and so there is but one relational state; at most a twentieth of the
-        history (`ModelConfig.history`), which they are part of. Default 3000, range >= 1. Few examples of a mode leave
-        thresholds blunt there, and where rare events can't be predicted they seem to be, in corners of which no other
-        example is left: of 43 touches of a LunarLander's leg that were predicted among 300, 38 were none.
+        history (`ModelConfig.history`), which they are part of. Default 3000, range 1 to 10,000,000. Few examples
+        of a mode leave thresholds blunt there, and where rare events can't be predicted they seem to be, in corners of
+        which no other example is left: of 43 touches of a LunarLander's leg that were predicted among 300, 38 were
+        none.
     noise_per_state
-        The same for noise, whose examples may still become a rare mode. Default 200, range >= 1.
+        The same for noise, whose examples may still become a rare mode. Default 200, range 1 to
+        10,000,000.
     max_exemplars
-        Examples kept in all. Default 6000, range >= 100.
+        Examples kept in all. Default 6000, range 100 to 10,000,000.
     repair
         Whether a contradicted definition is first mended (a threshold moved, a clause dropped or added) and
         only learned anew where that isn't enough (§5.1). Default true.
@@ -145,6 +147,12 @@ class ClassificationConfig:
         at_least(self, 1, "exemplars_per_state", "exemplars_alone", "noise_per_state")
         at_least(self, 0, "max_new_variables")
         at_least(self, 100, "max_exemplars")
+        # Searches may take long, but not for ever.
+        at_most(self, max_literals=64, max_clauses=256, max_new_variables=4, beam=256, tree_max_depth=64)
+        at_most(
+            self, **dict.fromkeys(("exemplars_per_state", "exemplars_alone", "noise_per_state"), 10_000_000)
+        )
+        at_most(self, max_exemplars=10_000_000, tree_min_leaf=1_000_000)
         unit(self, "min_precision", "clause_tree_threshold", "fall_through_tree_threshold", "class_balance")
         at_least(self, 0.5, "min_precision")
         if not self.relearn_growth > 1:

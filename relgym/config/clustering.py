@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from relgym.arguments import refusing_fields
-from relgym.config.checks import at_least, one_of, plain
+from relgym.config.checks import GREATEST_NOISE, LEAST_NOISE, at_least, at_most, one_of, plain
 from relgym.errors import ConfigError
 
 __all__ = ["ClusteringConfig"]
@@ -21,23 +21,25 @@ class ClusteringConfig:
     ----------
     noise_std
         σ of §3.2.2, the standard deviation of the noise on a target, in its units. ``"auto"`` (default)
-        estimates it per target from the data and their precision; a positive number overrides the estimate.
+        estimates it per target from the data and their precision; a number in [1e-100, 1e100] overrides the estimate.
         Too large folds behaviours into one mode, too small learns none (§4.6).
     inlier_stds
-        An example fits a function when its residual is at most this many σ. Default 4 (thesis 2, original 3).
-        Raising it admits more of a noisy mode's tail.
+        An example fits a function when its residual is at most this many σ. Default 4 (thesis 2, original 3), range
+        [1e-6, 1e6]. Raising it admits more of a noisy mode's tail.
     tail_stds
-        Noise within this many σ of a known mode never seeds another. Default 6: an estimated σ may be a third too
-        small. Raising it prevents duplicates of a noisy frequent mode and hides behaviours that differ by less.
+        Noise within this many σ of a known mode never seeds another. Default 6, range [1e-6, 1e6]: an estimated σ may
+        be a third too small. Raising it prevents duplicates of a noisy frequent mode and hides behaviours that differ
+        by less.
     min_examples
         T of §3.2.2, examples needed to found a mode; it is deleted below half of them. ``"auto"`` (default):
         10 where data are exact, because each further example then verifies the function to many digits, up to
-        40 (the thesis' value) the noisier they are. Raising it learns later and fewer modes.
+        40 (the thesis' value) the noisier they are; or a number from 4 to a million. Raising it learns
+        later and fewer modes.
     draws
-        N of §3.2.2, samples drawn per search. Default 1536 (thesis 2000). Raising it finds rarer modes
-        sooner.
+        N of §3.2.2, samples drawn per search. Default 1536 (thesis 2000), range 1 to 100,000. Raising it finds
+        rarer modes sooner.
     max_terms
-        Largest number of weights in a mode. Default 8.
+        Largest number of weights in a mode. Default 8, range 0 to 64.
     own_only
         Whether only the target's own properties (and bodiless objects') may enter. Default false.
     unify_ratio
@@ -45,7 +47,7 @@ class ClusteringConfig:
         in the thesis: a side may owe a few of its examples to coincidence. Raising it leaves more modes apart.
     support
         Number of examples that must back each weight: what fewer than this many leverage points alone
-        determine isn't learned. Default 3.
+        determine isn't learned. Default 3, range 1 to a million.
     refit_growth
         A mode is refitted when its examples have grown by this factor. Default 2.
     approximate
@@ -81,14 +83,20 @@ class ClusteringConfig:
         one_of(self, stickiness=("simple", "nearest"))
         at_least(self, 1, "draws", "support")
         at_least(self, 0, "max_terms")
+        at_most(self, draws=100_000, support=1_000_000, max_terms=64)
         noise: object = self.noise_std
         least: object = self.min_examples
         if noise != "auto" and not (isinstance(noise, int | float) and noise > 0):
             raise ConfigError(f"noise_std must be 'auto' or a positive float, got {self.noise_std!r}")
+        if noise != "auto":
+            at_least(self, LEAST_NOISE, "noise_std")
+            at_most(self, noise_std=GREATEST_NOISE)
         if least != "auto" and not (isinstance(least, int) and least >= 4):
             raise ConfigError(f"min_examples must be 'auto' or an int >= 4, got {self.min_examples!r}")
-        if not 0.0 < self.inlier_stds < float("inf"):
-            raise ConfigError(f"inlier_stds must be a positive number, got {self.inlier_stds}")
+        if least != "auto":
+            at_most(self, min_examples=1_000_000)
+        at_least(self, 1e-6, "inlier_stds", "tail_stds")
+        at_most(self, inlier_stds=1e6, tail_stds=1e6)
         if not 0.5 <= self.unify_ratio <= 1.0:
             raise ConfigError(f"unify_ratio must lie in [0.5, 1], got {self.unify_ratio}")
         if not self.refit_growth > 1.0:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from relgym.arguments import refusing_fields
-from relgym.config.checks import at_least, one_of, plain
+from relgym.config.checks import at_least, at_most, one_of, plain
 from relgym.config.classification import ClassificationConfig
 from relgym.config.clustering import ClusteringConfig
 from relgym.errors import ConfigError
@@ -34,8 +34,20 @@ class ModelConfig:
         Default true; false: the votes decide there as everywhere.
     work_per_step
         Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
-        literals examined). Default 400,000, some 20 ms; a search once begun is finished, whatever it costs.
-        Raising it makes rules fresher and single steps slower.
+        literals examined). Default 400,000, some 20 ms, range 0 to 10**12. Raising it makes rules fresher and single
+        steps slower.
+    cells_per_step
+        What each transition earns for searches (for modes, approximations, causal order, guesses, and what
+        `work_per_step` counts), in cells: numbers looked at, of which a thousand million take some four seconds.
+        Default 750,000, some 3 ms, range 1 to 10**15. A search that takes more than there is goes on after the next
+        transitions. Raising it finds sooner what is hard to find and makes every step of a world that isn't
+        understood slower.
+    most_cells
+        Largest number of cells that one transition spends; the last piece of work may overdraw it. Default 5,000,000,
+        some 20 ms, so that no step takes longer than a frame at 25 Hz.
+    saved_cells
+        Cells that are saved for later where nothing is to be searched, and that there are to begin with. Default
+        500,000,000, some 2 s: worlds that can be understood are, before it is spent.
     frames
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
@@ -48,9 +60,23 @@ class ModelConfig:
         to one type only. Default none; where linear laws don't explain a property, the report says what would.
         A linear law wins where it is enough; every kind offered makes searches slower.
     history
-        Examples kept per object type; memory stays flat beyond. Default 200,000, range >= 100. Of more, a uniform
+        Examples kept per object type; memory stays flat beyond. Default 200,000, range 100 to 10**9. Of more, a uniform
         choice stays, and everything rare: small modes, recent noise, and what classifiers remember. Raising it costs
         memory (some 100 bytes an example and upwards), lowering it makes late discoveries rest on fewer examples.
+    claim_error
+        By how much what is claimed may be off, as a share of the median of what the property changes by where it
+        changes. Default 0.05, range (0, 1]. Raising it claims approximations, too; lowering it claims exact laws alone.
+    claim_probability
+        How probable it must be, after how such predictions came out, that a prediction is no further off than that,
+        for it to be claimed (`Prediction.ok`). Default 0.95, range (0, 1]. Raising it claims less, and more of that
+        is right. It counts only where predictions are looked back at, as wrappers and `WorldModel.fit` do.
+    claim_slips
+        Where more than this share of a property's latest predictions were claimed and off, only what is at least one
+        minus this probable is claimed. Default 0.005, range (0, 1]: of what is claimed, half a per cent is off in the
+        long run, though some kinds of predictions are less sure than that.
+    regression_columns
+        Regressions on all that a target may depend on are made on at most so many columns, squares and products
+        included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.
     """
 
     clustering: ClusteringConfig = field(default_factory=ClusteringConfig)
@@ -59,9 +85,16 @@ class ModelConfig:
     geometry: Literal["arrays", "fcl"] = "arrays"
     abstain: bool = True
     work_per_step: int = 400_000
+    cells_per_step: int = 750_000
+    most_cells: int = 5_000_000
+    saved_cells: int = 500_000_000
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()
     history: int = 200_000
+    claim_error: float = 0.05
+    claim_probability: float = 0.95
+    claim_slips: float = 0.005
+    regression_columns: int = 320
 
     def __post_init__(self) -> None:
         plain(self)
@@ -69,8 +102,15 @@ class ModelConfig:
             if not isinstance(getattr(self, name), kind):
                 raise ConfigError(f"{name} must be a {kind.__name__}, got {getattr(self, name)!r}")
         one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
-        at_least(self, 0, "seed", "work_per_step")
+        at_least(self, 0, "seed", "work_per_step", "saved_cells")
+        at_least(self, 1, "cells_per_step", "most_cells")
         at_least(self, 100, "history")
+        at_most(self, work_per_step=10**12, history=10**9)
+        at_most(self, cells_per_step=10**15, most_cells=10**15, saved_cells=10**15)
+        at_least(self, 0, "regression_columns")
+        for name in ("claim_error", "claim_probability", "claim_slips"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise ConfigError(f"{name} must lie in (0, 1], got {getattr(self, name)}")
         features: object = self.features
         if not isinstance(features, (tuple, list)) or not all(isinstance(entry, str) for entry in features):
             raise ConfigError(f"features must be a tuple of names, such as ('trig',), got {features!r}")

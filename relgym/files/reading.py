@@ -14,7 +14,7 @@ import stat
 import struct
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import IO, Any, Final
 
@@ -27,6 +27,7 @@ __all__ = [
     "ARCHIVE",
     "DEPTH",
     "FileLimits",
+    "StoredArrays",
     "check_depth",
     "parse_json",
     "read_arrays",
@@ -238,27 +239,68 @@ def write_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     return buffer.getvalue()
 
 
-def read_arrays(data: bytes, limits: FileLimits) -> dict[str, NDArray[Any]]:
-    """What `write_arrays` wrote; `ValueError` says what is wrong with it.
+class StoredArrays(Mapping[str, NDArray[Any]]):
+    """What `write_arrays` wrote: arrays by name, each of which is read when it is asked for, and then kept.
 
-    The sizes that all arrays claim are looked at before the first one is made room for, and no more than that is
-    ever decompressed.
+    The sizes that all arrays claim are looked at before the first one is made room for, and no more than that is ever
+    decompressed. Who knows what shapes there should be can look at the claims before any room is made.
+
+    Parameters
+    ----------
+    data
+        The archive.
+    limits
+        How much it may ask for.
+    error
+        What to raise where an array that is asked for can't be read.
+
+    Raises
+    ------
+    ValueError
+        Says what is wrong with the archive, or with what it claims.
     """
-    with _opened(data) as archive:
-        claims = {info.filename: _claim(archive, info) for info in archive.infolist()}
-        total = sum(claim.nbytes for claim in claims.values())
+
+    def __init__(
+        self, data: bytes, limits: FileLimits, *, error: Callable[[str], Exception] = ValueError
+    ) -> None:
+        self._error = error
+        self._archive = _opened(data)
+        self._members = {info.filename.removesuffix(".npy"): info for info in self._archive.infolist()}
+        self._claims = {name: _claim(self._archive, info) for name, info in self._members.items()}
+        self._found: dict[str, NDArray[Any]] = {}
+        total = sum(claim.nbytes for claim in self._claims.values())
         if total > limits.arrays:
             raise ValueError(str(_too_large("bytes of arrays", total, limits.arrays, "arrays")))
-        for info in archive.infolist():
-            claim = claims[info.filename]
-            if info.file_size != claim.start + claim.nbytes:
-                raise ValueError(
-                    f"{info.filename}: expected {claim.start + claim.nbytes:,} bytes, got {info.file_size:,}"
-                )
-        return {
-            info.filename.removesuffix(".npy"): _array(archive, info, claims[info.filename])
-            for info in archive.infolist()
-        }
+        for name, info in self._members.items():
+            size = self._claims[name].start + self._claims[name].nbytes
+            if info.file_size != size:
+                raise ValueError(f"{info.filename}: expected {size:,} bytes, got {info.file_size:,}")
+
+    def claim(self, name: str) -> tuple[np.dtype[Any], tuple[int, ...]]:
+        """Dtype and shape of an array, from its header."""
+        return np.dtype(self._claims[name].dtype), self._claims[name].shape
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self._found:
+            try:
+                self._found[name] = _array(self._archive, self._members[name], self._claims[name])
+            except ValueError as problem:
+                raise self._error(str(problem)) from None
+        return self._found[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._members  # without reading it
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._members)
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+
+def read_arrays(data: bytes, limits: FileLimits) -> dict[str, NDArray[Any]]:
+    """All of `StoredArrays`; `ValueError` says what is wrong with it."""
+    return dict(StoredArrays(data, limits))
 
 
 @dataclass(frozen=True, slots=True)

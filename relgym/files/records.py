@@ -15,11 +15,14 @@ from msgspec import Meta
 from relgym.errors import ModelFileError, RelgymError
 
 __all__ = [
+    "LARGEST",
     "Amount",
     "Count",
     "Finite",
     "Hex",
     "Name",
+    "Noise",
+    "Number",
     "Pair",
     "Random",
     "Record",
@@ -33,6 +36,16 @@ _MOST = sys.float_info.max
 
 Finite: TypeAlias = Annotated[float, Meta(ge=-_MOST, le=_MOST, description="a finite number")]
 Amount: TypeAlias = Annotated[float, Meta(ge=0.0, le=_MOST, description="a finite number, at least 0")]
+LARGEST = 1e120
+"""A number beyond this can't be learned from: its square nears the largest that there is."""
+
+Number: TypeAlias = Annotated[
+    float, Meta(ge=0.0, le=LARGEST, description="a number's size, as far as any can be learned from")
+]
+Noise: TypeAlias = Annotated[
+    float,
+    Meta(ge=1.0 / LARGEST, le=LARGEST, description="a deviation whose square is neither zero nor infinite"),
+]
 Spread: TypeAlias = Annotated[float, Meta(ge=0.0, description="at least 0; Infinity where there is no bound")]
 Share: TypeAlias = Annotated[float, Meta(ge=0.0, le=1.0, description="a share, from 0 to 1")]
 Weight: TypeAlias = Annotated[

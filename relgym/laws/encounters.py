@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from relgym.laws.pair import Encounters
 from relgym.laws.records import Kind, Share
 from relgym.laws.shares import EXTENT, find_share
 from relgym.laws.store import Store
-from relgym.laws.touching import Contacts
+from relgym.laws.touching import Cast, Contacts
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.schema import SceneSchema
@@ -82,15 +82,41 @@ class EncounterStore:
         wrong: bool,
     ) -> None:
         """Keep a contact of a single scene; `after` are all bodies' next velocities (and spins)."""
-        cast = contacts.cast
-        a, b = int(cast.first[pair]), int(cast.second[pair])
-        kind = cast.kinds[pair]
+        kind = contacts.cast.kinds[pair]
         if kind not in self.kinds:
             self.kinds.append(kind)
+        row = self._row(contacts, pair, vector, after)
+        if np.isfinite(row).all():
+            self._store.add(row, cell=self._cell(kind, wrong))
+
+    def confirm(
+        self,
+        contacts: Callable[[], Contacts],
+        cast: Cast,
+        pair: int,
+        vector: NDArray[np.float64],
+        after: NDArray[np.float64],
+    ) -> None:
+        """`add` of a contact of a known kind that came as predicted; looked at only if it is drawn to be kept."""
+        cell = self._cell(cast.kinds[pair], False)
+        if (place := self._store.draw(cell)) is not None:
+            row = self._row(contacts(), pair, vector, after)
+            if np.isfinite(row).all():
+                self._store.put(place, row, cell=cell)
+
+    def _cell(self, kind: Kind, wrong: bool) -> int:
+        return 2 * self.kinds.index(kind) + wrong
+
+    def _row(
+        self, contacts: Contacts, pair: int, vector: NDArray[np.float64], after: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """All that is kept of a contact."""
+        cast = contacts.cast
+        a, b = int(cast.first[pair]), int(cast.second[pair])
         state = cast.padded(vector[None])[:, 0]
         there = contacts.bearings(np.zeros(1, dtype=np.intp), np.array([pair]))
         row = np.zeros(self._store.rows.shape[1])
-        row[self._at["kind"]] = self.kinds.index(kind)
+        row[self._at["kind"]] = self.kinds.index(cast.kinds[pair])
         for side, body in (("a", a), ("b", b)):
             row[self._at[f"now_{side}"]] = state[cast.velocities[:, body]]
             row[self._at[f"after_{side}"]] = after[:, body]
@@ -104,8 +130,7 @@ class EncounterStore:
             row[self._at["after_b"]] = row[self._at["now_b"]]
         row[self._at["normal"]], row[self._at["centres"]] = there.normal[:, 0], there.centres[:, 0]
         row[self._at["angles"]] = there.angles[:, 0]
-        if np.isfinite(row).all():
-            self._store.add(row, cell=2 * self.kinds.index(kind) + wrong)
+        return row
 
     def encounters(self, book: LawBook) -> Encounters | None:
         """The contacts as laws see them, with the present free laws; None where none has one."""

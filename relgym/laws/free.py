@@ -88,6 +88,15 @@ class FreeLearner:
         self._news = 0
         return self.fit(tolerance)
 
+    def confirms(self, more: int) -> bool:
+        """Whether so many more examples that the law explains change nothing but the choice of those kept."""
+        return not any(_power_of_two(self.seen + k + 1) for k in range(more))
+
+    def confirm(self, x: NDArray[np.float64], after: NDArray[np.float64]) -> None:
+        """`learn_one` of an example that the law explains, where `confirms` says that this is all."""
+        if np.isfinite(x).all() and (place := self.store.draw(0)) is not None:
+            self.store.put(place, np.concatenate([x, after]), cell=0)
+
     def _patience(self) -> int:
         """How much news doesn't call for another search: ever more while there is no law, or one that fails."""
         return self.seen // 4 if self.law is None else self.law.unexplained // 4

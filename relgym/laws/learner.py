@@ -8,7 +8,8 @@ was derived from it is derived again from the raw contacts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from relgym.laws.free import FreeLearner
 from relgym.laws.inertia import Inertia
 from relgym.laws.ledger import Ledger
 from relgym.laws.pair import PairFit, fit_pair
+from relgym.laws.points import Points
 from relgym.laws.records import FreeLaw, PairLaw, Share
 from relgym.laws.touching import Cast, Contacts
 from relgym.laws.turning import PushStore
@@ -171,12 +173,71 @@ class LawLearner:
                     changed |= self._learn_free(cast, body, motion, after[:, body], right[body])
         if changed:
             self._restate()
-        single = self._single(contacts, touching, degree, stays)
+        single = self._single(cast, touching.tolist(), degree, stays, contacts.points)
         self._count(cast, right, degree, single)
         news = [self._meet(contacts, pair, vector, after, right) for pair in single]
         if any(news) or (news and _doubled(self._store.seen, len(news))):
             changed |= self._hear(sum(news))
         return changed
+
+    def confirm(
+        self,
+        cast: Cast,
+        vector: NDArray[np.float64],
+        following: NDArray[np.float64],
+        touched: Mapping[int, Sequence[int]],
+        off: Mapping[int, float],
+        contacts: Callable[[], Contacts],
+    ) -> bool:
+        """`learn_one` of a transition that came as the laws said, if that is all it teaches: else nothing is done.
+
+        It is counted, and offered to the examples kept. Parameters that are others than there:
+
+        Parameters
+        ----------
+        touched
+            Bodies that each mover touches.
+        off
+            What the prediction of each mover was off by at most.
+        contacts
+            Gives who touches whom, with all that is to be known of it; asked only where a contact is kept.
+        """
+        self._rescale(cast, vector)
+        if set(off) != set(cast.movers) or any(not error <= self.book.tolerance for error in off.values()):
+            return False
+        degree = np.zeros(len(cast.layout.bodies), dtype=np.int64)
+        touching = [k for k, (a, b) in enumerate(cast.pairs) if b in touched[a]]
+        if touching and self.book.turning:
+            return False  # whether they touch in one point is to be looked at
+        for pair in touching:
+            degree[list(cast.pairs[pair])] += 1
+        free = [body for body in cast.movers if not degree[body]]
+        names = Counter(cast.sources[body][0].type.name for body in free)
+        if any(
+            not self._free[name].confirms(more)
+            or any(self._free[name].seen + k + 1 in ESTIMATE_AT for k in range(more))
+            for name, more in names.items()
+        ):
+            return False
+        single = self._single(cast, touching, degree)
+        if single and (
+            _doubled(self._store.seen + len(single), len(single))
+            or any(cast.kinds[pair] not in self._store.kinds for pair in single)
+        ):
+            return False
+        after = cast.padded(following[None])[cast.velocities][..., 0]
+        state = cast.padded(vector[None])[:, 0]
+        for body in free:
+            sources, places = cast.sources[body]
+            d = len(sources.velocity)
+            name = cast.layout.names[cast.layout.bodies[body]]
+            self._drift[sources.type.name].add(name, state[places[:d]], after[:d, body])
+            self._free[sources.type.name].confirm(state[places], after[: len(sources.moving), body])
+        self._count(cast, dict.fromkeys(cast.movers, True), degree, single)
+        for pair in single:
+            assert isinstance(self._store, EncounterStore), "of bodies that turn none is single here"
+            self._store.confirm(contacts, cast, pair, vector, after)
+        return True
 
     def _assess(self, cast: Cast, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
         count = len(self.book.components(cast.sources[body][0].type.name))
@@ -210,21 +271,22 @@ class LawLearner:
 
     def _single(
         self,
-        contacts: Contacts,
-        touching: NDArray[np.intp],
+        cast: Cast,
+        touching: Sequence[int],
         degree: NDArray[np.int64],
-        stays: Mapping[int, bool],
+        stays: Mapping[int, bool] | None = None,
+        points: Points | None = None,
     ) -> list[int]:
         """Pairs whose bodies touch nothing else; what a body that never moves touches is all the same.
 
         Of bodies that turn those that touch in a single point.
         """
-        cast, points, found = contacts.cast, contacts.points, []
-        for pair in touching.tolist():
+        found = []
+        for pair in touching:
             a, b = int(cast.first[pair]), int(cast.second[pair])
             alone = degree[a] == 1 and (degree[b] == 1 or not cast.both[pair])
             alone = alone and (points is None or int((points.pair == pair).sum()) == 1)
-            if alone and stays[cast.layout.bodies[a]] and stays[cast.layout.bodies[b]]:
+            if alone and (stays is None or (stays[cast.layout.bodies[a]] and stays[cast.layout.bodies[b]])):
                 found.append(pair)
         return found
 

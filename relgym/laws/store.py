@@ -32,6 +32,7 @@ class Store:
         self._rows = np.zeros((64, width))
         self._cells = np.zeros(64, dtype=np.int64)
         self._size = 0
+        self._counts: dict[int, int] | None = None  # worked out when it is needed
         self._rng = np.random.default_rng([seed, 2])
 
     @property
@@ -46,29 +47,44 @@ class Store:
 
     def add(self, row: NDArray[np.float64], *, cell: int) -> None:
         """Keep a row in a cell."""
+        if (place := self.draw(cell)) is not None:
+            self.put(place, row, cell=cell)
+
+    def draw(self, cell: int) -> int | None:
+        """Count one more row of a cell, and draw whether it is kept: where `put` is to put it, or None."""
         self.seen += 1
-        if self._size < self.limit:
-            if self._size == len(self._rows):
-                room = min(self.limit, 2 * self._size) - self._size
-                self._rows = np.pad(self._rows, ((0, room), (0, 0)))
-                self._cells = np.pad(self._cells, (0, room))
-            place, self._size = self._size, self._size + 1
+        if self._size == self.limit:
+            return self._make_room(cell)
+        if self._size == len(self._rows):
+            room = min(self.limit, 2 * self._size) - self._size
+            self._rows = np.pad(self._rows, ((0, room), (0, 0)))
+            self._cells = np.pad(self._cells, (0, room))
+        return self._size
+
+    def put(self, place: int, row: NDArray[np.float64], *, cell: int) -> None:
+        """Keep a row that was drawn, in the place of another one or behind all."""
+        counts = self._cell_counts()
+        if place == self._size:
+            self._size += 1
         else:
-            found = self._make_room(cell)
-            if found is None:
-                return
-            place = found
+            counts[int(self._cells[place])] -= 1
+        counts[cell] = counts.get(cell, 0) + 1
         self._rows[place], self._cells[place] = row, cell
+
+    def _cell_counts(self) -> dict[int, int]:
+        """Number of rows kept in each cell."""
+        if self._counts is None:
+            numbers, counts = np.unique(self._cells[: self._size], return_counts=True)
+            self._counts = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
+        return self._counts
 
     def _make_room(self, cell: int) -> int | None:
         """Place of a row to replace; None where the new row's own cell is crowded and it isn't drawn."""
-        numbers, counts = np.unique(self._cells[: self._size], return_counts=True)
-        crowded = int(numbers[counts.argmax()])
-        members = np.flatnonzero(self._cells[: self._size] == crowded)
+        most, crowded = max((count, -number) for number, count in self._cell_counts().items())
         # A reservoir within the crowded cell: later rows come in ever more rarely.
-        if cell == crowded and self._rng.random() > len(members) / self.seen:
+        if cell == -crowded and self._rng.random() > most / self.seen:
             return None
-        return int(self._rng.choice(members))
+        return int(self._rng.choice(np.flatnonzero(self._cells[: self._size] == -crowded)))
 
     def to_json(self) -> dict[str, Any]:
         """Everything but the rows."""
@@ -84,6 +100,6 @@ class Store:
         self._rng.bit_generator.state = data["random"]
         self._rows = np.array(arrays["rows"], dtype=np.float64)
         self._cells = np.array(arrays["cells"], dtype=np.int64)
-        self._size = len(self._rows)
+        self._size, self._counts = len(self._rows), None
         if not self._size:
             self._rows, self._cells = np.zeros((64, self._rows.shape[1])), np.zeros(64, dtype=np.int64)

@@ -49,6 +49,8 @@ class Cast:
         ``(d, K)`` or ``(d + 1, K)``; of a 0 where there is none.
     spins
         Whether a body's spin is learned, shape ``(K,)``.
+    pairs
+        `first` and `second` of each pair.
     manifolds
         Finds the points of contacts, where bodies turn that aren't round; else None.
     squares
@@ -65,6 +67,7 @@ class Cast:
     both: NDArray[np.bool_]
     velocities: NDArray[np.intp]
     spins: NDArray[np.bool_]
+    pairs: tuple[tuple[int, int], ...]
     manifolds: Manifolds | None
     squares: FloatArray
 
@@ -99,6 +102,7 @@ class Cast:
             np.isin(second, np.array(movers, dtype=np.intp)),
             np.where(columns < 0, layout.width + 1, columns),
             spin >= 0,
+            tuple(pairs),
             *_geometry(axes, types, sources),
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -14,9 +14,10 @@ from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
 from relgym.logic.growing import EPS, Growing, Score, Weights
 from relgym.logic.pruning import Problem, center_thresholds, prune
-from relgym.logic.search import Harvest, grow
+from relgym.logic.search import BLOCK, Harvest, grow
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
+from relgym.scheduling.work import Steps
 
 __all__ = ["Cover"]
 
@@ -60,47 +61,49 @@ class Cover:
         """Return the same problem with the classes exchanged (§3.4.5)."""
         return Cover(self._tables, self._problem.weights, self._config, not self._swapped)
 
-    def solve(self, limit: float = math.inf) -> Definition:
+    def solve(self, limit: float = math.inf) -> Steps[Definition]:
         """Learn the definition, see `foil.learn`; its clauses take no more bits than `limit`."""
         everything = self._problem.count(np.ones(self._tables.size, dtype=np.bool_))
         if everything.positives <= 0 or everything.negatives <= 0:
             # a single class: the clause without literals covers it
             return self._definition([Clause((), self._tables.arity)] if everything.positives > 0 else [])
         if not self._config.mdl:
-            return self._definition(self._clauses(True, math.inf))
-        best = self._definition(self._clauses(False, limit))
+            return self._definition((yield from self._clauses(True, math.inf)))
+        best = self._definition((yield from self._clauses(False, limit)))
         if best.errors > EPS or sum(map(len, best.clauses)) > _SHORT:
-            other = self._definition(self._clauses(True, min(limit, best.bits)))
+            other = self._definition((yield from self._clauses(True, min(limit, best.bits))))
             best = other if other.bits < best.bits - EPS else best
         return replace(best, work=self._work)
 
-    def _clauses(self, pure: bool, limit: float) -> list[Clause]:
+    def _clauses(self, pure: bool, limit: float) -> Steps[list[Clause]]:
         """Add clauses, `pure` ones if any, until all is covered or they cost more bits than `limit`."""
         alive = np.ones(self._tables.size, dtype=np.bool_)
         clauses: list[Clause] = []
         while len(clauses) < self._config.max_clauses and self._problem.count(alive).positives > EPS:
-            clause = next(self._acceptable(alive, pure), None)
+            clause = yield from self._acceptable(alive, pure)
             if clause is None or self._length.clauses([*clauses, clause]) > limit:
                 break
             clauses.append(clause)
             alive &= ~self._problem.matches(clause)
         return self._without_redundant(clauses)
 
-    def _acceptable(self, alive: Bool, pure: bool) -> Iterator[Clause]:
-        """Yield, best first, the clauses that tell enough about the tuples left."""
+    def _acceptable(self, alive: Bool, pure: bool) -> Steps[Clause | None]:
+        """The best clause that tells enough about the tuples left."""
         problem = self._problem
         rest = replace(problem, weights=np.where(alive | ~problem.positive, problem.weights, 0.0))
-        for growing in self._ranked(alive, pure)[:_ATTEMPTS]:
+        for growing in (yield from self._ranked(alive, pure))[:_ATTEMPTS]:
             clause = prune(Clause.of(growing.literals, self._tables.arity), rest)
             clause = center_thresholds(clause.connected(), rest)
             covered = problem.count(alive & problem.matches(clause))
+            yield BLOCK
             if self._accepts(clause, covered, problem.count(alive)):
-                yield clause
+                return clause
+        return None
 
-    def _ranked(self, alive: Bool, pure: bool) -> list[Growing]:
+    def _ranked(self, alive: Bool, pure: bool) -> Steps[list[Growing]]:
         key = alive.tobytes()
         if key not in self._harvests:
-            harvest = self._harvests[key] = self._harvest(alive)
+            harvest = self._harvests[key] = yield from self._harvest(alive)
             self._work += harvest.work
         whole = self._problem.count(alive)
         information = Score(whole.positives, whole.negatives).information
@@ -113,7 +116,7 @@ class Cover:
             keys[place] = (not clean, -round(value, 7), round(bits, 7), place)
         return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
 
-    def _harvest(self, alive: Bool) -> Harvest:
+    def _harvest(self, alive: Bool) -> Steps[Harvest]:
         """Search among the tuples left. Where many are gone it is cheaper to lay out the others anew."""
         tables, weights = self._tables, self._problem.weights
         if alive.mean() < _RELAID:
@@ -121,7 +124,7 @@ class Cover:
         else:
             weights = np.where(alive, weights, 0.0)
         classes = Weights(weights[: tables.split], weights[tables.split :], self._swapped)
-        return grow(tables, classes, self._config, self._length)
+        return grow.steps(tables, classes, self._config, self._length)
 
     def _accepts(self, clause: Clause, covered: Coverage, whole: Coverage) -> bool:
         if covered.positives <= covered.negatives + EPS or covered.precision < self._config.min_precision:

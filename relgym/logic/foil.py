@@ -20,10 +20,12 @@ from relgym.logic.facts import Facts, Float, Int
 from relgym.logic.growing import EPS
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
+from relgym.scheduling.work import Steps, resumable
 
 __all__ = ["FoilConfig", "learn", "learn_both"]
 
 
+@resumable
 def learn(
     facts: Facts,
     positives: Int,
@@ -32,7 +34,7 @@ def learn(
     pos_weights: ArrayLike | None = None,
     neg_weights: ArrayLike | None = None,
     config: FoilConfig | None = None,
-) -> Definition:
+) -> Steps[Definition]:
     """Learn a definition of the positive tuples (Algorithm 2).
 
     Parameters
@@ -66,9 +68,10 @@ def learn(
     compress best; the definition that takes fewer bits is kept.
     Deterministic. Cost: see `search.grow`, per clause.
     """
-    return _cover(facts, positives, negatives, pos_weights, neg_weights, config).solve()
+    return (yield from _cover(facts, positives, negatives, pos_weights, neg_weights, config).solve())
 
 
+@resumable
 def learn_both(
     facts: Facts,
     positives: Int,
@@ -77,7 +80,7 @@ def learn_both(
     pos_weights: ArrayLike | None = None,
     neg_weights: ArrayLike | None = None,
     config: FoilConfig | None = None,
-) -> Definition:
+) -> Steps[Definition]:
     """Learn both polarities and keep the better one (§3.4.5).
 
     Parameters, errors and cost are those of `learn`, the latter twice.
@@ -88,11 +91,11 @@ def learn_both(
     fewer errors; on ties the one with fewer bits, then the former. `Definition.work` is that of both.
     """
     task = _cover(facts, positives, negatives, pos_weights, neg_weights, config)
-    given = task.solve()
+    given = yield from task.solve()
     if given.errors <= EPS and sum(map(len, given.clauses)) <= 1:
         return given  # one literal without errors: the other side can't be told more simply
     # nothing beats a definition without errors but one of fewer bits
-    other = task.swapped().solve(given.bits if given.errors <= EPS else math.inf)
+    other = yield from task.swapped().solve(given.bits if given.errors <= EPS else math.inf)
     work = given.work + other.work
     if (round(other.errors, 7), round(other.bits, 7)) < (round(given.errors, 7), round(given.bits, 7)):
         return replace(other, negated=True, work=work)

@@ -17,12 +17,17 @@ from relgym.logic.growing import EPS, Counts, Growing, Score, Weights, extend
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 from relgym.logic.thresholds import signs_differ
+from relgym.scheduling.work import Steps, resumable
 
-__all__ = ["Harvest", "grow"]
+__all__ = ["BLOCK", "LITERAL", "Harvest", "grow"]
 
 
 _PATIENCE: Final = 2
 """A search ends after so many literals that saved no bits; one that connects pays only with the next."""
+
+
+LITERAL, BLOCK = 12, 150_000
+"""What a literal tried on a tuple costs, and a group of literals tried on a clause however few its tuples, in cells."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +38,8 @@ class Harvest:
     work: int
 
 
-def grow(tables: Tables, weights: Weights, config: FoilConfig, length: DescriptionLength) -> Harvest:
+@resumable
+def grow(tables: Tables, weights: Weights, config: FoilConfig, length: DescriptionLength) -> Steps[Harvest]:
     """Search for clauses that cover positives and few negatives.
 
     Parameters
@@ -70,6 +76,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
     for depth in range(1, config.max_literals + 1):
         found = _Candidates(tables, beam, weights, score, config, length)
         work += tables.size * found.size
+        yield BLOCK * found.blocks + LITERAL * tables.size * found.size
         lookahead = config.lookahead if depth < config.max_literals else 0
         beam = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
         beam = _promising(beam, pool.values())
@@ -134,6 +141,7 @@ class _Candidates:
             for block in blocks(tables, growing, weights, score, config.max_new_variables)
             if block.templates
         ]
+        self.blocks = len(self._blocks)
         self._ends = np.cumsum([len(block.templates) for _, block in self._blocks], dtype=np.int64)
         self.size = int(self._ends[-1]) if self._blocks else 0
         if self.size:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +13,10 @@ from relgym.classification.mode_classifier import ModeClassifier
 from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
+from relgym.clustering.mode import NOISE
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
+from relgym.model.calibration import LATEST, OWN, Calibration, Judgement, Key
 from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions
 from relgym.model.functions import Verdict
@@ -32,6 +35,12 @@ _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
     OUTCOMES.index(o)
     for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
 )
+
+
+FEW_LEFT = 20
+"""A target is explained if less than one example in so many isn't."""
+
+_NOTHING = Calibration()
 
 
 class Answers(StandIns):
@@ -56,6 +65,10 @@ class Answers(StandIns):
         Which modes are walls at work: they take no part in the vote either.
     hindsight
         How the latest predictions came out, if somebody looked back at them.
+    calibration
+        How right predictions of every kind were, if somebody looked back at them, and who gives their values.
+    latest
+        Id of the mode that explained the latest example that any mode did.
     leaned_on
         Whether laws of other properties read this one's next value. Then its modes answer as long as it has any: what a
         guess leaves would be magnified in those laws.
@@ -76,6 +89,8 @@ class Answers(StandIns):
         self.limits = Limits()
         self.stops = Stops()
         self.hindsight = Hindsight()
+        self.calibration = Calibration(config.claim_probability)
+        self.latest = NOISE
         self.leaned_on = False
 
     def bounds(self, mode: int) -> bool:
@@ -94,6 +109,55 @@ class Answers(StandIns):
         With a single mode there is no choice; whether it holds is told by the examples that it leaves over.
         """
         return len(self.classifier.modes) > 1 and self.hindsight.undecided
+
+    def judge(self, key: Key, values: Sequence[float]) -> Judgement:
+        """Who gives the value of a prediction, and how right it will be."""
+        return self._record.judge(key, values)
+
+    def judge_many(
+        self, key: Key, values: NDArray[np.float64]
+    ) -> Iterator[tuple[NDArray[np.intp], Judgement]]:
+        """`judge` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
+        return self._record.judge_many(key, values)
+
+    def claims(self, told: Judgement) -> bool:
+        """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
+        if told.speaker not in (OWN, LATEST):
+            return False
+        least, slips = self.config.claim_probability, self.config.claim_slips
+        if self._record.slips > slips:
+            least = max(least, 1.0 - slips)
+        return told.probability >= least or not self._record.trials
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether no kind of its modes' predictions came true often enough to be claimed."""
+        kinds = [told for _, told in self._record.kinds(_PREDICTED)]
+        return bool(kinds) and not any(map(self.claims, kinds))
+
+    def latest_values(
+        self, percept: Percept, index: int, following: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """What the mode that held last says of one object of n scenes, shape ``(n,)``; None where nobody asks it.
+
+        Nobody does where the vote's winners are mostly right. NaN where its roles are open.
+        """
+        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
+        asked = self.rough or self._record.doubts(_PREDICTED, self.config.claim_probability)
+        if not known or not asked or len(self.classifier.modes) < 2:
+            return None
+        x = percept.rows(index, following, ordered=False)
+        return self._values(percept.situation(index).signature, x, (self.latest,))[:, 0]
+
+    @property
+    def _record(self) -> Calibration:
+        """What is known of earlier predictions; of a model that always answers nothing."""
+        return self.calibration if self.config.abstain else _NOTHING
+
+    @property
+    def rough(self) -> bool:
+        """Whether so much is unexplained, or explained only roughly, that regressions may know better."""
+        return self._guessable or FEW_LEFT * self.clusterer.noise_examples > self.clusterer.seen
 
     @property
     def _lost(self) -> bool:

@@ -20,6 +20,8 @@ _Arrays = dict[str, NDArray[Any]]
 
 def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
     """Schema, config and everything learned; with history also what further learning needs."""
+    # What is under way isn't kept: whoever reads the file begins it again.
+    looks = [*([] if parts.inquiry is None else [parts.inquiry.look]), *parts.looks]
     return {
         "schema": schema_to_json(parts.schema),
         "config": parts.config.to_json(),
@@ -29,10 +31,16 @@ def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
             {"target": target_to_json(t), "model": parts.models[t].to_json(history=history)}
             for t in parts.targets
         ],
-        **({"looks": [list(look) for look in parts.looks]} if history and parts.looks else {}),
+        **({"looks": [list(look) for look in looks]} if history and looks else {}),
+        **({"saved_cells": parts.agenda.saved} if history else {}),
         "tables": [parts.tables[name].to_json() for name in sorted(parts.tables)] if history else [],
         "laws": None if parts.laws is None else parts.laws.to_json(history=history),
         **({"screen": parts.screen.to_json()} if history else {}),
+        "regressions": {
+            name: regression.to_json(history=history)
+            for name, regression in sorted(parts.regressions.items())
+            if regression.seen
+        },
     }
 
 
@@ -43,6 +51,8 @@ def parts_to_arrays(parts: Parts) -> _Arrays:
         arrays |= {f"table{k}.{name}": a for name, a in parts.tables[type_name].to_arrays().items()}
     for k, target in enumerate(parts.targets):
         arrays |= {f"target{k}.{name}": a for name, a in parts.models[target].to_arrays().items()}
+    for k, name in enumerate(_regressed(parts)):
+        arrays |= {f"regression{k}.{part}": a for part, a in parts.regressions[name].to_arrays().items()}
     if parts.laws is not None:
         arrays |= {f"laws.{name}": a for name, a in parts.laws.learner.to_arrays().items()}
     return arrays
@@ -78,12 +88,21 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
         parts.tables[type_name].restore(data["tables"][k], _of(arrays, f"table{k}."), parts.signature_of)
     for k, target in enumerate(targets):
         parts.models[target].restore(data["targets"][k]["model"], _of(arrays, f"target{k}."))
+    for k, name in enumerate(sorted(body.regressions)):
+        parts.regressions[name].restore(data["regressions"][name], _of(arrays, f"regression{k}."))
     parts.looks = [(name, prop, inert) for name, prop, inert in body.looks]
+    if body.saved_cells is not None:
+        parts.agenda.saved = body.saved_cells
     if "screen" in data:
         parts.screen.restore(data["screen"])
     if parts.laws is not None:
         parts.laws.restore(data["laws"], _of(arrays, "laws."))
     return parts
+
+
+def _regressed(parts: Parts) -> list[str]:
+    """Types whose targets regressions predict."""
+    return [name for name, regression in sorted(parts.regressions.items()) if regression.seen]
 
 
 def _of(arrays: Mapping[str, NDArray[np.generic]] | None, prefix: str) -> _Arrays:

@@ -19,15 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
-from relgym.clustering.discovery import identified, is_law
+from relgym.clustering.discovery import Scale, identified, is_law, law_cells
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import TASK, Target
+from relgym.scheduling.work import Steps, Task, resumable
 
 if TYPE_CHECKING:
     from relgym.model.parts import Parts
 
-__all__ = ["CHECK_AT", "Look", "due", "in_order", "revise"]
+__all__ = ["CHECK_AT", "Inquiry", "Look", "due", "in_order", "inquire", "revise"]
 
 CHECK_AT = (48, 192, 768, 3072)
 """Numbers of examples of a type after which the order of its targets is looked at again."""
@@ -81,15 +82,42 @@ def due(parts: Parts, type_name: str) -> list[Look]:
     return [(type_name, target.property, inert) for inert in (True, False) for target in targets]
 
 
-def revise(parts: Parts, look: Look) -> None:
-    """Look for a law with next values of one target; give it what it needs.
+@dataclass(frozen=True, slots=True)
+class Inquiry:
+    """A look that is being taken: a search under way.
 
-    Cost: a search of at most `ROWS` rows, unless the target is explained by a law of two terms already.
+    Attributes
+    ----------
+    look
+        What is looked at, and how.
+    target
+        The target as it was when it began.
+    task
+        The search.
     """
-    type_name, prop, inert = look
+
+    look: Look
+    target: Target
+    task: Task[_Found | None]
+
+
+def inquire(parts: Parts, look: Look) -> Inquiry | None:
+    """Begin to look for a law with next values of one target.
+
+    Cost of the search: at most `ROWS` rows; none where the target is explained by a law of two terms already.
+    """
+    type_name, prop, _ = look
+    return _search(parts, parts.property_model(type_name, prop).target, look)
+
+
+def revise(parts: Parts, inquiry: Inquiry) -> None:
+    """A search for a law with next values is done: give the target what it needs."""
+    type_name, prop, inert = inquiry.look
     target = parts.property_model(type_name, prop).target
-    found = _search(parts, target)
-    if found is not None and found.inert >= inert:
+    found = inquiry.task.result
+    if found is None or target != inquiry.target or not set(found.given) <= set(_free(parts, target)):
+        return  # what was true of the order then needn't be now
+    if found.inert >= inert:
         parts.retarget(target, replace(target, given=found.given))
         if found.lead is not None:
             rate, step = found.lead
@@ -109,8 +137,8 @@ def in_order(targets: Iterable[Target]) -> tuple[Target, ...]:
     return tuple(done)
 
 
-def _search(parts: Parts, target: Target) -> _Found | None:
-    """The law with next values that describes a target better than its modes do, if there is one."""
+def _search(parts: Parts, target: Target, look: Look) -> Inquiry | None:
+    """The search for a law with next values that describes a target better than its modes do, if it is worth while."""
     model, table = parts.models[target], parts.tables[target.type]
     clusterer = model.clusterer
     if len(clusterer.y) < LEAST:
@@ -126,10 +154,43 @@ def _search(parts: Parts, target: Target) -> _Found | None:
     free = _free(parts, target)
     order = _columns(slots, replace(target, given=free))
     x, y = slots.matrix(table.x[clusterer.rows[recent]], order), clusterer.y[recent]
-    scales = dict.fromkeys((replace(clusterer.scale, sigma=clusterer.floor), clusterer.scale))
+    scales = tuple(dict.fromkeys((replace(clusterer.scale, sigma=clusterer.floor), clusterer.scale)))
+    seed, support = parts.config.seed, parts.config.clustering.support
+    task = Task(_better, x, y, slots, order, scales, share=share, size=size, seed=seed, support=support)
+    return Inquiry(look, target, task)
+
+
+@resumable
+def _better(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    slots: SlotSignature,
+    order: NDArray[np.intp],
+    scales: tuple[Scale, ...],
+    *,
+    share: float,
+    size: int,
+    seed: int,
+    support: int,
+) -> Steps[_Found | None]:
+    """The law with next values that explains more of some rows than modes do, or as many more briefly.
+
+    Parameters
+    ----------
+    x, y
+        Rows and responses.
+    slots, order
+        Signature of the rows, and what columns they have of it.
+    scales
+        That of rounding alone, and that which is assumed, if it is another one.
+    share, size
+        Share of the rows that modes explain, and parameters of the largest one.
+    seed, support
+        As in the configuration.
+    """
     for scale, (terms, sample, draws) in itertools.product(scales, PLANS):
-        rng = np.random.default_rng([parts.config.seed, len(y)])
-        found = consensus(
+        rng = np.random.default_rng([seed, len(y)])
+        found = yield from consensus.steps(
             x,
             y,
             sigma=scale.sigma,
@@ -141,14 +202,15 @@ def _search(parts: Parts, target: Target) -> _Found | None:
             misfit=scale.misfit,
         )
         if found is not None:
-            found = identified(x, y, found.fit, scale=scale, support=parts.config.clustering.support)
+            found = yield from identified.steps(x, y, found.fit, scale=scale, support=support)
         if found is None or found.size < SHARE * len(y) or not is_law(x, y, found, x.shape[1], scale):
             continue
         gain = found.size / len(y) - share
         if gain <= GAIN and (gain <= -GAIN or found.fit.terms >= size):
             continue
+        yield law_cells(found, x.shape[1])
         law = _read(slots, order, found.fit)
-        if law is None or not law.difference or scale.sigma <= clusterer.floor:
+        if law is None or not law.difference or scale == scales[0]:
             return law
     return None
 

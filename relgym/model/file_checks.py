@@ -25,6 +25,8 @@ from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.mode import Mode
 from relgym.clustering.roles import bind
 from relgym.errors import ModelFileError
+from relgym.files.reading import StoredArrays
+from relgym.files.records import LARGEST
 from relgym.laws.frames import axis_names
 from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE
@@ -60,27 +62,6 @@ __all__ = ["check_body"]
 
 _Arrays = Mapping[str, NDArray[Any]]
 
-_CEILINGS: Final = {
-    "work_per_step": 10**12,
-    "history": 10**9,
-    "draws": 100_000,
-    "max_terms": 64,
-    "max_literals": 64,
-    "max_clauses": 256,
-    "max_new_variables": 4,
-    "beam": 256,
-    "tree_max_depth": 64,
-    "max_exemplars": 10**7,
-    "exemplars_per_state": 10**7,
-    "exemplars_alone": 10**7,
-    "noise_per_state": 10**7,
-    "seed": 2**63 - 1,
-    "support": 10**6,
-    "tree_min_leaf": 10**6,
-    "min_examples": 10**6,
-}
-"""Greatest parameters that a file may ask for: a search may take long, but not for ever."""
-
 _CHOICES: Final = 4
 """More roles of one kind aren't filled at once: all ways to do so are gone through."""
 
@@ -113,7 +94,6 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
     ModelFileError
         Something names what isn't there, or doesn't fit.
     """
-    _check_config(body)
     targets = [_target(part.target) for part in body.targets]
     _require(
         list(parts.targets) == targets and set(parts.models) == set(targets),
@@ -126,30 +106,64 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
     for name, hindsight in body.hindsight.items():
         _require(name in known, "hindsight", f"{name!r} is no target")
         _require(all(wrong <= said for said, wrong in hindsight.steps), "hindsight", "more wrong than said")
+    _check_calibration(body, known)
     pairs = {(t.type, t.property) for t in targets}
+    _check_regressions(body, parts, pairs)
     _require(all((name, prop) in pairs for name, prop, _ in body.looks), "looks", "expected targets")
     if body.screen is not None:
         _check_screen(body.screen, parts)
     _require((parts.laws is None) == (body.laws is None), "laws", "they don't go with config.frames")
-    if parts.laws is not None and body.laws is not None:
-        _check_laws(body.laws, parts.laws.learner, arrays)
     if arrays is None:
         _require(not body.tables, "tables", "expected none without history")
-        return
-    _check_history(body, parts, targets, arrays)
+    else:
+        _check_history(body, parts, targets, arrays)
+    if parts.laws is not None and body.laws is not None:
+        _check_laws(body.laws, parts.laws.learner, arrays)
+
+
+def _check_calibration(body: Body, known: set[str]) -> None:
+    for name, calibration in body.calibration.items():
+        _require(name in known, "calibration", f"{name!r} is no target")
+        _distinct([cell.key for cell in calibration.cells], "calibration")
+        _require(calibration.slips[1] <= calibration.slips[0], "calibration", "more slips than predictions")
+        records = [record for cell in calibration.cells for record in cell.records]
+        for cell in calibration.cells:
+            _distinct([who for who, *_ in cell.records], "calibration")
+        _require(
+            all(hits <= trials for _, trials, hits, _, _ in records), "calibration", "more hits than trials"
+        )
+        for bins in (calibration.changes, *(record[-1] for record in records)):
+            _distinct([place for place, _ in bins], "calibration")
+            _require(all(-(1 << 14) <= place < 1 << 12 for place, _ in bins), "calibration", "no such size")
+
+
+def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) -> None:
+    for name, regression in body.regressions.items():
+        where = f"regressions[{name!r}]"
+        _require(name in parts.regressions, where, "nothing of this type is predicted")
+        _require(all((name, prop) in pairs for prop in regression.targets), where, "expected targets")
+        _distinct(regression.targets, where)
+        _require(regression.seen > 0, where, "nothing was seen")
+        d, count = len(regression.names), len(regression.targets)
+        _require(d <= parts.config.regression_columns, where, "more columns than are regressed on")
+        widths = {len(regression.centre), len(regression.scale)}
+        _require(widths == {d} or (widths == {0} and not regression.ridges), where, "expected one a column")
+        _require(all(each > 0.0 for each in regression.scale), where, "expected scales above 0")
+        least, most = regression.range
+        _require(len(least) == len(most) == count, where, "expected a range for each target")
+        _require(
+            all(a <= b for a, b in zip(least, most, strict=True)), where, "the smaller change comes first"
+        )
+        _require(all(len(x) == d and len(y) <= count for x, y in regression.waiting), where, "another width")
+        for (_, _, weights), width in zip(regression.ridges, (d, d + d * (d + 1) // 2), strict=False):
+            _require(len(weights) <= count, where, "more weights than targets")
+            _require(
+                all(len(row) == width + 1 for row in weights), where, "expected a weight for each column"
+            )
 
 
 def _target(record: TargetRecord) -> Target:
     return Target(record.type, record.property, tuple((t, p) for t, p in record.given))
-
-
-def _check_config(body: Body) -> None:
-    config = body.config
-    for part in (config, config.clustering, config.classification):
-        for name, most in _CEILINGS.items():
-            value = getattr(part, name, 0)
-            if isinstance(value, (int, float)):
-                _require(value <= most, "config", f"expected {name} of at most {most:,}, got {value:,}")
 
 
 # ---------------------------------------------------------------------- one target
@@ -485,6 +499,14 @@ def _within(values: NDArray[Any], low: int, high: int) -> bool:
     return not values.size or bool(values.min() >= low and values.max() < high)
 
 
+def _sized(values: NDArray[np.float64]) -> bool:
+    """Whether numbers are such that can be learned from: the squares of larger ones would overflow."""
+    return bool((np.abs(values) <= LARGEST).all())
+
+
+_SIZED: Final = f"expected finite numbers of at most {LARGEST:g}"
+
+
 # ---------------------------------------------------------------------- laws of motion
 def _check_screen(record: ScreenRecord, parts: Parts) -> None:
     known = {(t.name, prop) for t in parts.schema.types for prop in t.properties}
@@ -622,25 +644,26 @@ def _check_kept(laws: LearnedLawsRecord, learner: LawLearner, arrays: _Arrays) -
 
 def _stored(arrays: _Arrays, name: str, width: int, limit: int, seen: int, cells: int) -> NDArray[Any]:
     """The rows of a store: as wide as they must be, not too many, all in one of its cells."""
-    rows = _array(arrays, f"{name}.rows", "float64", (None, width))
-    _require(
-        len(rows) <= min(limit, seen), f"{name}.rows", f"expected at most {min(limit, seen)}, got {len(rows)}"
-    )
-    _require(np.isfinite(rows).all(), f"{name}.rows", "expected finite numbers")
-    found = _array(arrays, f"{name}.cells", "int64", (len(rows),))
+    n = _rows(arrays, f"{name}.rows", "float64", (None, width))
+    _require(n <= min(limit, seen), f"{name}.rows", f"expected at most {min(limit, seen)}, got {n:,}")
+    _rows(arrays, f"{name}.cells", "int64", (n,))
+    rows, found = arrays[f"{name}.rows"], arrays[f"{name}.cells"]
+    _require(_sized(rows), f"{name}.rows", _SIZED)
     _require(_within(found, 0, cells), f"{name}.cells", "expected one of the cells")
     return rows
 
 
 # ---------------------------------------------------------------------- the history
-def _array(arrays: _Arrays, name: str, dtype: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
+def _rows(arrays: _Arrays, name: str, dtype: str, shape: tuple[int | None, ...]) -> int:
+    """Length of an array, which must be of this dtype and shape; of a stored one no more is read than its header."""
     _require(name in arrays, "history", f"the array {name!r} is missing")
-    found = arrays[name]
-    fits = len(shape) == found.ndim and all(w in (None, n) for w, n in zip(shape, found.shape, strict=True))
-    _require(
-        found.dtype == np.dtype(dtype) and fits, f"history: {name}", f"expected {dtype} of shape {shape}"
-    )
-    return found
+    if isinstance(arrays, StoredArrays):
+        kind, found = arrays.claim(name)
+    else:
+        kind, found = arrays[name].dtype, arrays[name].shape
+    fits = len(shape) == len(found) and all(w in (None, n) for w, n in zip(shape, found, strict=True))
+    _require(kind == np.dtype(dtype) and fits, f"history: {name}", f"expected {dtype} of shape {shape}")
+    return found[0]
 
 
 def _check_history(body: Body, parts: Parts, targets: Sequence[Target], arrays: _Arrays) -> None:
@@ -651,26 +674,50 @@ def _check_history(body: Body, parts: Parts, targets: Sequence[Target], arrays: 
     if body.laws is not None:
         stores = ["contacts", *(f"free{k}" for k in range(len(body.laws.laws.learners or ())))]
         expected |= {f"laws.{store}.{name}" for store in stores for name in ("rows", "cells")}
+    expected |= _check_regression_shapes(body, arrays)
     _require(
         set(arrays) == expected,
         "history",
         f"arrays are missing or too many: {sorted(set(arrays) ^ expected)[:5]}",
     )
-    signatures: dict[str, list[SlotSignature]] = {}
+    signatures = {
+        name: _signatures(table, name, parts, f"table{k}")
+        for k, (name, table) in enumerate(zip(types, body.tables, strict=True))
+    }
     for k, (name, table) in enumerate(zip(types, body.tables, strict=True)):
-        signatures[name] = _check_table(table, name, parts, arrays, f"table{k}")
+        _check_table_shapes(table, signatures[name], arrays, f"table{k}")
+    for k, (part, target) in enumerate(zip(body.targets, targets, strict=True)):
+        most = _rows(arrays, f"table{types.index(target.type)}.serial", "int64", (None,))
+        _check_target_shapes(part.model, most, arrays, f"target{k}")
+    for k, (name, table) in enumerate(zip(types, body.tables, strict=True)):
+        _check_table(table, signatures[name], arrays, f"table{k}")
     for k, (part, target) in enumerate(zip(body.targets, targets, strict=True)):
         table_at = f"table{types.index(target.type)}"
         _check_examples(part.model, target, signatures[target.type], arrays, table_at, f"target{k}")
+
+
+def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
+    """Names of the arrays of regressions, whose shapes and numbers are such as they must be."""
+    names: set[str] = set()
+    for k, (_, regression) in enumerate(sorted(body.regressions.items())):
+        for number, (_, _, weights) in enumerate(regression.ridges):
+            _require(weights, f"regression{k}", "expected weights")
+            width = len(weights[0])
+            shapes = {f"gram{number}": (width, width), f"moments{number}": (len(weights), width)}
+            for part, shape in shapes.items():
+                name = f"regression{k}.{part}"
+                _rows(arrays, name, "float64", shape)
+                _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
+                names.add(name)
+    return names
 
 
 _TABLE: Final = ("x", "signature", "stratum", "bodies", "serial")
 _TARGET: Final = ("y", "labels", "rows", "forgotten")
 
 
-def _check_table(
-    table: TableRecord, type_name: str, parts: Parts, arrays: _Arrays, at: str
-) -> list[SlotSignature]:
+def _signatures(table: TableRecord, type_name: str, parts: Parts, at: str) -> list[SlotSignature]:
+    """What the rows of a table hold."""
     known = {t.name: t for t in parts.schema.types}
     signatures = []
     for names in table.signatures:
@@ -680,27 +727,50 @@ def _check_table(
         _require(bodily == sorted(bodily), at, "expected bodiless objects before bodies")
         signatures.append(parts.signature_of(tuple(names)))
     _distinct(signatures, f"{at}: signatures")
+    return signatures
+
+
+def _check_table_shapes(
+    table: TableRecord, signatures: Sequence[SlotSignature], arrays: _Arrays, at: str
+) -> None:
+    """Shapes are looked at before room is made for any array."""
+    n = _rows(arrays, f"{at}.x", "float64", (None, max((len(s.columns) for s in signatures), default=0)))
+    _require(n <= table.seen, f"history: {at}.x", "there are more rows than were seen")
+    for name in ("signature", "stratum"):
+        _rows(arrays, f"{at}.{name}", "int32", (n,))
+    _rows(arrays, f"{at}.bodies", "int16", (n, max((len(s.types) for s in signatures), default=0)))
+    _rows(arrays, f"{at}.serial", "int64", (n,))
+
+
+def _check_target_shapes(model: PropertyRecord, most: int, arrays: _Arrays, at: str) -> None:
+    """The same of the examples of a target, each of which is a row of a table."""
+    n = _rows(arrays, f"{at}.y", "float64", (None,))
+    _require(n <= most, f"history: {at}.y", f"expected at most {most:,} examples, as many as there are rows")
+    _rows(arrays, f"{at}.labels", "int32", (n,))
+    _rows(arrays, f"{at}.rows", "int64", (n,))
+    counted = _rows(arrays, f"{at}.forgotten", "int64", (None, 2))
+    _require(counted <= model.clusterer.next_id, f"history: {at}.forgotten", "there are more than modes")
+
+
+def _check_table(table: TableRecord, signatures: Sequence[SlotSignature], arrays: _Arrays, at: str) -> None:
     _distinct(table.strata, f"{at}: strata")
-    slots = max((len(s.types) for s in signatures), default=0)
-    width = max((len(s.columns) for s in signatures), default=0)
-    x = _array(arrays, f"{at}.x", "float64", (None, width))
+    x = arrays[f"{at}.x"]
     n = len(x)
-    _require(np.isfinite(x).all(), f"history: {at}.x", "expected finite numbers")
-    ids = _array(arrays, f"{at}.signature", "int32", (n,))
+    _require(_sized(x), f"history: {at}.x", _SIZED)
+    ids = arrays[f"{at}.signature"]
     _require(_within(ids, 0, len(signatures)), f"history: {at}.signature", "expected one of the signatures")
-    strata = _array(arrays, f"{at}.stratum", "int32", (n,))
+    strata = arrays[f"{at}.stratum"]
     _require(_within(strata, 0, len(table.strata)), f"history: {at}.stratum", "expected one of the states")
-    bodies = _array(arrays, f"{at}.bodies", "int16", (n, slots))
+    bodies = arrays[f"{at}.bodies"]
     for number, signature in enumerate(signatures):
         _check_bodies(bodies[ids == number], signature, f"history: {at}.bodies")
-    serial = _array(arrays, f"{at}.serial", "int64", (n,))
+    serial = arrays[f"{at}.serial"]
     _require(
         n == 0 or ((np.diff(serial) > 0).all() and serial[0] >= 0),
         f"history: {at}.serial",
         "expected an order",
     )
     _require(n == 0 or serial[-1] < table.seen, f"history: {at}.serial", "there are more rows than were seen")
-    return signatures
 
 
 def _check_bodies(bodies: NDArray[Any], signature: SlotSignature, where: str) -> None:
@@ -721,14 +791,14 @@ def _check_examples(
     at: str,
 ) -> None:
     ids = [mode.id for mode in model.clusterer.modes]
-    y = _array(arrays, f"{at}.y", "float64", (None,))
-    _require(np.isfinite(y).all(), f"history: {at}.y", "expected finite numbers")
-    labels = _array(arrays, f"{at}.labels", "int32", (len(y),))
+    y = arrays[f"{at}.y"]
+    _require(_sized(y), f"history: {at}.y", _SIZED)
+    labels = arrays[f"{at}.labels"]
     _require(np.isin(labels, [0, *ids]).all(), f"history: {at}.labels", f"expected 0 or one of {ids}")
-    rows = _array(arrays, f"{at}.rows", "int64", (len(y),))
+    rows = arrays[f"{at}.rows"]
     _require(_within(rows, 0, len(arrays[f"{table}.x"])), f"history: {at}.rows", "expected rows of the table")
     _distinct(rows.tolist(), f"history: {at}.rows")
-    dropped = _array(arrays, f"{at}.forgotten", "int64", (None, 2))
+    dropped = arrays[f"{at}.forgotten"]
     _require(_within(dropped, 0, 2**53), f"history: {at}.forgotten", "expected modes and numbers of examples")
     _distinct(dropped[:, 0].tolist(), f"history: {at}.forgotten")
     _require(len(y) or not ids, f"history: {at}.y", "there are modes, but no examples")

@@ -17,6 +17,8 @@ from relgym.files.records import (
     Finite,
     Hex,
     Name,
+    Noise,
+    Number,
     Pair,
     Random,
     Record,
@@ -167,12 +169,12 @@ class ModeRecord(Record):
 class ClustererRecord(Record):
     """The modes of a target, and what finding more of them needs."""
 
-    sigma: Amount
+    sigma: Noise
     next_id: ModeId
-    largest: Amount
-    reach: Amount
-    spread: Amount
-    rounding: Amount
+    largest: Number
+    reach: Number
+    spread: Number
+    rounding: Noise
     approximate: bool
     noise: Count
     modes: list[ModeRecord]
@@ -181,6 +183,7 @@ class ClustererRecord(Record):
     random: Random
     due: bool = False
     chancy: bool = False
+    estimating: bool = False
 
 
 # ---------------------------------------------------------------------- clauses and trees
@@ -393,6 +396,7 @@ class PropertyRecord(Record):
     scope: ScopeRecord = field(default_factory=ScopeRecord)
     limits: LimitsRecord = field(default_factory=LimitsRecord)
     stops: StopsRecord = field(default_factory=StopsRecord)
+    latest: ModeOrNoise = 0
 
 
 class TargetModel(Record):
@@ -407,6 +411,47 @@ class HindsightRecord(Record):
 
     steps: Annotated[list[tuple[Count, Count]], Meta(max_length=200)]
     undecided: bool
+
+
+Expert: TypeAlias = Annotated[
+    int, Meta(ge=0, lt=6, description="who gave a value, as a place among all experts")
+]
+Bins: TypeAlias = list[tuple[int, Weight]]
+
+
+class CellRecord(Record):
+    """How one kind of predictions came out: its key, who speaks, and of every expert what it left.
+
+    A record is an expert, trials, hits, the run under way and bins of errors; squares are trials, the expert's own and
+    those of saying that nothing changes.
+    """
+
+    key: tuple[int, int, int]
+    speaker: Expert
+    records: list[tuple[Expert, Weight, Weight, int, Bins]]
+    squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6, max_length=6)]
+
+
+class CalibrationRecord(Record):
+    """How right a target's predictions were, and what it changes by, in bins."""
+
+    trials: Count
+    slips: tuple[Weight, Weight]
+    changes: Bins
+    cells: list[CellRecord]
+
+
+class RegressionRecord(Record):
+    """Least squares on all numbers of a type: columns, targets, and for each kind rows, when due, and weights."""
+
+    names: list[Name]
+    seen: Count
+    targets: list[Name]
+    centre: list[float]
+    scale: list[float]
+    range: tuple[list[float], list[float]]
+    waiting: Annotated[list[tuple[list[float], list[float]]], Meta(max_length=64)]
+    ridges: Annotated[list[tuple[Count, Count, list[list[float]]]], Meta(max_length=2)]
 
 
 class TableRecord(Record):
@@ -504,7 +549,7 @@ class ContactsRecord(Record):
 class LearnedLawsRecord(Record):
     """The laws; the last four fields only with history."""
 
-    tolerance: Amount
+    tolerance: Noise
     free: list[FreeLawRecord]
     pair: PairLawRecord | None
     shares: list[tuple[Name, Name, str, Literal[1, 2, 3], Finite]]
@@ -568,7 +613,10 @@ class Body(Record):
     seen: Count
     extra: dict[str, Any]
     looks: list[tuple[Name, Name, bool]] = []
+    saved_cells: int | None = None
     screen: ScreenRecord | None = None
     hindsight: dict[str, HindsightRecord] = {}
+    calibration: dict[str, CalibrationRecord] = {}
+    regressions: dict[str, RegressionRecord] = {}
     names: dict[str, Name] = {}
     report: ReportRecord = field(default_factory=ReportRecord)

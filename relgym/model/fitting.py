@@ -66,9 +66,13 @@ def compare_and_learn(
         Whether to learn.
     """
     residuals, wrong = compared(prediction, transition.after, precision)
-    if prediction is not None and learn:
-        model.look_back(prediction, residuals, precision)
-    learned = model.learn_one(transition) if learn else None
+    learned = None
+    if learn:
+        learned = (
+            model.take_up(transition, prediction, residuals, precision)
+            if prediction is not None
+            else model.learn_one(transition)
+        )
     return StepReport(prediction, residuals, wrong, learned, transition)
 
 

@@ -60,9 +60,8 @@ def _indispensable(model: PropertyModel, bound: int) -> NDArray[np.int64]:
         model.classifier.exemplars.rows.astype(np.intp),
         np.flatnonzero(log.labels == NOISE)[-bound // 4 :],
     ]
-    counts = np.bincount(log.labels)
-    for mode in np.flatnonzero(counts[1:]) + 1:
-        if counts[mode] < bound / RARE:
+    for mode, count in zip(*np.unique(log.labels, return_counts=True), strict=True):
+        if mode != NOISE and count < bound / RARE:
             chosen.append(np.flatnonzero(log.labels == mode))
     return log.rows[np.concatenate(chosen)]
 

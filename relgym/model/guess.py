@@ -22,9 +22,11 @@ from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
-from relgym.model.scope import Scope, alike, spread_out
-from relgym.numeric.stepwise import LinearFit, forward_order, least_squares
+from relgym.model.scope import Scope, alike, alike_to, spread_out
+from relgym.numeric.stepwise import LinearFit, fitting_cells, forward_order, least_squares
 from relgym.scene.objects import Target
+from relgym.scheduling.agenda import Budget
+from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["Guess", "Guesses"]
 
@@ -94,6 +96,7 @@ class Guesses:
         self.beyond: Guess | None = None
         self.errors = np.zeros((2, 2))
         self._due = LEAST
+        self._trials: list[_Trial] | None = None  # those under way
 
     @property
     def superior(self) -> bool:
@@ -114,21 +117,36 @@ class Guesses:
         self.errors += (np.column_stack([np.square(off), np.sqrt(off)]) - self.errors) / MEMORY
 
     def stale(self, seen: int) -> bool:
-        """Whether a new guess is due after so many examples."""
-        return seen >= self._due
+        """Whether a new guess is due after so many examples, or under way."""
+        return seen >= self._due or self._trials is not None
 
-    def renew(self, clusterer: ModeClusterer, table: ExampleTable, scope: Scope) -> int:
-        """Guess anew, beyond the scope of approximations too; the work done, in units of classifiers' work.
+    @property
+    def underway(self) -> bool:
+        """Whether a new guess is being worked on."""
+        return self._trials is not None
+
+    def drop(self) -> None:
+        """Forget the guess that is being worked on: it was of other columns."""
+        self._trials = None
+
+    def renew(self, clusterer: ModeClusterer, table: ExampleTable, scope: Scope, budget: Budget) -> None:
+        """Guess anew, beyond the scope of approximations too, as far as the budget goes.
 
         Cost O(`FOLDS` * rows * columns * terms) with at most `MOST_CELLS` for rows times columns, some
         0.3 s among 500 features.
         """
-        self._due = int(GROWTH * max(LEAST, clusterer.seen))
-        numbers, slots = alike(clusterer, table)
-        self.best, work = _guessed(clusterer, table, slots, numbers)
-        beyond = numbers[~scope.covers(table.x[clusterer.rows[numbers]], slots)]
-        self.beyond, more = _guessed(clusterer, table, slots, beyond)
-        return work + more
+        if self._trials is None:
+            self._due = int(GROWTH * max(LEAST, clusterer.seen))
+            numbers, slots = alike(clusterer, table)
+            beyond = numbers[~scope.covers(table.x[clusterer.rows[numbers]], slots)]
+            self._trials = [_Trial.of(clusterer, table, slots, some) for some in (numbers, beyond)]
+        if not all([trial.go_on(budget) for trial in self._trials]):
+            return
+        (whole, rest), self._trials = self._trials, None
+        numbers = alike_to(clusterer, table, whole.slots)
+        beyond = numbers[~scope.covers(table.x[clusterer.rows[numbers]], whole.slots)]
+        self.best = whole.fitted(clusterer, table, numbers)
+        self.beyond = rest.fitted(clusterer, table, beyond)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
@@ -136,7 +154,7 @@ class Guesses:
         told = {
             name: None if each is None else [each.mode.to_json(), each.left] for name, each in known.items()
         }
-        return {**told, "errors": self.errors.tolist(), "due": self._due}
+        return {**told, "errors": self.errors.tolist(), "due": 0 if self.underway else self._due}
 
     @classmethod
     def from_json(cls, target: Target, data: dict[str, Any]) -> Guesses:
@@ -157,29 +175,57 @@ def _read(target: Target, data: list[Any] | None) -> Guess | None:
     return None if data is None else Guess(Mode.from_json(target, data[0]), float(data[1]))
 
 
-def _guessed(
-    clusterer: ModeClusterer, table: ExampleTable, slots: SlotSignature, numbers: NDArray[np.intp]
-) -> tuple[Guess | None, int]:
-    """A guess from some examples, if they are enough and it is better than none; the work done."""
-    if len(numbers) < LEAST or slots.feature_count > MOST_FEATURES:
-        return None, 0
-    order, stages = slots.preference(clusterer.target)
-    present = np.array([slots.at(int(k)).property[-1:] != "'" for k in order])
-    widths = [int(present[:stage].sum()) for stage in (stages[:2] if slots.features else stages[:1])]
-    order = order[present]
-    best: tuple[int, ...] | None = None
-    left, work = 1.0, 0
-    for width in widths:  # few examples choose among many features badly
-        some = spread_out(numbers, min(MOST_ROWS, max(LEAST, MOST_CELLS // width)))
-        x, change = _data(clusterer, table, slots, order[:width], some)
-        work += int(x.size)
-        terms, leaves = _terms(x, change)
-        if terms is not None and (best is None or leaves < left):
-            best, left = least_squares(x, change, _order(x, change, terms)).columns, leaves
-    if best is None:
-        return None, work
-    mode = _fitted(clusterer, table, slots, order, spread_out(numbers, FITTED), best)
-    return Guess(mode, left), work
+@dataclass(slots=True)
+class _Trial:
+    """The choice of a guess's terms, under way; on examples as they were when it began.
+
+    Attributes
+    ----------
+    slots, order
+        The examples' signature, and its columns in order of preference.
+    tasks
+        The choice among the own columns, and among features too.
+    """
+
+    slots: SlotSignature
+    order: NDArray[np.intp]
+    tasks: list[Task[tuple[tuple[int, ...] | None, float]]]
+
+    @classmethod
+    def of(
+        cls, clusterer: ModeClusterer, table: ExampleTable, slots: SlotSignature, numbers: NDArray[np.intp]
+    ) -> _Trial:
+        """Begin with some examples; there is nothing to do if they are too few."""
+        order, stages = slots.preference(clusterer.target)
+        if len(numbers) < LEAST or slots.feature_count > MOST_FEATURES:
+            return cls(slots, order, [])
+        present = np.array([slots.at(int(k)).property[-1:] != "'" for k in order])
+        widths = [int(present[:stage].sum()) for stage in (stages[:2] if slots.features else stages[:1])]
+        order, tasks = order[present], []
+        for width in widths:  # few examples choose among many features badly
+            some = spread_out(numbers, min(MOST_ROWS, max(LEAST, MOST_CELLS // width)))
+            tasks.append(Task(_choice, *_data(clusterer, table, slots, order[:width], some)))
+        return cls(slots, order, tasks)
+
+    def go_on(self, budget: Budget) -> bool:
+        """Work as far as the budget goes; whether all is done."""
+        return all([budget.work(task) for task in self.tasks])
+
+    def fitted(
+        self, clusterer: ModeClusterer, table: ExampleTable, numbers: NDArray[np.intp]
+    ) -> Guess | None:
+        """The guess, if there is one that is better than none, with weights from these examples."""
+        best: tuple[int, ...] | None = None
+        left = 1.0
+        for task in self.tasks:
+            columns, leaves = task.result
+            if columns is not None and (best is None or leaves < left):
+                best, left = columns, leaves
+        if best is None or not len(numbers):
+            return None
+        return Guess(
+            _fitted(clusterer, table, self.slots, self.order, spread_out(numbers, FITTED), best), left
+        )
 
 
 def _data(
@@ -195,7 +241,20 @@ def _data(
     return slots.matrix(rows, order), clusterer.y[numbers] - present
 
 
-def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> tuple[int | None, float]:
+@resumable
+def _choice(
+    x: NDArray[np.float64], change: NDArray[np.float64]
+) -> Steps[tuple[tuple[int, ...] | None, float]]:
+    """Columns that serve best, None if it is no better to say that nothing changes, and what they leave of it."""
+    terms, leaves = yield from _terms.steps(x, change)
+    if terms is None:
+        return None, leaves
+    order = yield from _order(x, change, terms)
+    return least_squares(x, change, order).columns, leaves
+
+
+@resumable
+def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> Steps[tuple[int | None, float]]:
     """The smallest number of terms that predicts well what it wasn't fitted to.
 
     Returns
@@ -207,8 +266,11 @@ def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> tuple[int | N
     squares = np.empty((len(sizes), n))
     for part in np.array_split(np.arange(n), FOLDS):
         others = np.setdiff1d(np.arange(n), part)
-        order = _order(x[others], change[others], sizes[-1])
-        fits = [least_squares(x[others], change[others], order[:k]) for k in sizes]
+        order = yield from _order(x[others], change[others], sizes[-1])
+        fits = []
+        for k in sizes:
+            fits.append(least_squares(x[others], change[others], order[:k]))
+            yield fitting_cells(len(others), min(k, len(order)))
         squares[:, part] = [np.square(change[part] - fit.predict(x[part])) for fit in fits]
     gain = np.square(change) - squares
     sure = gain.mean(axis=1) > SURE * gain.std(axis=1) / np.sqrt(n)
@@ -219,9 +281,9 @@ def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> tuple[int | N
     return sizes[first], float(errors[first]) / max(float(change.std()), 1e-300)
 
 
-def _order(x: NDArray[np.float64], change: NDArray[np.float64], terms: int) -> tuple[int, ...]:
+def _order(x: NDArray[np.float64], change: NDArray[np.float64], terms: int) -> Steps[tuple[int, ...]]:
     """Columns in the order in which they serve."""
-    return forward_order(x, change, sigma=1e-12, max_terms=terms)
+    return forward_order.steps(x, change, sigma=1e-12, max_terms=terms)
 
 
 def _fitted(

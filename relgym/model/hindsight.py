@@ -8,17 +8,28 @@ wins the vote was the wrong one. So a learner that predicts before each step rep
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Mapping
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
+from relgym.model.calibration import OWN, Calibration
 from relgym.model.prediction import ScenePrediction
 
 if TYPE_CHECKING:
     from relgym.model.parts import Parts
 
-__all__ = ["LEAST", "SHARE", "WINDOW", "WRONG", "Hindsight", "look_back"]
+__all__ = [
+    "LEAST",
+    "SHARE",
+    "WINDOW",
+    "WRONG",
+    "Hindsight",
+    "calibration_to_json",
+    "look_back",
+    "restore_calibration",
+]
 
 WRONG = 1e-9
 """A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
@@ -118,15 +129,27 @@ def look_back(
         target = targets.get(pair)
         if residual is None or target is None:
             continue
-        rounding = max(WRONG, precision * max(1.0, abs(part.value + residual)))
+        came = part.value + residual
+        rounding = max(WRONG, precision * max(1.0, abs(came)))
+        turn = 2.0 * math.pi if part.property in layout.types[layout.index(part.object)].angles else 0.0
+        model = parts.models[target]
+        if part.audit is not None:
+            error, noise = parts.config.claim_error, parts.config.clustering.noise_std
+            if not isinstance(noise, str):  # who says how large the noise is takes it for granted
+                rounding = max(rounding, parts.config.clustering.inlier_stds * noise)
+            model.calibration.look_back(
+                part.audit, came, claimed=part.ok, rounding=rounding, error=error, turn=turn
+            )
         if not abs(residual) <= rounding:
             off.add(pair)
         if not part.mode or parts.governs(target):
             continue
-        model = parts.models[target]
         if not off.isdisjoint(target.given) and not off.isdisjoint(model.needs):
             continue
         spread = SPREADS * part.spread if part.spread == part.spread else 0.0
+        if part.audit is not None and part.audit.speaker != OWN:  # another one gave the value, and the spread
+            residual, spread = came - part.audit.values[OWN], 0.0
+            residual = math.remainder(residual, turn) if turn else residual
         count = counts.setdefault(pair, [0, 0])
         count[0] += 1
         count[1] += not abs(residual) <= max(rounding, model.clusterer.scale.tolerance, spread)
@@ -145,3 +168,18 @@ def restore_hindsight(parts: Parts, data: Mapping[str, Any]) -> None:
     for target in parts.targets:
         if str(target) in data:
             parts.models[target].hindsight = Hindsight.from_json(data[str(target)])
+
+
+def calibration_to_json(parts: Parts) -> dict[str, Any]:
+    """Plain data that `restore_calibration` reads back, by target; empty where nobody ever looked back."""
+    known = {str(t): parts.models[t].calibration for t in parts.targets}
+    return {name: calibration.to_json() for name, calibration in known.items() if calibration.trials}
+
+
+def restore_calibration(parts: Parts, data: Mapping[str, Any]) -> None:
+    """Take over what `calibration_to_json` wrote."""
+    for target in parts.targets:
+        if str(target) in data:
+            parts.models[target].calibration = Calibration.from_json(
+                data[str(target)], parts.config.claim_probability
+            )

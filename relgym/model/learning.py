@@ -8,17 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
-from relgym.clustering.turn import Turn
 from relgym.html import html_table
-from relgym.model.chaining import CHECK_AT, due, revise
+from relgym.logic.search import LITERAL
+from relgym.model.chaining import CHECK_AT, due, inquire, revise
 from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
+from relgym.model.prediction import ScenePrediction
 from relgym.model.property_model import bodies_of
 from relgym.model.scenes import next_values, stays, unwrapped
-from relgym.scene.objects import Transition
+from relgym.scene.objects import TASK, Target, Transition
+from relgym.scheduling.agenda import Budget
 
 __all__ = ["LearnReport", "finish", "learn"]
+
+
+SEARCHES = 0.6
+"""Searches for modes, which may go on for ever, get this share of a step's budget; others get the rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,33 +64,63 @@ def _ids(modes: tuple[int, ...]) -> str:
 
 
 def learn(
-    parts: Parts, percept: Percept, transition: Transition, only: frozenset[int] | None = None
+    parts: Parts,
+    percept: Percept,
+    transition: Transition,
+    only: frozenset[int] | None = None,
+    told: ScenePrediction | None = None,
 ) -> LearnReport:
     """Take up one transition, whose first scene has been perceived and whose numbers are finite.
 
-    With `only`, of the objects with these indices; all others are there to be seen.
+    With `only`, of the objects with these indices; all others are there to be seen. What was predicted of it, if
+    somebody asked, saves looking at what came as it was told.
     """
     before, after = transition.before, transition.after
     if parts.open:
         parts.discover_targets(before, after)
     following = unwrapped(before.layout, before.vector, next_values(before, after))
     reports: dict[tuple[str, str], ClusterReport] = {}
-    turn = Turn()
+    budget = parts.agenda.open()
+    _go_on(parts, budget)
+    searches = budget.part(SEARCHES)
     for type_name in dict.fromkeys(t.type for t in parts.targets):
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
             if (only is None or index in only) and stays(before, after, index):
-                _learn_object(parts, percept, index, following, reports, turn)
+                _learn_object(parts, percept, index, following, reports, searches)
     for type_name, table in parts.tables.items():
         if parts.open and table.seen in CHECK_AT:
             parts.looks += due(parts, type_name)
         forget(table, [m for t, m in parts.models.items() if t.type == type_name], parts.config.history)
-    if parts.looks and turn.take():
-        revise(parts, parts.looks.pop(0))
+    _inquire(parts, budget)
     if parts.laws is not None:
-        parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models)
-    return LearnReport(reports, _refresh(parts))
+        parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models, told)
+    work = _refresh(parts, budget)
+    parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
+    return LearnReport(reports, work)
+
+
+def _go_on(parts: Parts, budget: Budget) -> None:
+    """Go on with what is under way: what is sure to end soon, then searches for modes, the oldest first."""
+    for target in parts.targets:
+        table = parts.tables[target.type]
+        parts.models[target].approximate(table, budget)
+        if parts.models[target].guesses.underway:
+            parts.models[target].reconsider(table, budget)
+    searches = budget.part(SEARCHES)
+    for waiting in parts.agenda.waiting:
+        if isinstance(waiting, Target) and waiting in parts.models:
+            parts.models[waiting].go_on(parts.tables[waiting.type], searches)
+
+
+def _inquire(parts: Parts, budget: Budget) -> None:
+    """Take the next look at a target's causal order, or go on with the one that is being taken."""
+    if parts.inquiry is None and parts.looks and budget.left:
+        parts.inquiry = inquire(parts, parts.looks.pop(0))
+    if parts.inquiry is not None and budget.work(parts.inquiry.task):
+        inquiry, parts.inquiry = parts.inquiry, None
+        revise(parts, inquiry)
 
 
 def _there(parts: Parts, transition: Transition, only: frozenset[int] | None) -> dict[int, bool]:
@@ -100,14 +136,18 @@ def _there(parts: Parts, transition: Transition, only: frozenset[int] | None) ->
 
 def finish(parts: Parts) -> int:
     """Make all searches that still wait, and re-learn every stale classifier, without a budget; the work spent."""
-    while parts.looks:
-        revise(parts, parts.looks.pop(0))
+    budget = Budget()
+    while parts.looks or parts.inquiry is not None:
+        _inquire(parts, budget)
     for target in parts.targets:
-        parts.models[target].search(parts.tables[target.type])
-    spoken = [t for t in parts.targets if not parts.governs(t)]
-    return sum(
-        parts.models[t].refresh(None) + parts.models[t].reconsider(parts.tables[t.type]) for t in spoken
-    )
+        parts.models[target].search(parts.tables[target.type], budget)
+    parts.agenda.waiting = ()
+    work = 0
+    for target in parts.targets:
+        if not parts.governs(target):
+            work += parts.models[target].refresh(None)
+            parts.models[target].reconsider(parts.tables[target.type], budget)
+    return work + budget.spent // LITERAL
 
 
 def _learn_object(
@@ -116,7 +156,7 @@ def _learn_object(
     index: int,
     following: NDArray[np.float64],
     reports: dict[tuple[str, str], ClusterReport],
-    turn: Turn,
+    budget: Budget,
 ) -> None:
     layout = percept.layout
     type_name = layout.types[index].name
@@ -126,19 +166,30 @@ def _learn_object(
     bodies = bodies_of(situation.order[0], layout)
     row = table.add(situation.signature, x, situation.keys[0], bodies)
     example = replace(situation.examples[0], key=situation.keys[0])
+    changes: dict[str, float] = {}
+    rough = False
     for target in parts.targets:
         if target.type == type_name:
-            y = float(following[layout.column(index, target.property)])
-            report = parts.models[target].learn_one(table, row, y, situation, example, turn)
+            column = layout.column(index, target.property)
+            y = float(following[column])
+            rough |= parts.models[target].rough
+            changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
+            report = parts.models[target].learn_one(table, row, y, situation, example, budget)
             reports[layout.names[index], target.property] = report
+    if rough:
+        parts.regressions[type_name].learn_one(situation.signature, x, changes)
 
 
-def _refresh(parts: Parts) -> int:
-    budget, spent = parts.config.work_per_step, 0
+def _refresh(parts: Parts, budget: Budget) -> int:
+    """Re-learn stale classifiers and guess anew within both budgets; the work spent on classifiers."""
+    spent = 0
     for target in parts.targets:
-        if not parts.governs(target):  # no clause is asked where laws predict
-            spent += parts.models[target].refresh(budget - spent)
-            spent += parts.models[target].reconsider(parts.tables[target.type]) if spent < budget else 0
-        if spent >= budget:
+        allowed = min(parts.config.work_per_step - spent, budget.left // LITERAL)
+        if allowed <= 0:
             break
+        if not parts.governs(target):  # no clause is asked where laws predict
+            work = parts.models[target].refresh(allowed)
+            budget.spend(LITERAL * work)
+            spent += work
+            parts.models[target].reconsider(parts.tables[target.type], budget)
     return spent

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,7 +203,13 @@ class Neighbourhoods:
         return _Window(objects, objects.index(focus), small, columns)
 
 
-def learn_locally(parts: Parts, near: Neighbourhoods, transition: Transition, seen: int) -> LearnReport:
+def learn_locally(
+    parts: Parts,
+    near: Neighbourhoods,
+    transition: Transition,
+    seen: int,
+    told: ScenePrediction | None = None,
+) -> LearnReport:
     """Take up one transition of a large scene: of the objects that changed, or of one that didn't in its turn."""
     before, after = transition.before, transition.after
     layout, following = before.layout, next_values(before, after)
@@ -211,11 +218,26 @@ def learn_locally(parts: Parts, near: Neighbourhoods, transition: Transition, se
         window = near.window(focus)
         later = Scene(before.schema, window.scene.layout, following[window.columns])
         step = Transition(window.scene, later)
-        report = learn(parts, near.percept(focus), step, only=frozenset({window.place}))
+        said = None if told is None else _told_of(told, window, layout)
+        report = learn(parts, near.percept(focus), step, only=frozenset({window.place}), told=said)
         named = {(layout.names[focus], prop): part for (_, prop), part in report.parts.items()}
         known = {} if whole is None else whole.parts
         whole = LearnReport(known | named, report.work + (0 if whole is None else whole.work))
     return LearnReport({}, 0) if whole is None else whole
+
+
+def _told_of(told: ScenePrediction, window: _Window, layout: SceneLayout) -> ScenePrediction | None:
+    """What was predicted of the object that a small scene is around, in its names; None where others play roles."""
+    names = {layout.names[k]: window.scene.layout.names[n] for n, k in enumerate(window.objects)}
+    own = layout.names[window.objects[window.place]]
+    found = []
+    for one in told.parts:
+        if one.object == own:
+            if not all(role in names for role in one.roles):
+                return None
+            roles = tuple(names[role] for role in one.roles)
+            found.append(replace(one, object=names[own], roles=roles))
+    return ScenePrediction(window.scene, tuple(found))
 
 
 def _learned(
@@ -258,7 +280,7 @@ def predict_many_locally(
 ) -> BatchPrediction:
     """Predict what follows n large scenes with the same objects."""
     following, keys, frames = vectors.copy(), list[tuple[str, str]](), list[str]()
-    columns: list[tuple[NDArray[np.int64], NDArray[np.int8], NDArray[np.float64]]] = []
+    columns: list[tuple[NDArray[Any], ...]] = []
     for focus in _predicted(parts, layout):
         windows = [each.window(focus) for each in near]
         small = np.stack([window.scene.vector for window in windows]) if windows else np.zeros((0, 0))
@@ -273,16 +295,29 @@ def predict_many_locally(
             rows = np.arange(len(vectors))
             at = np.array([inner.column(int(place), target.property) for place in places])
             following[:, layout.column(focus, target.property)] = said.vectors[rows, at]
-            columns.append((said.modes[rows, part], said.outcomes[rows, part], said.margins[rows, part]))
+            tables = (said.modes, said.outcomes, said.margins, said.probabilities, said.intervals)
+            columns.append(tuple(table[rows, part] for table in tables))
             keys.append((layout.names[focus], target.property))
             frames.append(said.frames[int(part[0])])
     derive(parts.schema, layout, vectors, following)
     wrap(layout, following)
     n = len(vectors)
-    modes = np.stack([c[0] for c in columns], axis=1) if columns else np.zeros((n, 0), dtype=np.int64)
-    outcomes = np.stack([c[1] for c in columns], axis=1) if columns else np.zeros((n, 0), dtype=np.int8)
-    margins = np.stack([c[2] for c in columns], axis=1) if columns else np.zeros((n, 0))
-    return BatchPrediction(layout, following, tuple(keys), modes, outcomes, margins, tuple(frames))
+    kinds = (np.int64, np.int8, np.float64, np.float64, np.float64)
+    modes, outcomes, margins, probabilities, intervals = (
+        np.stack([c[k] for c in columns], axis=1) if columns else np.zeros((n, 0), dtype=kind)
+        for k, kind in enumerate(kinds)
+    )
+    return BatchPrediction(
+        layout,
+        following,
+        tuple(keys),
+        modes,
+        outcomes,
+        margins,
+        tuple(frames),
+        probabilities,
+        intervals,
+    )
 
 
 def _predicted(parts: Parts, layout: SceneLayout) -> list[int]:
@@ -300,7 +335,7 @@ def _told(batch: BatchPrediction) -> tuple[Prediction, ...]:
     for k, (name, prop) in enumerate(batch.parts):
         value = float(batch.vectors[0, layout.column(layout.index(name), prop)])
         outcome, mode = OUTCOMES[int(batch.outcomes[0, k])], int(batch.modes[0, k])
-        found.append(
-            Prediction(name, prop, value, outcome, mode, (), float(batch.margins[0, k]), batch.frames[k])
-        )
+        one = Prediction(name, prop, value, outcome, mode, (), float(batch.margins[0, k]), batch.frames[k])
+        stated = float(batch.probabilities[0, k]), float(batch.intervals[0, k])
+        found.append(replace(one, probability=stated[0], interval=stated[1]))
     return tuple(found)

@@ -50,6 +50,9 @@ def merge(parts: Parts, other: Parts, *, follow_laws: bool) -> None:
         mine = parts.property_model(theirs.type, theirs.property)
         rows = moved[theirs.type]
         _take_up(mine, model, parts.tables[theirs.type], rows)
+    for name, regression in other.regressions.items():
+        if name in parts.regressions and regression.seen > parts.regressions[name].seen:
+            parts.regressions[name] = copy.deepcopy(regression)  # sums about other centres don't add up
     parts.screen.absorb(other.screen)
     for name, table in parts.tables.items():
         forget(table, [m for t, m in parts.models.items() if t.type == name], parts.config.history)
@@ -127,6 +130,7 @@ def _take_up(
     mine.follow(table)
     mine.start_over(table)
     mine.hindsight = mine.hindsight.united(theirs.hindsight)
+    mine.calibration = mine.calibration.united(theirs.calibration)
 
 
 def _exemplars(

@@ -16,7 +16,7 @@ from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.learner import LawLearner
 from relgym.laws.touching import Contacts
 from relgym.model.perception import Percept
-from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.model.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
 from relgym.model.property_model import PropertyModel, Verdict
 from relgym.scene.objects import ACTION, Target
 from relgym.scene.schema import SceneSchema
@@ -87,17 +87,61 @@ class Laws:
         following: NDArray[np.float64],
         stays: Mapping[int, bool],
         models: Mapping[Target, PropertyModel],
+        told: ScenePrediction | None = None,
     ) -> None:
-        """Take up one transition, then weigh laws against modes if that is due."""
+        """Take up one transition, then weigh laws against modes if that is due.
+
+        What was predicted of it may be told: what came as predicted is only counted, and offered to what is kept.
+        """
         if not self.learner.sources:
             return
         self._seen += 1
+        if told is not None and self._seen % WEIGH_EVERY and self._confirmed(percept, following, stays, told):
+            self._last = None
+            return
         motion = self._last[2] if self._last is not None and self._last[0] is percept else None
         contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
         changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
         self._last = None  # what the laws say may have changed
         if changed or self._seen % WEIGH_EVERY == 0:
             self.governed = frozenset(name for name in self.learner.types if self._shorter(name, models))
+
+    def _confirmed(
+        self,
+        percept: Percept,
+        following: NDArray[np.float64],
+        stays: Mapping[int, bool],
+        told: ScenePrediction,
+    ) -> bool:
+        """Whether a transition came as the laws said, and was taken up as such."""
+        layout = percept.layout
+        if told.scene.layout is not layout or not all(stays.values()):
+            return False
+        cast = self.learner.book.cast(layout)
+        bodies = {layout.names[index]: body for body, index in enumerate(layout.bodies)}
+        said: dict[int, int] = {}
+        off: dict[int, float] = {}
+        touched: dict[int, list[int]] = {}
+        for one in told.parts:
+            body = bodies.get(one.object, -1)
+            if body not in cast.sources:
+                continue
+            kind = layout.types[layout.bodies[body]].name
+            if kind not in self.governed or one.property not in self.learner.book.components(kind):
+                continue
+            if not one.ok or len(one.roles) < one.mode or one.mode not in (FREE, TOUCHING):
+                return False  # a batch tells no roles
+            column = layout.column(layout.bodies[body], one.property)
+            error = abs(one.value - float(following[column]))
+            said[body] = said.get(body, 0) + 1
+            off[body] = max(off.get(body, 0.0), error)
+            touched[body] = [bodies[name] for name in one.roles[1:]]
+        for body in cast.movers:
+            kind = layout.types[layout.bodies[body]].name
+            if said.get(body, 0) != len(self.learner.book.components(kind)):
+                return False
+        vector = percept.vectors[0]
+        return self.learner.confirm(cast, vector, following, touched, off, lambda: self._contacts(percept))
 
     def _shorter(self, type_name: str, models: Mapping[Target, PropertyModel]) -> bool:
         """Whether a type's motion takes fewer bits by laws than by modes of every component."""

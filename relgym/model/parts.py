@@ -13,15 +13,17 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
-from relgym.model.chaining import Look, in_order
+from relgym.model.chaining import Inquiry, Look, in_order
 from relgym.model.motion import Laws, possible_targets
-from relgym.model.perception import Perception
+from relgym.model.perception import Percept, Perception
 from relgym.model.property_model import PropertyModel
+from relgym.model.regression import Regression
 from relgym.model.scenes import mismatch, stays
 from relgym.model.screening import Screen
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 from relgym.scene.sizes import check_sizes
+from relgym.scheduling.agenda import Agenda
 
 __all__ = ["MOST_TARGETS", "Parts"]
 
@@ -51,12 +53,18 @@ class Parts:
         The property model of each target.
     tables
         Regression rows by type name, shared by all targets of a type.
+    regressions
+        What least squares on everything says, by type name.
     perception
         Turns scenes into relations and rows.
     laws
         Laws of motion; None with ``frames="world"``.
     looks
         Targets to be looked at for laws with next values, one in a step.
+    inquiry
+        The look that is being taken.
+    agenda
+        How much may be searched in a step, and what waits for its next piece.
     screen
         Tells gross errors in observations, which aren't learned from.
     """
@@ -79,7 +87,10 @@ class Parts:
         )
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}
+        self.regressions: dict[str, Regression] = {}
         self.looks: list[Look] = []
+        self.inquiry: Inquiry | None = None
+        self.agenda = Agenda(earned=config.cells_per_step, most=config.most_cells, saved=config.saved_cells)
         self.screen = Screen()
         self.laws: Laws | None = None
         if config.frames == "auto":
@@ -159,6 +170,7 @@ class Parts:
         targets = (*self.targets, target)
         self._set_targets(in_order(targets) if self.open else targets)
         self.tables.setdefault(target.type, ExampleTable())
+        self.regressions.setdefault(target.type, Regression(self.config.regression_columns))
 
     def _bearing_on(self, target: Target) -> tuple[tuple[str, str], ...]:
         """Next values that a property of the task is given: worth is a function of what was, was done and came of it.
@@ -218,6 +230,19 @@ class Parts:
             if (target.type, target.property) == (type_name, prop):
                 return self.models[target]
         raise QueryError(f"{type_name}.{prop} is no target; the model has {[str(t) for t in self.targets]}")
+
+    def regressed(self, percept: Percept, index: int, prop: str) -> NDArray[np.float64] | None:
+        """Changes of a property that regressions predict for an object of n scenes, shape ``(n, kinds)``."""
+        regression = self.regressions[percept.layout.types[index].name]
+        if prop not in regression.targets:
+            return None
+        known = percept.regressed.get(index)
+        if known is None or known[0] != regression.seen:
+            signature = percept.situation(index).signature
+            # Only present values are read, and of objects alone of their type: their order doesn't matter.
+            x = percept.rows(index, percept.vectors, ordered=False)
+            known = percept.regressed[index] = (regression.seen, regression.values(signature, x))
+        return None if known[1] is None else known[1][:, :, regression.targets.index(prop)]
 
     def governs(self, target: Target) -> bool:
         """Whether laws of motion, not modes, predict a target."""

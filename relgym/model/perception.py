@@ -154,9 +154,9 @@ class Perception:
         self._forget()
 
     def percept(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> Percept:
-        """Relations of a batch of scenes, shape ``(n, layout.width)``."""
+        """What is seen of a batch of scenes, shape ``(n, layout.width)``, as far as somebody asks for it."""
         self._layouts[id(layout)] = layout  # keeps it alive, so that its id stays its own
-        return Percept(self, layout, vectors, self.extractor.extract(layout, vectors))
+        return Percept(self, layout, vectors)
 
     def vocabulary(self, target: ObjectType) -> Vocabulary:
         """Names of what classifiers of a type's targets are shown."""
@@ -228,8 +228,16 @@ class Percept:
     perception: Perception
     layout: SceneLayout
     vectors: NDArray[np.float64]
-    relations: Relations
+    _relations: Relations | None = None
     _situations: dict[int, Situation] = field(default_factory=dict)
+    regressed: dict[int, tuple[int, NDArray[np.float64] | None]] = field(default_factory=dict)
+
+    @property
+    def relations(self) -> Relations:
+        """The scenes' relations, extracted when somebody asks for them."""
+        if self._relations is None:
+            self._relations = self.perception.extractor.extract(self.layout, self.vectors)
+        return self._relations
 
     def __len__(self) -> int:
         return len(self.vectors)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import builtins
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.html import html_table
+from relgym.model.calibration import Audit
 from relgym.scene.objects import Scene, SceneLayout
 
 __all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
@@ -35,6 +36,7 @@ class Outcome(enum.Enum):
     NO_ROLES = "no mode's roles could be filled by the objects in the scene"
     OUTSIDE = "outside experience: nothing like this situation was seen in training"
     DEPENDS = "depends on another property that could not be predicted"
+    UNSURE = "unsure: predictions like this one were wrong too often"
 
 
 OUTCOMES = tuple(Outcome)
@@ -67,6 +69,14 @@ class Prediction:
         Standard deviation of what training examples of the same mode (after the same action, where the agent chooses
         among a few, or else on the same side of a threshold that tells) left, in units of the property; of a fallback
         what it left there; NaN where the property keeps its value.
+    probability
+        That the value is right: off by at most `ModelConfig.claim_error` of what the property mostly changes by.
+        Learned from how such predictions came out (`relgym.model.calibration`); NaN as long as nobody looked back.
+    interval
+        Half width of the interval about the value that holds what comes in 95 % of such predictions, in units of the
+        property; NaN where too few came out for that.
+    audit
+        What `WorldModel.look_back` needs to learn that.
     """
 
     object: str
@@ -78,6 +88,9 @@ class Prediction:
     margin: float = 0.0
     frame: str = "world"
     spread: float = math.nan
+    probability: float = math.nan
+    interval: float = math.nan
+    audit: Audit | None = field(default=None, compare=False, repr=False)
 
     @builtins.property  # `property` is a field here
     def ok(self) -> bool:
@@ -111,11 +124,15 @@ class ScenePrediction:
         return all(p.ok for p in self.parts)
 
     def _repr_html_(self) -> str:
-        head = ("target", "value", "how it came about", "mode", "roles", "margin", "spread")
+        head = (
+            *("target", "value", "how it came about", "mode", "roles", "margin", "spread"),
+            *("probability", "95 % interval"),
+        )
         rows = [
             (
                 *(f"{p.object}.{p.property}", f"{p.value:.7g}", p.outcome.value, p.mode or "–"),
                 *(", ".join(p.roles), f"{p.margin:.3g}", f"{p.spread:.2g}"),
+                *(f"{p.probability:.2g}", f"± {p.interval:.2g}"),
             )
             for p in self.parts
         ]
@@ -149,6 +166,8 @@ class BatchPrediction:
         Shape ``(n, len(parts))``.
     frames
         Per part the axes in which its laws of contacts are stated; ``"world"`` where modes predict.
+    probabilities, intervals
+        As of `Prediction`, shape ``(n, len(parts))``.
     """
 
     layout: SceneLayout
@@ -158,6 +177,13 @@ class BatchPrediction:
     outcomes: NDArray[np.int8]
     margins: NDArray[np.float64]
     frames: tuple[str, ...] = ()
+    probabilities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    intervals: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        for name in ("probabilities", "intervals"):  # of who knows none
+            if getattr(self, name).shape != self.outcomes.shape:
+                object.__setattr__(self, name, np.full(self.outcomes.shape, np.nan))
 
     @property
     def ok(self) -> NDArray[np.bool_]:

@@ -14,7 +14,6 @@ from relgym.classification.mode_classifier import ModeClassifier
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.clustering.turn import Turn
 from relgym.config import ModelConfig
 from relgym.model.answers import Answers
 from relgym.model.casting import Casting
@@ -29,6 +28,7 @@ from relgym.model.spread import Spreads, measure
 from relgym.model.stops import Stops, find_stops
 from relgym.scene.objects import Target
 from relgym.scene.schema import SceneSchema
+from relgym.scheduling.agenda import Budget
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
@@ -100,7 +100,7 @@ class PropertyModel(Answers):
         y: float,
         situation: Situation,
         example: Example,
-        turn: Turn | None = None,
+        budget: Budget | None = None,
     ) -> ClusterReport:
         """Take up one example: cluster it, then let the classifiers see where it belongs.
 
@@ -112,11 +112,13 @@ class PropertyModel(Answers):
             The property's next value.
         situation, example
             How the target object is situated, in a single scene.
-        turn
-            Leave for a dear search; default: given.
+        budget
+            What may be spent on searches; default: as much as they take.
         """
         self._compare(situation, example, table.x[row], y)
-        report = self.clusterer.learn_one(table, row, y, turn)
+        report = self.clusterer.learn_one(table, row, y, budget)
+        if report.mode != NOISE and self.latest not in report.fits:
+            self.latest = report.mode
         self._unexplained = self._assess()
         if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
             self._measure(table)
@@ -201,10 +203,22 @@ class PropertyModel(Answers):
         exemplars = self.classifier.exemplars.columns["row"]
         exemplars[:] = numbers[exemplars]
 
-    def search(self, table: ExampleTable) -> None:
-        """Make up for a dear search that still waits for its turn, if there is one."""
-        if self.clusterer.due:
-            self.clusterer.approximate_now(table)
+    def go_on(self, table: ExampleTable, budget: Budget) -> None:
+        """Go on with a search for modes that is under way, as far as the budget goes."""
+        if self.clusterer.go_on(table, budget):
+            self.follow(table)
+
+    def approximate(self, table: ExampleTable, budget: Budget) -> None:
+        """Look for an approximation if one is due, as far as the budget goes."""
+        if self.clusterer.due and self.clusterer.approximate_now(table, budget):
+            self.follow(table)
+
+    def search(self, table: ExampleTable, budget: Budget) -> None:
+        """Finish the searches that are under way or due."""
+        changed = False
+        while self.clusterer.searching or self.clusterer.due:
+            changed |= self.clusterer.go_on(table, budget) | self.clusterer.approximate_now(table, budget)
+        if changed:
             self.follow(table)
 
     def refresh(self, budget: int | None) -> int:
@@ -213,11 +227,10 @@ class PropertyModel(Answers):
         spent = self.classifier.refresh(left)
         return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
 
-    def reconsider(self, table: ExampleTable) -> int:
-        """Guess anew where nothing is explained and it is time; returns the work spent."""
-        if not self._guessable or not self.guesses.stale(self.clusterer.seen):
-            return 0
-        return self.guesses.renew(self.clusterer, table, self.scope)
+    def reconsider(self, table: ExampleTable, budget: Budget) -> None:
+        """Guess anew where nothing is explained and it is time, as far as the budget goes."""
+        if self._guessable and self.guesses.stale(self.clusterer.seen):
+            self.guesses.renew(self.clusterer, table, self.scope, budget)
 
     def retarget(self, target: Target, table: ExampleTable) -> None:
         """Be given other next values: modes and classifiers are learned again, from what is remembered."""
@@ -225,7 +238,9 @@ class PropertyModel(Answers):
         self.conditions = Conditions(self.schema, target)
         self.clusterer.retarget(target)
         self.casting = Casting(self._base, self.config.classification)
+        self.guesses.drop()
         self.hindsight = Hindsight()  # what follows is another model's word
+        self.calibration.forget()
         self._follow(table)
         self._widen(table, self.classifier.vocabulary.follows)
 
@@ -257,6 +272,7 @@ class PropertyModel(Answers):
         fits = fits[:, [not self.bounds(i) for i in known]]
         values = self._values_many(table, self.clusterer.rows[numbers], ids)
         labels = self.clusterer.labels[numbers].astype(np.int64)
+        self.calibration.keep(ids)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self._recast(table, self.classifier.exemplars)
@@ -276,6 +292,7 @@ class PropertyModel(Answers):
             "guess": self.guesses.to_json(),
             "spreads": self.spreads.to_json(),
             "scope": self.scope.to_json(),
+            "latest": self.latest,
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
             "limits": self.limits.to_json(),
@@ -293,6 +310,7 @@ class PropertyModel(Answers):
         self.guesses = Guesses.from_json(self.target, data.get("guess", {}))
         self.spreads = Spreads.from_json(data["spreads"])
         self.scope = Scope.from_json(data.get("scope", {}))
+        self.latest = int(data.get("latest", NOISE))
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
         self.casting.restore(data["casting"])
         self.limits = Limits.from_json(data.get("limits", {}))

@@ -8,18 +8,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.model.calibration import EXPERTS, GUESS, LATEST, LINEAR, OWN, PERSISTENCE, Audit, key_of, keys_of
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.property_model import PropertyModel, Verdict
+from relgym.model.property_model import Verdict
+from relgym.model.regression import KINDS
 from relgym.model.scenes import wrap
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["derive", "predict", "predict_many"]
 
-_PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED = (
-    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.OUTSIDE, Outcome.DEPENDS, Outcome.UNEXPLAINED)
+_PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED, _UNSURE = (
+    OUTCOMES.index(o)
+    for o in (Outcome.PREDICTED, Outcome.OUTSIDE, Outcome.DEPENDS, Outcome.UNEXPLAINED, Outcome.UNSURE)
 )
 
 
@@ -42,7 +45,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
                 one = replace(one, outcome=outcome, mode=0, spread=np.nan)
-                one = _fallback(parts.models[target], percept, index, following, one)
+            one = _settled(parts, target, percept, index, following, one)
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
@@ -52,20 +55,72 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
     return ScenePrediction(Scene(scene.schema, layout, following), tuple(found))
 
 
-def _fallback(
-    model: PropertyModel,
+def _settled(
+    parts: Parts,
+    target: Target,
     percept: Percept,
     index: int,
     following: NDArray[np.float64],
     one: Prediction,
 ) -> Prediction:
-    """A prediction that no mode makes, with the best guess as its value, or else the present one."""
-    guessed = model.guessed(percept, index, following[None])
-    if guessed is None or not np.isfinite(guessed[0]):
-        column = percept.layout.column(index, model.target.property)
-        return replace(one, value=float(following[column]))
-    best = model.guess_at(percept, index, following)
-    return replace(one, value=float(guessed[0]), spread=one.spread if best is None else best.mode.sigma)
+    """A prediction with the value of who codes such ones best, and how right that will be."""
+    model, own = parts.models[target], np.array([one.value])
+    values = tuple(_experts(parts, target, percept, index, following[None], own)[0].tolist())
+    winner = -one.mode if parts.governs(target) else one.mode
+    # Whether a target counts as undecided or not, what won its vote is as right as it is.
+    key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
+    told = model.judge(key, values)
+    if told.speaker == LATEST and one.mode:
+        one = replace(one, mode=model.latest, roles=one.roles[:1])
+    spread = one.spread
+    if told.speaker == GUESS:
+        best = model.guess_at(percept, index, following)
+        spread = spread if best is None else best.mode.sigma
+    elif told.speaker != OWN:
+        spread = np.nan if told.speaker == PERSISTENCE else told.spread
+    return replace(
+        one,
+        value=values[told.speaker],
+        outcome=_outcome(one, claimed=model.claims(told), known=bool(model.calibration.trials)),
+        spread=spread,
+        probability=told.probability,
+        interval=told.interval,
+        audit=Audit(key, values, told.speaker),
+    )
+
+
+def _outcome(one: Prediction, *, claimed: bool, known: bool) -> Outcome:
+    """What is known of a mode's predictions has the last word on whether one is claimed."""
+    if one.ok:
+        return Outcome.PREDICTED if claimed else Outcome.UNSURE
+    trusted = one.mode and one.outcome is Outcome.UNEXPLAINED and claimed and known
+    return Outcome.PREDICTED if trusted else one.outcome
+
+
+def _experts(
+    parts: Parts,
+    target: Target,
+    percept: Percept,
+    index: int,
+    following: NDArray[np.float64],
+    own: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """What each of `EXPERTS` says of one object of n scenes, shape ``(n, experts)``; NaN: nothing."""
+    model = parts.models[target]
+    found = np.full((len(own), len(EXPERTS)), np.nan)
+    present = following[:, percept.layout.column(index, target.property)]
+    found[:, OWN], found[:, PERSISTENCE] = np.where(np.isfinite(own), own, np.nan), present
+    guessed = model.guessed(percept, index, following)
+    if guessed is not None:
+        found[:, GUESS] = np.where(np.isfinite(guessed), guessed, np.nan)
+    latest = None if parts.governs(target) else model.latest_values(percept, index, following)
+    if latest is not None:
+        found[:, LATEST] = latest
+    if model.rough and not parts.governs(target):
+        changes = parts.regressed(percept, index, target.property)
+        if changes is not None:
+            found[:, LINEAR : LINEAR + KINDS] = present[:, None] + changes
+    return found
 
 
 def predict_many(
@@ -75,6 +130,8 @@ def predict_many(
     following = vectors.copy()
     keys: list[tuple[str, str]] = []
     verdicts: list[Verdict] = []
+    probabilities: list[NDArray[np.float64]] = []
+    intervals: list[NDArray[np.float64]] = []
     lost: dict[tuple[str, str], NDArray[np.bool_]] = {}
     nowhere = np.zeros(len(vectors), dtype=bool)
     motion = None if parts.laws is None else parts.laws.speak(percept)
@@ -89,15 +146,15 @@ def predict_many(
                 verdict.outcomes[rows], verdict.margins[rows] = _DEPENDS, 0.0
             told = np.isfinite(verdict.values)
             known = told & (verdict.outcomes == _PREDICTED)
-            column = layout.column(index, target.property)
-            guessed = None if told.all() else parts.models[target].guessed(percept, index, following)
-            if guessed is not None:
-                rest = ~told & np.isfinite(guessed)
-                following[rest, column] = guessed[rest]
-            following[told, column] = verdict.values[told]
             verdict.outcomes[~told & (verdict.outcomes == _PREDICTED)] = _OUTSIDE
             # What is unexplained has a value only if a mode gave it, one that is too often the wrong one.
             verdict.modes[~(known | told & (verdict.outcomes == _UNEXPLAINED))] = 0
+            column = layout.column(index, target.property)
+            values, probability, interval = _settled_many(parts, target, percept, index, following, verdict)
+            following[:, column] = values
+            known &= verdict.outcomes == _PREDICTED
+            probabilities.append(probability)
+            intervals.append(interval)
             key = (target.type, target.property)
             lost[key] = lost.get(key, nowhere) | ~known
             keys.append((layout.names[index], target.property))
@@ -105,7 +162,36 @@ def predict_many(
     derive(parts.schema, layout, vectors, following)
     wrap(layout, following)
     frames = tuple(_frame(parts, target) for target in parts.targets for _ in layout.of_type(target.type))
-    return _stacked(layout, following, tuple(keys), verdicts, frames)
+    return _stacked(layout, following, tuple(keys), verdicts, frames, (probabilities, intervals))
+
+
+def _settled_many(
+    parts: Parts,
+    target: Target,
+    percept: Percept,
+    index: int,
+    following: NDArray[np.float64],
+    verdict: Verdict,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """`_settled` of n scenes: values, probabilities and intervals, shape ``(n,)`` each; outcomes change in place."""
+    model = parts.models[target]
+    said = _experts(parts, target, percept, index, following, verdict.values)
+    values, probability, interval = (np.full(len(said), np.nan) for _ in range(3))
+    winners = -verdict.modes if parts.governs(target) else verdict.modes
+    outcomes = np.where(verdict.modes != 0, np.int8(_PREDICTED), verdict.outcomes)
+    for key, part in keys_of(outcomes, winners, verdict.margins):
+        for rows, told in model.judge_many(key, said[part]):
+            some = part[rows]
+            values[some] = said[some, told.speaker]
+            probability[some], interval[some] = told.probability, told.interval
+            if told.speaker == LATEST and key.winner:
+                verdict.modes[some] = model.latest
+            before = verdict.outcomes[some]
+            if not model.claims(told):
+                verdict.outcomes[some[before == _PREDICTED]] = _UNSURE
+            elif model.calibration.trials and key.winner:
+                verdict.outcomes[some[before == _UNEXPLAINED]] = _PREDICTED
+    return values, probability, interval
 
 
 def _stacked(
@@ -114,6 +200,7 @@ def _stacked(
     keys: tuple[tuple[str, str], ...],
     verdicts: Sequence[Verdict],
     frames: tuple[str, ...],
+    calibrated: tuple[Sequence[NDArray[np.float64]], Sequence[NDArray[np.float64]]],
 ) -> BatchPrediction:
     n = len(following)
     if not verdicts:
@@ -122,7 +209,10 @@ def _stacked(
     modes = np.stack([v.modes for v in verdicts], axis=1)
     outcomes = np.stack([v.outcomes for v in verdicts], axis=1)
     margins = np.stack([v.margins for v in verdicts], axis=1)
-    return BatchPrediction(layout, following, keys, modes, outcomes, margins, frames)
+    probabilities, intervals = (np.stack(each, axis=1) for each in calibrated)
+    return BatchPrediction(
+        layout, following, keys, modes, outcomes, margins, frames, probabilities, intervals
+    )
 
 
 def _frame(parts: Parts, target: Target) -> str:

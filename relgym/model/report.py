@@ -12,6 +12,7 @@ from relgym.clustering.mode import Mode
 from relgym.errors import ConfigError
 from relgym.laws.text import LawRow, WorldRow, law_rows, world_rows
 from relgym.model.advice import Advice
+from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.report_tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
 from relgym.model.rules import agreement
 from relgym.model.spread import ROUNDING
@@ -19,6 +20,7 @@ from relgym.model.spread_text import spread_text
 from relgym.model.text import Cell, as_relations, table
 from relgym.reporting.naming import named_text
 from relgym.reporting.parser import parse_rules
+from relgym.reporting.rules import RuleList
 from relgym.scene.objects import ACTION, Scene
 
 if TYPE_CHECKING:
@@ -32,11 +34,14 @@ __all__ = [
     "PairTable",
     "RoleRow",
     "TargetReport",
+    "checked_rules",
     "describe",
     "report",
 ]
 
 _ELSE = "else"
+
+_PREDICTED = OUTCOMES.index(Outcome.PREDICTED)
 
 
 def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
@@ -106,7 +111,7 @@ def describe(
     if details or (not model.has_rules and not names and check is None):
         text = str(report(model, digits=digits))
     else:
-        text = _rules_text(model, digits, names, check)
+        text = checked_rules(model, digits, names, check).text(digits)
     if frame is None or model.laws is None or not model.governed:
         return text
     angles = (incline,) if isinstance(incline, (int, float)) else tuple(incline)
@@ -118,16 +123,23 @@ def describe(
     return "\n\n".join([text, *tables])
 
 
-def _rules_text(
-    model: WorldModel, digits: int, names: Mapping[str, str] | None, check: Iterable[Scene] | None
-) -> str:
+def checked_rules(
+    model: WorldModel,
+    digits: int = 7,
+    names: Mapping[str, str] | None = None,
+    check: Iterable[Scene] | None = None,
+) -> RuleList:
+    """A model's rules, with other names of conditions, and with how well the text agrees on some scenes.
+
+    Parameters are those of `describe`, which prints them.
+    """
     rules = model.rules()
     if names:
         rules = rules.renamed({named_text(rules, old): new for old, new in names.items()})
     if check is not None:
         measured, _ = agreement(model, parse_rules(rules.text(digits)), check)
         rules = replace(rules, agreement=measured.agreement)
-    return rules.text(digits)
+    return rules
 
 
 def _world_text(name: str, incline: float, rows: tuple[WorldRow, ...]) -> str:
@@ -150,6 +162,22 @@ def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> T
         _role_rows(part),
         advice,
         tuple(as_relations(tests, part.flags) for tests in part.scope.beyond()),
+        _record(part),
+    )
+
+
+def _record(part: PropertyModel) -> str:
+    """How a target's predictions came out; empty if nobody looked back at them."""
+    known = part.calibration
+    if not known.trials or not part.config.abstain:
+        return ""
+    kinds = list(known.kinds(_PREDICTED))
+    trials = sum(count for count, _ in kinds)
+    sure = sum(count for count, told in kinds if part.claims(told))
+    share = 100.0 * sure / trials if trials else 0.0
+    return (
+        f"{share:.3g} % of what modes predicted lately is of a kind that is claimed; "
+        f"{100.0 * known.slips:.2g} % of all was claimed and off by more than a claim may be"
     )
 
 

@@ -126,6 +126,8 @@ class TargetReport:
         What the target lacks, if modes don't explain it.
     beyond
         Tests of the places where modes don't speak (`relgym.model.scope`).
+    record
+        How its predictions came out, in a sentence; empty if nobody looked back at them.
     """
 
     target: str
@@ -136,6 +138,7 @@ class TargetReport:
     roles: tuple[RoleRow, ...]
     advice: Advice | None = None
     beyond: tuple[str, ...] = ()
+    record: str = ""
 
     @property
     def examples(self) -> int:
@@ -144,7 +147,8 @@ class TargetReport:
 
     def __str__(self) -> str:
         if not self.modes:
-            return f"{self.target}: no mode learned yet, {amount(self.examples, 'example')}{self._advice()}"
+            head = f"{self.target}: no mode learned yet, {amount(self.examples, 'example')}"
+            return f"{head}{self._record()}{self._advice()}"
         head = f"{self.target}: {amount(len(self.modes), 'mode')}, {amount(self.examples, 'example')}"
         parts = [head, indented(_mode_table(self))]
         if self.beyond:
@@ -153,7 +157,10 @@ class TargetReport:
             parts.append(indented(_clause_table(self.pairs)))
         if self.roles:
             parts.append(indented(_role_table(self.roles)))
-        return "\n\n".join(parts) + self._advice()
+        return "\n\n".join(parts) + self._record() + self._advice()
+
+    def _record(self) -> str:
+        return f"\n\n  record: {self.record}" if self.record else ""
 
     def _advice(self) -> str:
         if self.advice is None:

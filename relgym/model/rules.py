@@ -149,9 +149,12 @@ def _motion(model: WorldModel) -> MotionRules | None:
         return None
     names = sorted(model.governed)
     letters = "" if book.pair is None else axis_names(book.pair.frame, len(Axes.of(book.schema).used))
+    said = {name: tuple(book.components(name)) for name in names}
+    # A free law may speak of spins, too; where contacts don't act on surfaces, nothing is said of those.
+    free = ((name, book.free[name]) for name in names if name in book.free)
     return MotionRules(
-        tuple(book.free[name] for name in names if name in book.free),
-        tuple((name, tuple(book.components(name))) for name in names),
+        tuple(replace(law, components=law.components[: len(said[name])]) for name, law in free),
+        tuple(said.items()),
         book.pair,
         "".join(letters),
         tuple(sorted(book.shares.items())),
@@ -204,7 +207,11 @@ def _doubt(part: PropertyModel) -> str:
         return "no law of the form that is looked for describes it"
     if not part.modes:
         return "no mode learned yet"
-    return "nothing tells yet which of these holds" if part.undecided else ""
+    if part.doubtful:
+        share = 100.0 * part.calibration.share(_PREDICTED)
+        return f"such predictions were right in {share:.2g} % of the latest cases, too few to claim any"
+    known = part.calibration.trials and part.config.abstain
+    return "nothing tells yet which of these holds" if part.undecided and not known else ""
 
 
 # ------------------------------------------------------------------ functions and roles

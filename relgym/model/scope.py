@@ -202,15 +202,20 @@ def _looked_at(slots: SlotSignature, index: int, target: Target) -> bool:
 
 def alike(clusterer: ModeClusterer, table: ExampleTable) -> tuple[NDArray[np.intp], SlotSignature]:
     """Numbers of the examples whose own and bodiless columns are the newest one's, and its signature."""
+    slots = table.signatures[int(table.signature_ids[clusterer.rows[-1]])]
+    return alike_to(clusterer, table, slots), slots
+
+
+def alike_to(clusterer: ModeClusterer, table: ExampleTable, slots: SlotSignature) -> NDArray[np.intp]:
+    """Numbers of the examples whose own and bodiless columns are those of a signature."""
     ids = table.signature_ids[clusterer.rows]
-    slots = table.signatures[int(ids[-1])]
     core = [(slots.named(k), slots.at(k).slot) for k in range(slots.core)]
     fitting = [
         k
         for k in np.unique(ids).tolist()
         if [(s.named(c), s.at(c).slot) for s in [table.signatures[k]] for c in range(s.core)] == core
     ]
-    return np.flatnonzero(np.isin(ids, fitting)), slots
+    return np.flatnonzero(np.isin(ids, fitting))
 
 
 def spread_out(numbers: NDArray[np.intp], most: int) -> NDArray[np.intp]:

@@ -18,9 +18,9 @@ from relgym.errors import ModelFileError
 from relgym.files.reading import (
     ARCHIVE,
     FileLimits,
+    StoredArrays,
     check_depth,
     parse_json,
-    read_arrays,
     read_bytes,
     read_members,
     write_arrays,
@@ -97,8 +97,10 @@ def write_model(
 
 def read_model(
     path: str | os.PathLike[str], limits: FileLimits | None = None
-) -> tuple[dict[str, Any], dict[str, NDArray[Any]] | None]:
+) -> tuple[dict[str, Any], StoredArrays | None]:
     """Read what `write_model` wrote: plain data and arrays (None when saved without history).
+
+    An array is read when it is asked for; one that can't be read then raises `ModelFileError`, too.
 
     Parameters
     ----------
@@ -127,9 +129,13 @@ def read_model(
         ) from None
     body = _checked(path, whole, history)
     try:
-        return body, None if history is None else read_arrays(history, limits)
+        return body, None if history is None else StoredArrays(history, limits, error=_lost)
     except ValueError as error:
-        raise ModelFileError(f"{path}: its history can't be read ({error}); save the model again") from None
+        raise ModelFileError(f"{path}: {_lost(str(error))}") from None
+
+
+def _lost(said: str) -> ModelFileError:
+    return ModelFileError(f"its history can't be read ({said}); save the model again")
 
 
 def _checked(path: str | os.PathLike[str], whole: Any, history: bytes | None) -> dict[str, Any]:

@@ -22,7 +22,13 @@ from relgym.laws.book import LawBook
 from relgym.model.advice import Advice, advices
 from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
 from relgym.model.fitting import Progress, as_transitions, progressive, transitions_of
-from relgym.model.hindsight import hindsight_to_json, look_back, restore_hindsight
+from relgym.model.hindsight import (
+    calibration_to_json,
+    hindsight_to_json,
+    look_back,
+    restore_calibration,
+    restore_hindsight,
+)
 from relgym.model.journal import Journal
 from relgym.model.learning import LearnReport, finish, learn
 from relgym.model.locality import (
@@ -102,6 +108,7 @@ class WorldModel:
         self.condition_names: dict[str, str] = {}
         self._percept: tuple[Scene, Percept] | None = None
         self._rules: tuple[Any, RuleList] | None = None
+        self._advice: tuple[Any, tuple[Advice, ...]] | None = None
         self._stored: tuple[RuleList, tuple[Advice, ...]] | None = None
 
         self._neighbourhoods: tuple[Scene, Neighbourhoods] | None = None
@@ -115,6 +122,7 @@ class WorldModel:
             "_percept": None,
             "_neighbourhoods": None,
             "_rules": None,
+            "_advice": None,
             "_journal": Journal(),
         }
 
@@ -155,6 +163,7 @@ class WorldModel:
             _percept=None,
             _neighbourhoods=None,
             _rules=None,
+            _advice=None,
             _damaged=False,
         )
 
@@ -228,6 +237,38 @@ class WorldModel:
 
         Cost: relations once, then per target O(modes); searches and re-learning when an example is news.
         """
+        self._check_step(transition)
+        with self._step("_learn", transition, numbers=2 * len(transition.before.vector)):
+            return self._learn(transition)
+
+    @refusing(ObservationError)
+    def take_up(
+        self,
+        transition: Transition,
+        prediction: ScenePrediction,
+        residuals: Mapping[tuple[str, str], float],
+        precision: float = 0.0,
+    ) -> LearnReport:
+        """`look_back` and `learn_one` in one: what came as predicted is only counted, and offered to what is kept.
+
+        Parameters, errors and notes as there; the model is the same as if both had been called.
+        """
+        self._check_step(transition)
+        numbers = 3 * len(transition.before.vector)
+        with self._step("_take_up", transition, prediction, dict(residuals), precision, numbers=numbers):
+            return self._take_up(transition, prediction, residuals, precision)
+
+    def _take_up(
+        self,
+        transition: Transition,
+        prediction: ScenePrediction,
+        residuals: Mapping[tuple[str, str], float],
+        precision: float,
+    ) -> LearnReport:
+        self._look_back(prediction, residuals, precision)
+        return self._learn(transition, prediction)
+
+    def _check_step(self, transition: Transition) -> None:
         self._parts.check(transition.before)
         self._parts.check(transition.after)
         if self.frozen:
@@ -236,18 +277,16 @@ class WorldModel:
                 "save it with save(path, history=True) to go on learning"
             )
         check_size(self._parts, transition.before.layout)
-        with self._step("_learn", transition, numbers=2 * len(transition.before.vector)):
-            return self._learn(transition)
 
-    def _learn(self, transition: Transition) -> LearnReport:
+    def _learn(self, transition: Transition, told: ScenePrediction | None = None) -> LearnReport:
         before = transition.before
         following = next_values(before, transition.after)
         if not self._parts.screen.admits(before.layout, before.vector, following):
             return LearnReport({}, 0, set_aside=True)
         if large(before.layout):
-            report = learn_locally(self._parts, self._near(before), transition, self.seen)
+            report = learn_locally(self._parts, self._near(before), transition, self.seen, told)
         else:
-            report = learn(self._parts, self._perceive(before), transition)
+            report = learn(self._parts, self._perceive(before), transition, None, told)
         self.seen += 1
         return report
 
@@ -450,7 +489,7 @@ class WorldModel:
 
         A model without its history has nothing to learn from and stays as it is.
         """
-        self._rules = None
+        self._rules = self._advice = None
         if self.frozen:
             return 0
         with self._step("_finish"):
@@ -625,7 +664,7 @@ class WorldModel:
                     "save it again where it was learned"
                 )
             return doubted(self._stored[0], self._parts.models.values()).renamed(self.condition_names)
-        state = tuple((m.undecided, m.unexplained) for m in self._parts.models.values())
+        state = tuple((m.undecided, m.unexplained, m.calibration.trials) for m in self._parts.models.values())
         if self._rules is None or self._rules[0] != (self.seen, state):
             self._rules = (self.seen, state), rule_list(self)
         return self._rules[1].renamed(self.condition_names)
@@ -672,8 +711,14 @@ class WorldModel:
         """What isn't explained, target by target, and which features would explain it (`ModelConfig.features`).
 
         A model that was loaded without its history knows what was known when it was saved.
+
+        Cost: up to a second for each such target; kept until the model learns on.
         """
-        found = advices(self._parts)
+        models = self._parts.models.values()
+        state = self.seen, tuple((m.undecided, m.hindsight.wrong, m.hindsight.spoken) for m in models)
+        if self._advice is None or self._advice[0] != state:
+            self._advice = state, advices(self._parts)
+        found = self._advice[1]
         if self._stored is None:
             return found
         # Hindsight goes on without the history; what features would do is known from when there was one.
@@ -740,7 +785,9 @@ class WorldModel:
         body = self.to_json(history=history) | {"extra": self.extra if extra is None else extra}
         known = hindsight_to_json(self._parts)
         body |= {"names": self.condition_names} if self.condition_names else {}
-        return body | {"hindsight": known} if known else body
+        body |= {"hindsight": known} if known else {}
+        stated = calibration_to_json(self._parts)
+        return body | {"calibration": stated} if stated else body
 
     def _report(self) -> dict[str, Any]:
         """What can't be told without the history: rules, as text, and advice."""
@@ -753,7 +800,16 @@ class WorldModel:
             advice = tuple(
                 Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
             )
-            self._stored = parse_rules(data.get("rules", "")), advice
+            rules = parse_rules(data.get("rules", ""))
+            told, spoken = (
+                [part.target for part in rules.properties],
+                [str(target) for target in self.targets if not self.governs(target)],
+            )
+            if told != spoken:
+                raise ModelFileError(
+                    f"report.rules: expected rules of {spoken}, got {told}; save the model again"
+                )
+            self._stored = rules, advice
 
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
@@ -792,11 +848,12 @@ class WorldModel:
         return model, model.extra
 
     @classmethod
-    def _restored(cls, body: dict[str, Any], arrays: dict[str, NDArray[Any]] | None) -> WorldModel:
+    def _restored(cls, body: dict[str, Any], arrays: Mapping[str, NDArray[Any]] | None) -> WorldModel:
         """The model that a file's body and history stand for; `ModelFileError` unless all of it fits together."""
         try:
             parts = parts_from_json(body, arrays)
             restore_hindsight(parts, body.get("hindsight", {}))
+            restore_calibration(parts, body.get("calibration", {}))
             model = cls(parts.schema, parts.config, targets=())
             model._state, model.seen, model.frozen = parts, body["seen"], arrays is None
             model.extra, model.condition_names = body["extra"], dict(body.get("names", {}))

@@ -23,9 +23,11 @@ from relgym.numeric.stepwise import (
     MANY,
     LinearFit,
     eliminate_backward,
+    fitting_cells,
     least_squares,
     varying_columns,
 )
+from relgym.scheduling.work import CALL, Steps, resumable
 
 __all__ = ["Consensus", "consensus", "draw_samples", "refine"]
 
@@ -35,6 +37,10 @@ LOOSE = 100.0
 TIGHT, CLOSE = 4.0, 0.01
 """... but not so wide, where there is noise, that it tells nothing: no wider than this share of the responses' spread,
 unless a few standard deviations are."""
+
+
+BLOCK = 30_000
+"""So many numbers of samples are worked on at a time: they fit into the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +90,7 @@ def draw_samples(
     return np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
 
 
+@resumable
 def consensus(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -99,7 +106,7 @@ def consensus(
     anchors: NDArray[np.intp] | None = None,
     limit: int = 48,
     misfit: bool = False,
-) -> Consensus | None:
+) -> Steps[Consensus | None]:
     """The function with the largest consensus among random samples; None if no sample verified itself.
 
     Parameters
@@ -131,25 +138,33 @@ def consensus(
     loose = LOOSE if misfit else min(LOOSE, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
     columns = varying_columns(x)
     samples = draw_samples(n, size, draws, rng=rng, strata=strata, apart=apart, anchors=anchors)
-    chosen = _forward_batch(x[:, columns][samples], y[samples], terms=terms, sigma=sigma, loose=loose)
+    yield CALL + 2 * draws * n
+    chosen = yield from _forward_batch(x[:, columns], y, samples, terms=terms, sigma=sigma, loose=loose)
     best: Consensus | None = None
+    tried: set[tuple[tuple[int, ...], bytes]] = set()  # what is refined depends on columns and inliers alone
     for sample, picked in _distinct(samples, chosen, limit):
         fit = least_squares(x[sample], y[sample], tuple(int(columns[c]) for c in picked))
         found = Consensus(fit, np.abs(y - fit.predict(x)) <= loose * tolerance)
+        key = (fit.columns, found.inliers.tobytes())
         if best is None or (found.size, -found.fit.terms) > (best.size, -best.fit.terms):
-            best = refine(x, y, found, sigma=sigma, tolerance=tolerance)
+            if key not in tried:
+                tried.add(key)
+                best = yield from refine.steps(x, y, found, sigma=sigma, tolerance=tolerance)
+        yield CALL + n * len(picked)
     return best
 
 
+@resumable
 def refine(
     x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, *, sigma: float, tolerance: float
-) -> Consensus:
+) -> Steps[Consensus]:
     """Refit on the inliers, drop needless terms and count again until nothing changes; at most 8 rounds."""
     for round_ in range(8):
         if found.size <= len(found.fit.columns) + 1:
             return Consensus(found.fit, np.zeros(len(y), dtype=bool))
         fit = least_squares(x[found.inliers], y[found.inliers], found.fit.columns)
-        fit = eliminate_backward(x[found.inliers], y[found.inliers], fit, sigma=sigma)
+        yield fitting_cells(found.size, fit.terms)
+        fit = yield from eliminate_backward.steps(x[found.inliers], y[found.inliers], fit, sigma=sigma)
         inliers = np.abs(y - fit.predict(x)) <= tolerance
         same = bool((inliers == found.inliers).all())
         found = Consensus(fit, inliers)
@@ -159,16 +174,29 @@ def refine(
 
 
 def _forward_batch(
-    a: NDArray[np.float64], y: NDArray[np.float64], *, terms: int, sigma: float, loose: float
-) -> NDArray[np.intp]:
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    samples: NDArray[np.intp],
+    *,
+    terms: int,
+    sigma: float,
+    loose: float,
+) -> Steps[NDArray[np.intp]]:
     """Columns chosen for each sample, ``(draws, terms)``: -1 where none, -2 in front if not verified."""
-    a = a - a.mean(axis=1, keepdims=True)
-    residual = y - y.mean(axis=1, keepdims=True)
-    enough = a.shape[1] * (loose * sigma) ** 2
-    choose = _choose_among_many if a.shape[2] > MANY else _choose
-    chosen, left = choose(a, residual, terms, sigma, enough)
-    chosen[left > enough, 0] = -2
-    return chosen
+    draws, size = samples.shape
+    enough = size * (loose * sigma) ** 2
+    choose = _choose_among_many if x.shape[1] > MANY else _choose
+    every = np.empty((draws, max(terms, 1)), dtype=np.intp)
+    block = max(16, BLOCK // max(1, size * x.shape[1]))
+    for begin in range(0, draws, block):
+        part = samples[begin : begin + block]
+        a, b = x[part], y[part]
+        a -= a.mean(axis=1, keepdims=True)
+        chosen, left = choose(a, b - b.mean(axis=1, keepdims=True), terms, sigma, enough)
+        chosen[left > enough, 0] = -2
+        every[begin : begin + block] = chosen
+        yield CALL + 4 * a.size * max(terms, 1)
+    return every
 
 
 def _choose(

@@ -12,14 +12,18 @@ thread counts.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.scheduling.work import CALL, Steps, resumable
+
 __all__ = [
     "LinearFit",
     "eliminate_backward",
+    "fitting_cells",
     "forward_order",
     "forward_stepwise",
     "least_squares",
@@ -93,16 +97,22 @@ def least_squares(
     -----
     Cost O(n p^2) for p columns.
     """
-    centre = x[:, list(columns)].mean(axis=0) if intercept else np.zeros(len(columns))
-    a = x[:, list(columns)] - centre
+    a = x[:, list(columns)]
+    centre = a.mean(axis=0) if intercept else np.zeros(len(columns))
+    a = a - centre
     shift = float(y.mean()) if intercept else 0.0
-    factors = _factors(a)
-    weights = factors.solve(y - shift)
-    weights += factors.solve((y - shift) - _combine(a, weights))
+    factors, rest = _factors(a), y - shift
+    weights = factors.solve(rest)
+    weights += factors.solve(rest - _combine(a, weights))
     constant = shift - float((centre * weights).sum()) if intercept else 0.0
-    kept = [k for k in np.argsort(columns, kind="stable") if weights[k] != 0.0]
+    kept = [k for k in sorted(range(len(columns)), key=columns.__getitem__) if weights[k] != 0.0]
     fit = LinearFit(tuple(columns[k] for k in kept), tuple(float(weights[k]) for k in kept), constant, 0.0)
     return LinearFit(fit.columns, fit.weights, constant, float(np.square(y - fit.predict(x)).sum()))
+
+
+def fitting_cells(rows: int, terms: int) -> int:
+    """What `least_squares` of so many rows and terms costs, in cells: each term is taken out of all others, twice."""
+    return CALL + terms * (CALL // 4 + 4 * rows * (terms + 1))
 
 
 def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -112,20 +122,26 @@ def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np
 
 @dataclass(frozen=True, slots=True)
 class _Factors:
-    """Orthonormal directions (None for columns collinear with earlier ones), and the triangle that leads back."""
+    """Orthonormal directions, shape ``(p, n)``, zero for columns collinear with earlier ones, and the triangle back."""
 
-    q: list[NDArray[np.float64] | None]
+    q: NDArray[np.float64]
     r: NDArray[np.float64]
+
+    @property
+    def independent(self) -> bool:
+        """Whether no column is collinear with earlier ones."""
+        return bool(self.r.diagonal().all())
 
     def solve(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights of the least-squares solution; exactly zero for columns collinear with earlier ones."""
-        p = len(self.q)
-        weights = np.zeros(p)
-        for k, own in reversed(list(enumerate(self.q))):
-            if own is not None:
-                rest = sum(self.r[k, j] * weights[j] for j in range(k + 1, p) if self.q[j] is not None)
-                weights[k] = (float((own * y).sum()) - rest) / self.r[k, k]
-        return weights
+        r, parts = self.r.tolist(), (self.q * y).sum(axis=1).tolist()
+        weights = [0.0] * len(parts)
+        for k in reversed(range(len(parts))):
+            row = r[k]
+            if row[k]:
+                rest = sum(row[j] * weights[j] for j in range(k + 1, len(parts)) if weights[j])
+                weights[k] = (parts[k] - rest) / row[k]
+        return np.array(weights)
 
     def shares(self) -> NDArray[np.float64]:
         """Square of what of each column all others don't reproduce, shape ``(p,)``; no column may be collinear."""
@@ -139,26 +155,38 @@ class _Factors:
 
 
 def _factors(a: NDArray[np.float64]) -> _Factors:
-    """Gram-Schmidt, column by column, twice."""
-    p = a.shape[1]
-    q: list[NDArray[np.float64] | None] = []
-    r = np.zeros((p, p))
+    """Gram-Schmidt, column by column against all before it at once, twice.
+
+    Twice is enough for orthogonality to rounding, with the directions taken one by one or all at once [1]_.
+
+    References
+    ----------
+    .. [1] L. Giraud, J. Langou, M. Rozloznik, J. van den Eshof, "Rounding error analysis of the classical
+       Gram-Schmidt orthogonalization process", Numerische Mathematik 101 (2005).
+    """
+    columns = np.array(a.T, order="C")  # a copy, worked on in place
+    p, n = columns.shape
+    q, r = np.zeros((p, n)), np.zeros((p, p))
     for k in range(p):
-        column = a[:, k].copy()
-        size = float(np.sqrt(np.square(column).sum()))
-        for _ in range(2):  # twice is enough for orthogonality to rounding
-            for j, other in enumerate(q):
-                if other is not None:
-                    part = float((other * column).sum())
-                    r[j, k] += part
-                    column -= part * other
-        norm = float(np.sqrt(np.square(column).sum()))
-        independent = norm > PIVOT * size
-        q.append(column / norm if independent else None)
-        r[k, k] = norm if independent else 0.0
+        column = columns[k]
+        size = _length(column)
+        if k:
+            for _ in range(2):
+                parts = (q[:k] * column).sum(axis=1)
+                r[:k, k] += parts
+                column -= (q[:k] * parts[:, None]).sum(axis=0)
+        left = _length(column)
+        if left > PIVOT * size:
+            np.divide(column, left, out=q[k])
+            r[k, k] = left
     return _Factors(q, r)
 
 
+def _length(column: NDArray[np.float64]) -> float:
+    return math.sqrt(float(np.square(column).sum()))
+
+
+@resumable
 def forward_stepwise(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
@@ -166,7 +194,7 @@ def forward_stepwise(
     sigma: float,
     max_terms: int | None = None,
     eliminate: bool = True,
-) -> LinearFit:
+) -> Steps[LinearFit]:
     """Forward-stepwise regression with Mallows's Cp (Algorithm 1), then backward elimination.
 
     Each round adds the column that lowers ``Cp = RSS / sigma^2 - n + 2 (p + 1)`` most; columns that do
@@ -188,13 +216,18 @@ def forward_stepwise(
     -----
     Cost O(n d p) for p chosen columns.
     """
-    fit = least_squares(x, y, forward_order(x, y, sigma=sigma, max_terms=max_terms))
-    return eliminate_backward(x, y, fit, sigma=sigma) if eliminate else fit
+    order = yield from forward_order.steps(x, y, sigma=sigma, max_terms=max_terms)
+    fit = least_squares(x, y, order)
+    yield fitting_cells(len(y), fit.terms)
+    if eliminate:
+        fit = yield from eliminate_backward.steps(x, y, fit, sigma=sigma)
+    return fit
 
 
+@resumable
 def forward_order(
     x: NDArray[np.float64], y: NDArray[np.float64], *, sigma: float, max_terms: int | None = None
-) -> tuple[int, ...]:
+) -> Steps[tuple[int, ...]]:
     """Columns in the order in which `forward_stepwise` adds them; the first k are what it finds with k at most.
 
     Parameters and cost as of `forward_stepwise`.
@@ -204,11 +237,13 @@ def forward_order(
     candidates = varying_columns(x) if n else np.empty(0, dtype=np.intp)
     a = x[:, candidates] - x[:, candidates].mean(axis=0) if len(candidates) else np.empty((n, 0))
     choose = _choose_among_many if len(candidates) > MANY else _choose
-    chosen = choose(a, y - y.mean(), sigma, limit) if n else []
+    chosen = (yield from choose(a, y - y.mean(), sigma, limit)) if n else []
     return tuple(int(candidates[c]) for c in chosen)
 
 
-def _choose(a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int) -> list[int]:
+def _choose(
+    a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int
+) -> Steps[list[int]]:
     """Centred columns in the order in which they lower Cp most; what is chosen is swept out of all others."""
     sizes, chosen = np.square(a).sum(axis=0), list[int]()
     while len(chosen) < limit:
@@ -224,12 +259,13 @@ def _choose(a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float,
         residual = residual - (q * residual).sum() * q
         a -= q[:, None] * (q[:, None] * a).sum(axis=0)
         a[:, best] = 0.0
+        yield CALL + 4 * a.size
     return chosen
 
 
 def _choose_among_many(
     a: NDArray[np.float64], residual: NDArray[np.float64], sigma: float, limit: int
-) -> list[int]:
+) -> Steps[list[int]]:
     """The same at a fraction of the cost: only what is left of the columns' squares is kept up to date.
 
     That is less exact for columns that are nearly collinear with the chosen ones, hence `COARSE`.
@@ -251,6 +287,7 @@ def _choose_among_many(
         residual = residual - (basis[-1] * residual).sum() * basis[-1]
         pivots -= np.square(np.einsum("i,ij->j", basis[-1], a))
         pivots[best] = 0.0
+        yield CALL + a.size
     return chosen
 
 
@@ -263,9 +300,10 @@ def _first_of_the_best(gains: NDArray[np.float64], rows: int, sigma: float) -> i
     return int(np.argmax(gains >= max(least, 2.0 * sigma**2)))
 
 
+@resumable
 def eliminate_backward(
     x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, *, sigma: float
-) -> LinearFit:
+) -> Steps[LinearFit]:
     """Drop terms, the constant included, as long as that raises Cp by less than it saves.
 
     Later columns are tried first, so that of two interchangeable ones the earlier stays.
@@ -275,6 +313,7 @@ def eliminate_backward(
         smaller = [_without(x, y, fit, k) for k in _needless(x, fit, 4.0 * allowed + fit.rss)]
         if fit.intercept != 0.0:
             smaller.append(least_squares(x, y, fit.columns, intercept=False))
+        yield (1 + len(smaller)) * fitting_cells(len(y), fit.terms)
         smaller = [s for s in smaller if s.rss <= fit.rss + allowed and s.terms < fit.terms]
         if not smaller:
             return fit
@@ -286,7 +325,7 @@ def _needless(x: NDArray[np.float64], fit: LinearFit, allowed: float) -> list[in
     """Terms without which the residuals' squares may grow by no more than so much; the others needn't be tried."""
     a = x[:, list(fit.columns)]
     factors = _factors(a - a.mean(axis=0) if fit.intercept != 0.0 else a)
-    if any(own is None for own in factors.q):
+    if not factors.independent:
         return list(range(len(fit.columns)))
     growth = np.square(np.array(fit.weights)) * factors.shares()
     return [int(k) for k in np.flatnonzero(growth <= allowed)]

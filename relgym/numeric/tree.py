@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
+from relgym.scheduling.work import CALL, Steps, resumable
 
 __all__ = ["DecisionTree", "learn_tree"]
 
@@ -133,6 +134,7 @@ class DecisionTree:
         return cls(**{name: tuple(data[name]) for name in cls.__slots__})
 
 
+@resumable
 def learn_tree(
     x: _Float2D,
     positive: NDArray[np.bool_],
@@ -142,7 +144,7 @@ def learn_tree(
     min_leaf: int = 3,
     max_depth: int = 6,
     prune: bool = True,
-) -> DecisionTree:
+) -> Steps[DecisionTree]:
     """Learn a tree that tells positive from negative examples.
 
     Parameters
@@ -181,7 +183,7 @@ def learn_tree(
             f"got x of shape {x.shape}, {len(positive)} classes, {len(weights)} weights, {len(names)} names"
         )
     grower = _Grower(x, np.asarray(positive, dtype=np.bool_), weights, min_leaf, max_depth)
-    root = grower.grow(np.arange(len(x)), 0)
+    root = yield from grower.grow(np.arange(len(x)), 0)
     if prune:
         root, _ = _pruned(root, x.shape[1])
     nodes: list[_Node] = []
@@ -196,6 +198,10 @@ def learn_tree(
         tuple(node.positive for node in nodes),
         tuple(node.negative for node in nodes),
     )
+
+
+CUT = 30
+"""What a row costs where a column is cut, in cells: it is sorted, and summed up before and behind it."""
 
 
 @dataclass(slots=True)
@@ -216,18 +222,20 @@ class _Grower:
     min_leaf: int
     max_depth: int
 
-    def grow(self, rows: NDArray[np.intp], depth: int) -> _Node:
+    def grow(self, rows: NDArray[np.intp], depth: int) -> Steps[_Node]:
         weights, classes = self.weights[rows], self.positive[rows]
         node = _Node(float(weights[classes].sum()), float(weights[~classes].sum()))
         if depth == self.max_depth or not (classes.any() and not classes.all()):
             return node
         best, cuts = self._best_split(rows)
+        yield self.x.shape[1] * (CALL + CUT * len(rows))
         if best is None:
             return node
         _, _, node.column, node.threshold = best
         node.cuts = cuts
         below = self.x[rows, node.column] <= node.threshold
-        node.children = self.grow(rows[below], depth + 1), self.grow(rows[~below], depth + 1)
+        lower = yield from self.grow(rows[below], depth + 1)
+        node.children = lower, (yield from self.grow(rows[~below], depth + 1))
         return node
 
     def _best_split(self, rows: NDArray[np.intp]) -> tuple[tuple[float, float, int, float] | None, int]:

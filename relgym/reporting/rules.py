@@ -241,6 +241,33 @@ class PropertyRules:
             lines += ["", f"  advice: {first}", *(f"    | {line}" for line in rest)]
         return "\n".join(lines)
 
+    def plain(self, digits: int = 7) -> dict[str, Any]:
+        """The list as dicts, lists and texts: conditions and functions as they are printed, numbers as numbers."""
+        return {
+            "property": self.target,
+            "steps": self.steps,
+            "unexplained": self.unexplained,
+            "doubt": self.doubt,
+            "advice": self.advice,
+            "branches": [
+                {
+                    "if": branch.text if branch.cases else None,
+                    "name": branch.name,
+                    "value": None if branch.function is None else branch.function.text(digits),
+                    "reason": branch.reason,
+                    "steps": branch.steps,
+                    "spread": branch.spread,
+                }
+                for branch in self.branches
+            ],
+            "bounds": [bound_text(bound, digits=digits).removeprefix("then ") for bound in self.bounds],
+            "roles": [
+                {"names": [*role.labels], "type": role.type, "if": [*map(condition_text, role.alternatives)]}
+                for role in self.roles
+            ],
+            "situations": None if self.experience is None else len(self.experience.seen),
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class Derivation:
@@ -362,6 +389,28 @@ class RuleList:
             parts.append("\n".join([SEEN, *(line for p in seen for line in _seen_lines(p))]))
         legend = self._legend()
         return "\n\n".join([*parts, legend] if legend else parts)
+
+    def plain(self, digits: int = 7) -> dict[str, Any]:
+        """What `text` prints as dicts, lists and texts, ready for JSON.
+
+        Parameters
+        ----------
+        digits
+            Significant digits of the coefficients of functions.
+
+        Returns
+        -------
+        ``transitions``, ``objects`` (the fewest and the most of each type in training), ``agreement``, ``motion`` (laws
+        as sentences, a text or None), ``properties`` (a dict each: `PropertyRules.plain`) and ``kinematics``.
+        """
+        return {
+            "transitions": self.transitions,
+            "objects": {name: [least, most] for name, least, most in self.scope},
+            "agreement": self.agreement,
+            "motion": None if self.motion is None else self.motion.text(digits),
+            "properties": [part.plain(digits) for part in self.properties],
+            "kinematics": [*map(str, self.kinematics)],
+        }
 
     def _repr_html_(self) -> str:
         import html

@@ -14,7 +14,9 @@ from relgym.scene.shapes import Sphere
 
 __all__ = ["check_sizes"]
 
-_Plan: TypeAlias = tuple[Axes, Bodies, NDArray[np.intp], NDArray[np.float64], NDArray[np.intp]]
+_Plan: TypeAlias = tuple[
+    Axes, Bodies, NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]
+]
 
 
 def check_sizes(scene: Scene) -> None:
@@ -22,10 +24,14 @@ def check_sizes(scene: Scene) -> None:
 
     Cost O(bodies), some microseconds.
     """
-    axes, bodies, columns, constants, spheres = _plan(scene)
+    axes, bodies, columns, constants, spheres, scaled = _plan(scene)
+    fine = f"_sizes-fine-{scene.schema.up}-{scene.schema.planar}"
     if len(bodies.names):
-        padded = np.concatenate([scene.vector, constants])
-        check_extents(bodies, axes, padded[columns][:, :, None], spheres)
+        sizes = scene.vector[scaled]
+        if sizes.tobytes() != scene.layout.__dict__.get(fine):
+            padded = np.concatenate([scene.vector, constants])
+            check_extents(bodies, axes, padded[columns][:, :, None], spheres)
+            scene.layout.__dict__[fine] = sizes.tobytes()  # sizes rarely change
 
 
 def _plan(scene: Scene) -> _Plan:
@@ -37,5 +43,14 @@ def _plan(scene: Scene) -> _Plan:
         shapes = tuple(shape for i in layout.bodies if (shape := layout.types[i].shape) is not None)
         spheres = np.flatnonzero([isinstance(shape, Sphere) for shape in shapes])
         bodies = Bodies(tuple(layout.names[i] for i in layout.bodies), shapes)
-        known = layout.__dict__[key] = (Axes.of(scene.schema), bodies, columns.T.copy(), constants, spheres)
+        extents = columns[:, 6:9]
+        scaled = np.unique(extents[extents < layout.width])
+        known = layout.__dict__[key] = (
+            Axes.of(scene.schema),
+            bodies,
+            columns.T.copy(),
+            constants,
+            spheres,
+            scaled,
+        )
     return known

@@ -145,9 +145,11 @@ def test_budget_is_spent_on_the_most_contradicted_pair_first() -> None:
         classifier.observe(item.example, item.mode, item.fits[:3], item.values[:3])
     assert len(classifier.stale) == 3
     most = classifier.stale[0]
-    spent = classifier.refresh(budget=1)
-    assert spent > 1
-    assert most not in classifier.stale
+    calls = 0
+    while most in classifier.stale:  # a piece at a time, whatever it costs
+        assert classifier.refresh(budget=1) > 1
+        calls += 1
+    assert calls > 1
     assert len(classifier.stale) == 2
     assert classifier.refresh() > 0
     assert classifier.stale == ()

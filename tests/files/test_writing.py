@@ -29,6 +29,22 @@ for k in range(100_000):
     write_whole(path, bytes([65 + k % 26]) * size, error=ModelFileError)
 """
 
+MANY_WRITERS = """
+import os, sys
+from relgym.errors import ModelFileError
+from relgym.files.writing import write_whole
+path, size = sys.argv[1], int(sys.argv[2])
+for line in sys.stdin:
+    child = os.fork()
+    if not child:
+        print(os.getpid(), flush=True)
+        for k in range(100_000):
+            write_whole(path, bytes([65 + k % 26]) * size, error=ModelFileError)
+    os.waitpid(child, 0)
+    print("dead", flush=True)
+"""
+"""Starts a writer for every line that it reads, and tells when that has ended; each has what it needs in memory."""
+
 
 def write(path: Path, data: bytes = b"new") -> None:
     write_whole(path, data, error=ModelFileError)
@@ -185,18 +201,18 @@ def test_leftovers_of_the_dead_are_removed_and_those_of_the_living_are_not(tmp_p
 def kill_while_writing(path: Path, kills: int, size: int = 3_000_000) -> int:
     """Kill writers at random moments; how many kills left a temporary file. Raises where a file is broken."""
     left = 0
-    for k in range(kills):
-        with subprocess.Popen(
-            [sys.executable, "-c", WRITER, path, str(size)], stdout=subprocess.PIPE
-        ) as writer:
-            assert writer.stdout is not None
-            writer.stdout.readline()
+    command = [sys.executable, "-c", MANY_WRITERS, str(path), str(size)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as writers:
+        assert writers.stdin is not None and writers.stdout is not None
+        for k in range(kills):
+            print(flush=True, file=writers.stdin)
+            writer = int(writers.stdout.readline())
             time.sleep(0.0007 * (k % 60))
-            writer.kill()
-            writer.wait()
-        left += len(names(path.parent)) > 1
-        found = path.read_bytes() if path.exists() else b"A" * size
-        assert len(found) == size and found == found[:1] * size
+            os.kill(writer, signal.SIGKILL)
+            assert writers.stdout.readline() == "dead\n"
+            left += len(names(path.parent)) > 1
+            found = path.read_bytes() if path.exists() else b"A" * size
+            assert len(found) == size and found == found[:1] * size
     return left
 
 
@@ -209,7 +225,9 @@ def test_a_kill_leaves_a_whole_file(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_thousand_kills_leave_a_whole_file(tmp_path: Path) -> None:
-    assert kill_while_writing(tmp_path / "file", 1_000) > 50, "kills hit no writer at work"
+    left = kill_while_writing(tmp_path / "file", 1_000)
+    print(f"{left} of 1,000 kills left a temporary file")
+    assert left > 50, "kills hit no writer at work"
     write(tmp_path / "file")
     assert names(tmp_path) == ["file"]
 

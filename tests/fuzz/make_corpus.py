@@ -1,12 +1,16 @@
-"""Make the corpus' files of small worlds anew: ``python tests/fuzz/make_corpus.py``.
+"""Make the corpus' files of small worlds anew: ``python tests/fuzz/make_corpus.py [name ...]``.
 
 Between them they hold what the files of other people's worlds don't: walls at work, scopes and guesses, roles with
-descriptions, masses that share an impulse, spin, and laws with grips. Beside each lie some more steps of its world.
+descriptions, masses that share an impulse, spin, and laws with grips; views of tables, of agents and of angles, with
+tasks; and a reward model. Beside each lie some more steps of its world.
 """
 
 from __future__ import annotations
 
+import json
 import sys
+from collections import Counter
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,15 +19,24 @@ import numpy as np
 sys.path[:0] = [str(Path(__file__).parents[1] / "support")]
 
 import points  # noqa: E402
+from dreams import recorded  # noqa: E402
+from file_fuzzing import spied  # noqa: E402
+from gymnasium import spaces  # noqa: E402
+from plain_envs import Birds, Wheel  # noqa: E402
+from runners import Runners  # noqa: E402
 from worlds import line, schema_of, transitions  # noqa: E402
 
-from relgym.config import ClassificationConfig, ModelConfig  # noqa: E402
+from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig  # noqa: E402
+from relgym.envs import AgentsEnv  # noqa: E402
+from relgym.envs.views import AgentsView, NumbersView, Static, TableView  # noqa: E402
 from relgym.experiments.law_motion import episode  # noqa: E402
 from relgym.experiments.law_worlds import Ball, Material, World  # noqa: E402
 from relgym.files.reading import write_arrays  # noqa: E402
 from relgym.model.world_model import WorldModel  # noqa: E402
-from relgym.scene.objects import Scene, Transition  # noqa: E402
+from relgym.scene.objects import ACTION, Scene, Transition  # noqa: E402
 from relgym.scene.schema import SceneSchema  # noqa: E402
+from relgym.wrappers import ModelLearner  # noqa: E402
+from relgym.wrappers.sb3.reward_models import LearnedRewardModel  # noqa: E402
 
 FOLDER = Path(__file__).parent / "corpus"
 SMALL = ModelConfig(
@@ -32,6 +45,7 @@ SMALL = ModelConfig(
         exemplars_per_state=2, noise_per_state=5, max_exemplars=100, exemplars_alone=20
     ),
 )
+SMALL_TASK = replace(SMALL, frames="world", clustering=ClusteringConfig(min_examples=4))
 KEPT = 24
 
 
@@ -86,8 +100,61 @@ def _steps(schema: SceneSchema, vectors: np.ndarray) -> list[Transition]:
     return [Transition(a, b) for a, b in pairwise(scenes)]
 
 
-def main() -> None:
-    """Write all files."""
+def birds() -> ModelLearner:
+    """A table whose rows are objects that come and go, matched from one step to the next."""
+    env = Birds(arrivals=True)
+    columns = ("here", "x", "d")
+    view = TableView(
+        env.observation_space, env.action_space, columns=columns, presence="here", match={"x": 1.0}
+    )
+    return ModelLearner(env, view=view, config=SMALL, learn_reward=True)
+
+
+def runners() -> ModelLearner:
+    """Agents of two kinds, each with its own action."""
+    env = AgentsEnv(Runners(2))
+    view = AgentsView(env.observation_space, env.action_space)
+    return ModelLearner(env, view=view, config=SMALL, learn_termination=True)
+
+
+def wheel() -> ModelLearner:
+    """An angle that is observed as its cosine and sine, and a post that is never observed."""
+    env = Wheel()
+    static = (Static("post", {"height": 1.0}),)
+    view = NumbersView(env.observation_space, env.action_space, angles=(("x0", "x1"),), static=static)
+    return ModelLearner(env, view=view, config=SMALL)
+
+
+def watched(learner: ModelLearner, episodes: int, length: int) -> tuple[WorldModel, list[Transition]]:
+    """A model with all that is known of its env, and the steps it learned from."""
+    learner.action_space.seed(0)
+    with spied() as steps:
+        for seed in range(episodes):
+            learner.reset(seed=seed)
+            for _ in range(length):
+                *_, terminated, truncated, _ = learner.step(learner.action_space.sample())
+                if terminated or truncated:
+                    break
+    objects = Counter((s.before.layout.names, s.after.layout.names) for s in steps).most_common(1)[0][0]
+    learner.save(FOLDER / "saved.relgym")  # puts what is known of the env beside the model
+    (FOLDER / "saved.relgym").unlink()
+    return learner.model, [s for s in steps if (s.before.layout.names, s.after.layout.names) == objects]
+
+
+def pay() -> tuple[LearnedRewardModel, list[Transition]]:
+    """What pushing the puck is paid, and where that ends; the steps are those of its own model."""
+    steps = puck(300)
+    schema = steps[0].before.schema
+    model = LearnedRewardModel(schema, {("self", "x"), ("self", "v")}, SMALL_TASK)
+    with spied() as lessons:
+        for step in steps:
+            x = step.after["self"]["x"]
+            model.learn_step(step, 1.0 if x >= 1.9 else -x, terminated=x >= 1.9)
+    return model, lessons
+
+
+def main(names: set[str]) -> None:
+    """Write the files of these names, or all."""
     FOLDER.mkdir(exist_ok=True)
     guessing = ModelConfig(features=("trig(x)",), history=400, classification=SMALL.classification)
     plans = {
@@ -97,17 +164,39 @@ def main() -> None:
         "discs": (discs(300), SMALL),
     }
     for name, (steps, config) in plans.items():
-        model = WorldModel(steps[0].before.schema, config)
-        for step in steps[:-KEPT]:
-            model.learn_one(step)
-        model.finish()
-        model.save(FOLDER / f"{name}.relgym", history=True)
-        model.save(FOLDER / f"{name}-frozen.relgym")
-        scenes = {"before": [s.before for s in steps[-KEPT:]], "after": [s.after for s in steps[-KEPT:]]}
-        arrays = {side: np.stack([scene.vector for scene in those]) for side, those in scenes.items()}
-        (FOLDER / f"{name}.npz").write_bytes(write_arrays(arrays))
-        print(model, model.governed)
+        if name in names or not names:
+            model = WorldModel(steps[0].before.schema, config)
+            for step in steps[:-KEPT]:
+                model.learn_one(step)
+            pushed = spaces.Box(-1.0, 1.0, (1,), np.float64) if ACTION in model.schema.order else None
+            keep(name, recorded(model, [step.before for step in steps[:4]], pushed), steps)
+    for name, learner in {"birds": birds(), "runners": runners(), "wheel": wheel()}.items():
+        if name in names or not names:
+            keep(name, *watched(learner, 12, 15))
+    if "pay" in names or not names:
+        paying, steps = pay()
+        paying.save(FOLDER / "pay.relgym")
+        keep_steps("pay", steps)
+        print(paying.model)
+
+
+def keep(name: str, model: WorldModel, steps: list[Transition]) -> None:
+    """Write a model with and without its history, and the last steps."""
+    model.finish()
+    model.save(FOLDER / f"{name}.relgym", history=True)
+    model.save(FOLDER / f"{name}-frozen.relgym")
+    keep_steps(name, steps)
+    print(model, model.governed)
+
+
+def keep_steps(name: str, steps: list[Transition]) -> None:
+    """Write the last steps, and which objects are there."""
+    scenes = {"before": [s.before for s in steps[-KEPT:]], "after": [s.after for s in steps[-KEPT:]]}
+    arrays = {side: np.stack([scene.vector for scene in those]) for side, those in scenes.items()}
+    names = {side: list(those[0].layout.names) for side, those in scenes.items()}
+    arrays["names"] = np.frombuffer(json.dumps(names).encode(), dtype=np.uint8)
+    (FOLDER / f"{name}.npz").write_bytes(write_arrays(arrays))
 
 
 if __name__ == "__main__":
-    main()
+    main(set(sys.argv[1:]))

@@ -215,7 +215,7 @@ def test_no_features_are_recommended_that_the_law_does_not_use(monkeypatch: pyte
     assert advice.features == ("trig",)
     bare = lambda *args: _Trial(args[-1], 0.0001, "v' = v + action.a", 15, bare=True)  # noqa: E731
     monkeypatch.setattr("relgym.model.advice._try", bare)
-    assert model.advice() == ()
+    assert learned(SCHEMA, drift(400)).advice() == ()
 
 
 def test_what_is_tried_knows_whether_its_law_needs_features() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-import copy
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from relgym.errors import ModelFileError
+from relgym.files import reading
 from relgym.files.reading import FileLimits
 from relgym.model.storage import read_model, write_model
 from relgym.model.world_model import WorldModel
@@ -25,7 +26,8 @@ Change = Callable[[dict[str, Any], dict[str, Any]], object]
 
 def changed(name: str, change: Change, path: Path) -> Path:
     """A file whose content was changed, with the checksum that goes with that."""
-    body, arrays = copy.deepcopy(read_model(FILES / f"{name}.relgym"))
+    body, stored = read_model(FILES / f"{name}.relgym")
+    arrays = None if stored is None else dict(stored)
     change(body, arrays or {})
     write_model(path, body, arrays)
     return path
@@ -48,8 +50,9 @@ def test_files_of_version_1_are_read_and_saved_as_version_2(name: str, tmp_path:
 def test_the_checksum_covers_the_history(tmp_path: Path) -> None:
     from relgym.files.reading import read_members, write_arrays, write_members
 
-    body, arrays = read_model(FILES / "mountain-car-history.relgym")
-    assert arrays is not None
+    body, stored = read_model(FILES / "mountain-car-history.relgym")
+    assert stored is not None
+    arrays = dict(stored)
     write_model(tmp_path / "file", body, arrays)
     members = read_members((tmp_path / "file").read_bytes(), ("model.json", "history.npz"))
     arrays["target0.y"][0] += 1.0
@@ -120,7 +123,18 @@ DAMAGES: dict[str, tuple[str, Change, str]] = {
     ),
     "a configuration out of range": ("truck", lambda b, a: b["config"].update(history=1), "history must be at least"),
     "a search for ever": (
-        "truck", lambda b, a: b["config"]["clustering"].update(draws=10**9), "expected draws of at most"
+        "truck", lambda b, a: b["config"]["clustering"].update(draws=10**9), "draws must be at most 100,000"
+    ),
+    "a noise of zero": ("truck", lambda b, a: _target(b)["clusterer"].update(sigma=0.0), "sigma"),
+    "a noise whose square overflows": (
+        "truck", lambda b, a: _target(b)["clusterer"].update(rounding=1e200), "rounding"
+    ),
+    "rules that leave a target out": (
+        "truck", lambda b, a: b.update(report={"rules": "Learned from 9 transitions."}), "expected rules of"
+    ),
+    "laws without a tolerance": ("ball-laws", lambda b, a: b["laws"]["laws"].update(tolerance=0.0), "tolerance"),
+    "a number in the history that is no size": (
+        "truck-history", lambda b, a: a["table0.x"].__setitem__((0, 0), 1e200), "at most 1e"
     ),
     "an unknown type": ("truck", lambda b, a: b["schema"]["objects"][0].__setitem__(1, "cow"), "unknown type 'cow'"),
     "a shape without a surface": (
@@ -241,3 +255,36 @@ def test_what_does_not_fit_is_named(name: str, tmp_path: Path) -> None:
     path = tmp_path / "model"
     with pytest.raises(ModelFileError, match=match):
         WorldModel.load(changed(file, change, path))
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "said"),
+    [
+        ("table0.x", (20_000, 3), "expected float64 of shape"),
+        ("table0.serial", (20_000,), "expected int64 of shape"),
+        ("target0.y", (20_000,), "as many as there are rows"),
+        ("target0.forgotten", (20_000, 2), "more than modes"),
+    ],
+)
+def test_arrays_that_can_not_fit_are_refused_by_their_headers(
+    name: str, shape: tuple[int, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def more(body: dict[str, Any], arrays: dict[str, Any]) -> None:
+        arrays[name] = np.zeros(shape, dtype=arrays[name].dtype)
+
+    path = changed("truck-history", more, tmp_path / "model")
+    monkeypatch.setattr(reading, "_array", lambda *_: pytest.fail("room was made for an array"))
+    with pytest.raises(ModelFileError, match=said):
+        WorldModel.load(path)
+
+
+def test_a_number_of_the_next_mode_needs_no_memory(tmp_path: Path) -> None:
+    path = changed(
+        "truck-history",
+        lambda b, a: _target(b)["clusterer"].update(next_id=2**31 - 1),
+        tmp_path / "model",
+    )
+    tracemalloc.start()
+    assert WorldModel.load(path).describe(details=True)
+    assert tracemalloc.get_traced_memory()[1] < 100 << 20
+    tracemalloc.stop()

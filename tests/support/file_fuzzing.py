@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import random
 import signal
 import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from file_mutations import Arrays, Mutator
+from numpy.typing import NDArray
 
 from relgym.envs.learned_model import LearnedModelEnv
 from relgym.errors import RelgymError
@@ -24,8 +26,9 @@ from relgym.model.storage import read_model, write_model
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers import ModelLearner
+from relgym.wrappers.sb3.reward_models import LearnedRewardModel
 
-__all__ = ["CORPUS", "Finding", "Fuzzer", "Tally", "worlds"]
+__all__ = ["CORPUS", "Finding", "Fuzzer", "Tally", "spied", "worlds"]
 
 CORPUS = Path(__file__).parent.parent / "model" / "files" / "v1"
 """Files of version 1, of four worlds."""
@@ -73,7 +76,9 @@ def worlds() -> dict[str, list[Transition]]:
     }
 
 
-def _steps(env: gym.Env[Any, Any], **options: Any) -> list[Transition]:
+@contextlib.contextmanager
+def spied() -> Iterator[list[Transition]]:
+    """The transitions that models learn from meanwhile."""
     seen: list[Transition] = []
     learn_one = WorldModel.learn_one
 
@@ -83,6 +88,13 @@ def _steps(env: gym.Env[Any, Any], **options: Any) -> list[Transition]:
 
     WorldModel.learn_one = spying  # type: ignore[method-assign]
     try:
+        yield seen
+    finally:
+        WorldModel.learn_one = learn_one  # type: ignore[method-assign]
+
+
+def _steps(env: gym.Env[Any, Any], **options: Any) -> list[Transition]:
+    with spied() as seen:
         learner = ModelLearner(env, **options)
         learner.action_space.seed(1)
         learner.reset(seed=1)
@@ -90,8 +102,6 @@ def _steps(env: gym.Env[Any, Any], **options: Any) -> list[Transition]:
             *_, terminated, truncated, _ = learner.step(learner.action_space.sample())
             if terminated or truncated:
                 learner.reset()
-    finally:
-        WorldModel.learn_one = learn_one  # type: ignore[method-assign]
     return seen
 
 
@@ -110,7 +120,7 @@ class Fuzzer:
         self.folder, self.seed = folder, seed
         self.steps = worlds() | {path.stem: _kept(path) for path in sorted(SMALL.glob("*.npz"))}
         paths = [path for corpus in (CORPUS, SMALL) for path in sorted(corpus.glob("*.relgym"))]
-        self.files = {path.stem: read_model(path) for path in paths}
+        self.files = {path.stem: _content(path) for path in paths}
         self._mutators: dict[str, Mutator] = {}
 
     def case(self, number: int) -> tuple[str, dict[str, Any], Arrays | None]:
@@ -142,7 +152,8 @@ class Fuzzer:
         """Try one case."""
         self._try(number, *self.case(number), tally)
 
-    def _try(self, number: int, name: str, body: dict[str, Any], arrays: Arrays | None, tally: Tally) -> None:
+    def _try(self, number: int, name: str, body: dict[str, Any], given: Arrays | None, tally: Tally) -> None:
+        arrays: Mapping[str, NDArray[Any]] | None = given
         path = self.folder / "case.relgym"
         stage = ["write"]
         began = time.process_time()
@@ -194,6 +205,31 @@ class Fuzzer:
         model.save(path, history=not model.frozen)
         stage[0] = "load again"
         WorldModel.load(path)
+        if "learned_task" in model.extra:
+            self._pay(path, stage, tally)
+
+    def _pay(self, path: Path, stage: list[str], tally: Tally) -> None:
+        """What reward models do: say what steps are worth, learn on, save again."""
+        stage[0] = "load reward model"
+        try:
+            model = LearnedRewardModel.load(path)
+        except RelgymError as error:  # what stands beside a model isn't its own
+            tally.typed_later[f"reward model: {type(error).__name__}"] += 1
+            return
+        layout = model.schema.layout()
+        steps = [
+            Transition(*(Scene(model.schema, layout, scene.vector) for scene in (step.before, step.after)))
+            for step in self.steps["puck"]
+        ]
+        before, after = (np.stack([getattr(s, side).vector for s in steps]) for side in ("before", "after"))
+        stage[0] = "evaluate"
+        model.evaluate(layout, before, np.zeros((len(steps), 1)), after)
+        stage[0] = "learn rewards"
+        for step in steps[:STEPS]:
+            model.learn_step(step, 1.0, terminated=False)
+        stage[0] = "save reward model"
+        model.save(path)
+        LearnedRewardModel.load(path)
 
     @staticmethod
     def _dream(model: WorldModel, tally: Tally) -> None:
@@ -209,12 +245,22 @@ class Fuzzer:
             tally.typed_later[f"dream: {type(error).__name__}"] += 1
 
 
+def _content(path: Path) -> tuple[dict[str, Any], Arrays | None]:
+    body, stored = read_model(path)
+    return body, None if stored is None else dict(stored)
+
+
 def _kept(path: Path) -> list[Transition]:
     """Steps of a small world, as scenes of its file's schema."""
     schema = WorldModel.load(path.with_suffix(".relgym")).schema
     with np.load(path) as arrays:
+        names = json.loads(arrays["names"].tobytes()) if "names" in arrays else {}
+        layouts = [schema.layout(names.get(side)) for side in ("before", "after")]
         pairs = zip(arrays["before"], arrays["after"], strict=True)
-        return [Transition(*(Scene(schema, schema.layout(), v.copy()) for v in pair)) for pair in pairs]
+        return [
+            Transition(*(Scene(schema, layout, v.copy()) for layout, v in zip(layouts, pair, strict=True)))
+            for pair in pairs
+        ]
 
 
 def _same(one: Scene, other: Scene) -> bool:

@@ -1,0 +1,226 @@
+"""Other people's worlds with nothing tuned to them: what is claimed, and how right claims are.
+
+``python -m relgym.experiments.strangers --out strangers.json`` learns from 2,000 random steps of each env with the
+default configuration, and predicts fresh episodes. Each (env, seed) that is done is in the file and isn't done again.
+Envs ending in ``-v5`` need the extra ``mujoco`` (``pip install mujoco``). What is measured, per property:
+
+- *claimed*, and *claimed and off*: by more than 5 % of the change (the median of those fresh steps that change it);
+  *own*: by more than 5 % of each step's own change, however small;
+- *against ridge*: root mean square error, fallback values included, over that of ridge regression of the change on
+  (x, u, 1), fitted to the same steps; *against persistence*: the same over that of saying that nothing changes;
+- *calibration error*: mean distance between the probability stated and the share of predictions that came true, over
+  ten bins of the probability (Naeini et al. 2015), of all targets together;
+- *coverage*: the share of next values inside the 95 % interval stated;
+- process time per step, mean and largest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.envs.views import NumbersView
+from relgym.errors import DataError
+from relgym.experiments.any_env_data import Study, stream
+from relgym.files.writing import write_whole
+from relgym.model.fitting import compare_and_learn
+from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Transition
+
+__all__ = ["FINAL", "NAMED", "main", "measure"]
+
+NAMED: Final = (
+    "InvertedPendulum-v5",
+    "Reacher-v5",
+    "HalfCheetah-v5",
+    "Ant-v5",
+    "BipedalWalker-v3",
+    "LunarLander-v3",
+)
+"""What thresholds may be chosen on."""
+
+FINAL: Final = ("Hopper-v5", "Pusher-v5", "Acrobot-v1", "Swimmer-v5")
+"""What nothing was chosen on."""
+
+STEPS: Final = 2_000
+"""Learned from, and as many fresh ones predicted."""
+
+OFF: Final = 0.05
+"""Share of the change by which a claim may be off."""
+
+_PREDICTED: Final = OUTCOMES.index(Outcome.PREDICTED)
+
+
+def measure(env_id: str, seed: int, steps: int = STEPS) -> dict[str, Any]:
+    """Learn one env, and measure what is claimed of fresh episodes.
+
+    Parameters
+    ----------
+    env_id
+        Gymnasium's id.
+    seed
+        Of the training steps; the fresh ones' is another.
+    steps
+        Learned from, and predicted.
+    """
+    env = gym.make(env_id)
+    view = NumbersView(env.observation_space, env.action_space)
+    env.close()
+    study = Study(env_id, ())
+    training = _transitions(study, view, seed, steps)
+    fresh = _transitions(study, view, 50_000 + seed, steps)
+    model = WorldModel(view.schema)
+    costs = []
+    for transition in training:
+        began = time.process_time()
+        compare_and_learn(model, transition, model.predict_one(transition.before), precision=view.precision)
+        costs.append(time.process_time() - began)
+    model.finish()
+    return {
+        "env": env_id,
+        "seed": seed,
+        "mean_ms": 1e3 * float(np.mean(costs)),
+        "max_ms": 1e3 * float(np.max(costs)),
+        **_compared(model, training, fresh, view.precision),
+    }
+
+
+def _transitions(study: Study, view: NumbersView, seed: int, steps: int) -> list[Transition]:
+    found = stream(study, view, seed)
+    return [next(found).transition for _ in range(steps)]
+
+
+def _compared(
+    model: WorldModel, training: Sequence[Transition], fresh: Sequence[Transition], precision: float
+) -> dict[str, Any]:
+    layout = fresh[0].before.layout
+    before = np.array([t.before.vector for t in fresh])
+    said = model.predict_batch(layout, before)
+    ridge = _ridge(training, fresh)
+    rows: dict[str, dict[str, float]] = {}
+    every: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+    for k, (name, prop) in enumerate(said.parts):
+        place = layout.column(layout.index(name), prop)
+        came = np.array([t.after[name][prop] for t in fresh])
+        angle = prop in layout.types[layout.index(name)].angles
+        error = _short(said.vectors[:, place] - came, angle)
+        change = _short(came - before[:, place], angle)
+        moved = np.abs(change[change != 0.0])
+        size = float(np.median(moved)) if len(moved) else 0.0
+        claimed = said.outcomes[:, k] == _PREDICTED
+        rounding = np.maximum(1e-9, precision * np.maximum(1.0, np.abs(came)))
+        off = np.abs(error) > np.maximum(rounding, OFF * size)
+        rows[f"{name}.{prop}"] = {
+            "claimed": float(claimed.mean()),
+            "claimed_off": float((claimed & off).mean()),
+            "claimed_off_own": float(
+                (claimed & (np.abs(error) > np.maximum(rounding, OFF * np.abs(change)))).mean()
+            ),
+            "ridge": _ratio(error, _short(ridge[f"{name}.{prop}"] - change, angle), rounding),
+            "persistence": _ratio(error, change, rounding),
+        }
+        if hasattr(said, "probabilities"):
+            stated = said.probabilities[:, k]
+            known = np.isfinite(stated)
+            every.append((stated[known], ~off[known]))
+            width = said.intervals[:, k]
+            known = np.isfinite(width)
+            rows[f"{name}.{prop}"]["coverage"] = float(
+                (np.abs(error) <= np.maximum(width, rounding))[known].mean()
+            )
+    columns = {key: np.array([row[key] for row in rows.values()]) for key in next(iter(rows.values()))}
+    summary = {key: float(np.mean(columns[key])) for key in ("claimed", "claimed_off", "claimed_off_own")}
+    summary |= {
+        "ridge_median": float(np.median(columns["ridge"])),
+        "ridge_worst": float(columns["ridge"].max()),
+        "persistence_worst": float(columns["persistence"].max()),
+        "ece": _calibration_error(every),
+        "coverage": float(np.nanmean(columns["coverage"])) if "coverage" in columns else float("nan"),
+    }
+    return {**summary, "properties": rows}
+
+
+def _short(difference: NDArray[np.float64], angle: bool) -> NDArray[np.float64]:
+    return np.arctan2(np.sin(difference), np.cos(difference)) if angle else difference
+
+
+def _ratio(error: NDArray[np.float64], other: NDArray[np.float64], rounding: NDArray[np.float64]) -> float:
+    """Ratio of root mean squares; errors within rounding aren't told apart."""
+    least = float(np.sqrt(np.square(rounding).mean()))
+    sizes = [float(np.sqrt(np.square(e).mean())) for e in (error, other)]
+    return max(sizes[0], least) / max(sizes[1], least)
+
+
+def _ridge(training: Sequence[Transition], fresh: Sequence[Transition]) -> dict[str, NDArray[np.float64]]:
+    """Changes that ridge regression on (x, u, 1) predicts, by property: standardised columns, penalty 1."""
+    x, z = (np.array([t.before.vector for t in part]) for part in (training, fresh))
+    mean, std = x.mean(axis=0), x.std(axis=0)
+    std[std == 0.0] = 1.0
+    x, z = (x - mean) / std, (z - mean) / std
+    layout = training[0].before.layout
+    found = {}
+    gram = x.T @ x + np.eye(x.shape[1])
+    for index, (name, kind) in enumerate(zip(layout.names, layout.types, strict=True)):
+        for prop in kind.properties if name in training[0].after else ():
+            place = layout.column(index, prop)
+            y = np.array([t.after[name][prop] - t.before.vector[place] for t in training])
+            y = _short(y, prop in kind.angles)
+            found[f"{name}.{prop}"] = z @ np.linalg.solve(gram, x.T @ (y - y.mean())) + y.mean()
+    return found
+
+
+def _calibration_error(every: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> float:
+    if not every:
+        return float("nan")
+    stated, right = (np.concatenate(part) for part in zip(*every, strict=True))
+    bins = np.minimum((10 * stated).astype(int), 9)
+    shares = [
+        (bins == k).mean() * abs(stated[bins == k].mean() - right[bins == k].mean()) for k in np.unique(bins)
+    ]
+    return float(sum(shares))
+
+
+_HEAD = ("claimed", "claimed_off", "ridge_median", "ridge_worst", "persistence_worst", "ece", "coverage")
+
+
+def _table(results: Sequence[dict[str, Any]]) -> str:
+    lines = [f"{'env':22}{'seed':>5}" + "".join(f"{h:>19}" for h in (*_HEAD, "mean_ms", "max_ms"))]
+    for one in results:
+        numbers = "".join(f"{one[h]:>19.4g}" for h in (*_HEAD, "mean_ms", "max_ms"))
+        lines.append(f"{one['env']:22}{one['seed']:>5}{numbers}")
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure, resume, print."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0] if __doc__ else None)
+    parser.add_argument("--envs", nargs="+", default=list(NAMED))
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
+    parser.add_argument("--steps", type=int, default=STEPS)
+    parser.add_argument("--out", type=Path, default=Path("strangers.json"))
+    options = parser.parse_args(arguments)
+    results: list[dict[str, Any]] = json.loads(options.out.read_text()) if options.out.exists() else []
+    done = {(one["env"], one["seed"]) for one in results}
+    for seed in options.seeds:
+        for env_id in options.envs:
+            if (env_id, seed) not in done:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")  # envs and their bindings warn when they are made
+                    results.append(measure(env_id, seed, options.steps))
+                write_whole(options.out, json.dumps(results, indent=1).encode(), error=DataError)
+                print(_table(results[-1:]), flush=True)
+    print(_table(results))
+
+
+if __name__ == "__main__":
+    main()

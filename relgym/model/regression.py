@@ -1,0 +1,191 @@
+"""What least squares on a type's own numbers and the action say of all its targets: a rival of modes and guesses.
+
+Regression of the change on (x, u, 1), and on squares and products of these where they are few, is what anybody would
+try first. So it is tried beside everything else, and where it codes what comes in fewer bits it gives the value
+(`relgym.model.calibration`). It claims nothing: it has no conditions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.clustering.columns import PRIME, SlotSignature
+from relgym.numeric.online_ridge import OnlineRidge
+from relgym.scene.objects import TASK
+
+__all__ = ["KINDS", "Regression"]
+
+KINDS = 2
+"""Linear, and with squares and products."""
+
+FIRST = 64
+"""So many rows tell where a column lies and how far it varies; from then on it is regressed on."""
+
+BEYOND = 0.5
+"""Changes may go beyond those that were seen by so much of their range, as in `relgym.model.scope`."""
+
+
+class Regression:
+    """Regressions of one type's targets on what objects of the type and bodiless ones have.
+
+    Parameters
+    ----------
+    most
+        Most columns (`ModelConfig.regression_columns`); more aren't regressed on.
+
+    Attributes
+    ----------
+    names
+        Names of the columns; empty as long as nothing was learned.
+    targets
+        Properties predicted, in the order of the responses.
+    seen
+        Number of examples.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.names: tuple[str, ...] = ()
+        self.targets: list[str] = []
+        self.seen = 0
+        self._most = most
+        self._ridges: list[OnlineRidge] = []
+        self._waiting: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        self._centre = np.zeros(0)
+        self._scale = np.ones(0)
+        self._range = np.zeros((2, 0))  # smallest and largest change of each target
+        self._places: dict[int, tuple[SlotSignature, NDArray[np.intp] | None]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_places": {}}  # keyed by identity, which a copy doesn't share
+
+    def learn_one(
+        self, signature: SlotSignature, row: NDArray[np.float64], changes: Mapping[str, float]
+    ) -> None:
+        """Take in one example: a row of the signature's columns, and what each target changed by."""
+        if not self.names:
+            self.names = _names(signature)
+        places = self._columns(signature)
+        if places is None or not 0 < len(places) <= self._most:
+            return
+        self.targets += [name for name in changes if name not in self.targets]
+        self.seen += 1
+        x, y = row[places], np.array([changes.get(name, 0.0) for name in self.targets])
+        missing = len(y) - self._range.shape[1]
+        if missing:
+            self._range = np.pad(self._range, ((0, 0), (0, missing)))
+        self._range = np.stack([np.minimum(self._range[0], y), np.maximum(self._range[1], y)])
+        if self._ridges:
+            self._add(x, y)
+            return
+        self._waiting.append((x, y))
+        if len(self._waiting) == FIRST:
+            self._begin()
+
+    def _begin(self) -> None:
+        x = np.array([row for row, _ in self._waiting])
+        self._centre = np.median(x, axis=0)
+        spread = x.std(axis=0)
+        self._scale = np.where(spread > 0.0, spread, 1.0)
+        d = len(self._centre)
+        self._ridges = [OnlineRidge(d)]
+        if d + d * (d + 1) // 2 <= self._most:
+            self._ridges.append(OnlineRidge(d + d * (d + 1) // 2))
+        for row, y in self._waiting:
+            self._add(row, y)
+        self._waiting = []
+
+    def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+        z = self._scaled(x[None])
+        for ridge, columns in zip(self._ridges, self._shown(z), strict=False):
+            ridge.add(columns[0], y)
+
+    def _scaled(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (x - self._centre) / self._scale
+
+    def _shown(self, z: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Columns for each of the regressions."""
+        found = [z]
+        if len(self._ridges) > 1:
+            first, second = np.triu_indices(z.shape[1])
+            found.append(np.concatenate([z, z[:, first] * z[:, second]], axis=1))
+        return found
+
+    def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Changes predicted of rows ``(n, width)``, shape ``(n, KINDS, targets)``; None while there is nothing.
+
+        NaN where a regression isn't made; never far beyond the changes that were seen.
+        """
+        if not self._ridges or (places := self._columns(signature)) is None:
+            return None
+        found = np.full((len(x), KINDS, len(self.targets)), np.nan)
+        shown = self._shown(self._scaled(x[:, places]))
+        for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
+            found[:, k, : len(ridge.weights)] = ridge.predict(columns)
+        least, most = self._range
+        slack = BEYOND * (most - least)
+        clipped: NDArray[np.float64] = np.clip(found, least - slack, most + slack)
+        return clipped
+
+    def _columns(self, signature: SlotSignature) -> NDArray[np.intp] | None:
+        """Where the columns lie in a signature's rows; None where one is missing."""
+        known = self._places.get(id(signature))
+        if known is None or known[0] is not signature:
+            there = {name: k for k, name in zip(_core(signature), _names(signature), strict=True)}
+            places = None
+            if all(name in there for name in self.names):
+                places = np.array([there[name] for name in self.names], dtype=np.intp)
+            known = self._places[id(signature)] = (signature, places)
+        return known[1]
+
+    # ------------------------------------------------------------------ saving
+    def to_json(self, *, history: bool) -> dict[str, Any]:
+        """Plain data; with history what further learning needs, too, but the sums in `to_arrays`."""
+        return {
+            "names": list(self.names),
+            "seen": self.seen,
+            "targets": list(self.targets),
+            "centre": self._centre.tolist(),
+            "scale": self._scale.tolist(),
+            "range": self._range.tolist(),
+            "waiting": [[x.tolist(), y.tolist()] for x, y in self._waiting] if history else [],
+            "ridges": [[r.rows, r.due, r.weights.tolist()] for r in self._ridges],
+        }
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """Sums that further learning adds to."""
+        found: dict[str, NDArray[Any]] = {}
+        for k, ridge in enumerate(self._ridges):
+            arrays = ridge.to_arrays()
+            found |= {f"gram{k}": arrays["gram"], f"moments{k}": arrays["moments"]}
+        return found
+
+    def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take over what `to_json` and `to_arrays` wrote; without arrays it can only predict."""
+        self.names, self.targets = tuple(data["names"]), list(data["targets"])
+        self.seen = int(data["seen"])
+        self._centre, self._scale = np.array(data["centre"]), np.array(data["scale"])
+        self._range = np.array(data["range"], dtype=np.float64).reshape(2, len(self.targets))
+        self._waiting = [(np.array(x), np.array(y)) for x, y in data["waiting"]]
+        self._ridges = []
+        for k, (rows, due, weights) in enumerate(data["ridges"]):
+            parts: dict[str, NDArray[Any]] = {"weights": np.array(weights, dtype=np.float64)}
+            if f"gram{k}" in arrays:
+                parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
+            self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
+
+
+def _core(signature: SlotSignature) -> list[int]:
+    """Columns of present numbers that mean the same in every signature, what the task says left aside."""
+    return [
+        k
+        for k in range(signature.core)
+        if not signature.at(k).property.endswith(PRIME) and signature.types[signature.at(k).slot].name != TASK
+    ]
+
+
+def _names(signature: SlotSignature) -> tuple[str, ...]:
+    return tuple(signature.named(k) for k in _core(signature))

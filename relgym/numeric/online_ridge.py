@@ -1,0 +1,135 @@
+"""Ridge regression kept up to date one row at a time: sums of products, solved anew as rows become more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["OnlineRidge"]
+
+PENALTY = 1.0
+"""Of standardised columns: each weight is taken to be no larger than the noise a single row leaves, as scikit-learn's
+default has it. It keeps weights finite where columns depend on one another."""
+
+GROWTH = 1.1
+"""Weights are solved anew when the rows have become more by this factor: they lag by at most a tenth of the rows, and
+the solutions' cost, O(d^3) each, is that of a few rows' products, O(d^2) each."""
+
+
+class OnlineRidge:
+    """Least squares of several responses on the same columns, with an intercept.
+
+    Parameters
+    ----------
+    columns
+        Number of columns, d.
+
+    Attributes
+    ----------
+    rows
+        Number of rows taken in.
+    weights
+        One row for each response, the intercept first, shape ``(responses, d + 1)``; of a response that came later
+        than some rows, as if it had been 0 in those.
+
+    Notes
+    -----
+    Cost O(d^2 + d * responses) a row; O(d^3 + d^2 * responses) at every tenth more.
+
+    References
+    ----------
+    Hoerl and Kennard (1970), Ridge regression.
+
+    Examples
+    --------
+    >>> ridge = OnlineRidge(1)
+    >>> for x in range(100):
+    ...     ridge.add(np.array([float(x)]), np.array([2.0 * x + 3.0]))
+    >>> bool(abs(ridge.predict(np.array([[5.0]]))[0, 0] - 13.0) < 1.0)
+    True
+    """
+
+    def __init__(self, columns: int) -> None:
+        self.rows = 0
+        self.weights = np.zeros((0, columns + 1))
+        self._gram = np.zeros((columns + 1, columns + 1))
+        self._moments = np.zeros((0, columns + 1))
+        self._due = 2
+
+    @property
+    def columns(self) -> int:
+        """Number of columns, d."""
+        return len(self._gram) - 1
+
+    def add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+        """Take in one row of columns, shape ``(d,)``, and its responses, shape ``(responses,)``."""
+        row = np.concatenate([[1.0], x])
+        self._widen(len(y))
+        self._gram += row[:, None] * row
+        self._moments += y[:, None] * row
+        self.rows += 1
+        if self.rows >= self._due:
+            self.solve()
+
+    def _widen(self, responses: int) -> None:
+        missing = responses - len(self._moments)
+        if missing > 0:
+            self._moments = np.pad(self._moments, ((0, missing), (0, 0)))
+            self.weights = np.pad(self.weights, ((0, missing), (0, 0)))
+
+    def solve(self) -> None:
+        """Work out the weights from the rows so far."""
+        self._due = max(self.rows + 1, int(GROWTH * self.rows))
+        n = float(self.rows)
+        if not n:
+            return
+        mean = self._gram[0, 1:] / n
+        covariance = self._gram[1:, 1:] / n - mean[:, None] * mean
+        variance = covariance.diagonal()
+        # What differs by rounding alone is constant.
+        std = np.sqrt(np.where(variance > 1e-12 * (variance + np.square(mean)), variance, np.inf))
+        std_of = np.where(np.isfinite(std), std, 1.0)
+        alive = np.isfinite(std)
+        scaled = np.where(alive[:, None] & alive, covariance / (std_of[:, None] * std_of), 0.0)
+        level = self._moments[:, 0] / n
+        slope = np.where(alive, (self._moments[:, 1:] / n - level[:, None] * mean) / std_of, 0.0)
+        solved = np.linalg.solve(scaled + (PENALTY / n) * np.eye(len(scaled)), slope.T).T / std_of
+        if np.isfinite(solved).all():
+            level -= (solved * mean).sum(axis=1)
+            # Rows lie side by side in memory: so sums along them are taken in the same order, however many there are.
+            self.weights = np.ascontiguousarray(np.concatenate([level[:, None], solved], axis=1))
+
+    def predict(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Responses of rows ``(n, d)``, shape ``(n, responses)``; of a row alone the same bits as among others."""
+        rows = np.ascontiguousarray(np.concatenate([np.ones((len(x), 1)), x], axis=1))
+        found = np.empty((len(x), len(self.weights)))
+        if len(x) == 1:  # the same sums along the same axis
+            found[0] = (self.weights * rows).sum(axis=1)
+            return found
+        for k, weights in enumerate(self.weights):
+            found[:, k] = (rows * weights).sum(axis=1)
+        return found
+
+    # ------------------------------------------------------------------ saving
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """The sums, which further rows are added to, and the weights."""
+        return {"gram": self._gram, "moments": self._moments, "weights": self.weights}
+
+    @classmethod
+    def restored(cls, rows: int, due: int, arrays: Mapping[str, NDArray[Any]]) -> OnlineRidge:
+        """What `to_arrays` wrote; sums may be missing, then it can only predict."""
+        weights = arrays["weights"]
+        found = cls(weights.shape[1] - 1)
+        found.rows, found._due, found.weights = rows, due, weights.copy()
+        found._moments = np.zeros_like(weights)
+        if "gram" in arrays:
+            found._gram, found._moments = arrays["gram"].copy(), arrays["moments"].copy()
+        return found
+
+    @property
+    def due(self) -> int:
+        """Number of rows at which weights are solved anew."""
+        return self._due

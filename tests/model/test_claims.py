@@ -1,0 +1,188 @@
+"""Small worlds that can't be explained whole: what is claimed of them must be right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import islice, pairwise
+
+import numpy as np
+import pytest
+from points import schema_of
+
+from relgym.experiments.law_trials import trial_rooms
+from relgym.experiments.law_worlds import Ball, Material, World
+from relgym.model.fitting import compare_and_learn
+from relgym.model.prediction import ScenePrediction
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Scene, Transition
+from relgym.scene.schema import SceneSchema
+
+Numbers = Iterator[tuple[float, ...]]
+
+
+def pixels(rng: np.random.Generator) -> Numbers:
+    """A ball of 1.5 pixels a step between two walls, shown in whole pixels, with its last displacement."""
+    x, v, last = float(rng.uniform(10.0, 90.0)), 1.5, 0.0
+    while True:
+        x += v
+        if not 0.0 <= x <= 100.0:
+            x, v = (-x if x < 0.0 else 200.0 - x), -v
+        shown = float(np.round(x))
+        yield shown, shown - last
+        last = shown
+
+
+def byte(rng: np.random.Generator) -> Numbers:
+    """A byte that switches between 0 and 192 once in 200 steps, and late to a value never seen."""
+    value, count = 0.0, 0
+    while True:
+        yield (value,)
+        count += 1
+        if rng.random() < 0.005:
+            value = (192.0 if value == 0.0 else 0.0) if count < 800 else float(rng.integers(1, 191))
+
+
+def redrawn(rng: np.random.Generator) -> Numbers:
+    """A number drawn anew once in a hundred steps."""
+    value = rng.normal()
+    while True:
+        yield (float(value),)
+        if rng.random() < 0.01:
+            value = rng.normal()
+
+
+def wrapped(rng: np.random.Generator) -> Numbers:
+    """A number that grows by 7 and starts over at 360."""
+    value = float(rng.uniform(0.0, 360.0))
+    while True:
+        yield (value,)
+        value = (value + 7.0) % 360.0
+
+
+def clock(rng: np.random.Generator) -> Numbers:
+    """A number that is raised every tenth step, which nothing shows."""
+    value, count = float(rng.normal()), int(rng.integers(0, 10))
+    while True:
+        yield (value,)
+        count += 1
+        if count % 10 == 0:
+            value += 1.0
+
+
+def stream(
+    schema: SceneSchema, world: Callable[[np.random.Generator], Numbers], seed: int, steps: int
+) -> list[Transition]:
+    rows = list(islice(world(np.random.default_rng(seed)), steps + 2))[1:]
+    scenes = [schema.scene({"self": row, "action": ()}) for row in rows]
+    return [Transition(a, b) for a, b in pairwise(scenes)]
+
+
+def typical(steps: list[Transition], name: str, prop: str) -> float:
+    """What a property mostly changes by, where it does."""
+    moved = np.abs([t.after[name][prop] - t.before[name][prop] for t in steps])
+    return float(np.median(moved[moved > 0.0])) if moved.any() else 0.0
+
+
+def watched(model: WorldModel, steps: list[Transition]) -> list[ScenePrediction]:
+    """What was said of each step before it was learned."""
+    said = []
+    for step in steps:
+        said.append(model.predict_one(step.before))
+        compare_and_learn(model, step, said[-1])
+    return said
+
+
+def claimed_and_off(said: list[ScenePrediction], steps: list[Transition]) -> float:
+    """Share of predictions that were claimed and off by more than a twentieth of what mostly changes."""
+    wrong = []
+    sizes = {(p.object, p.property): typical(steps, p.object, p.property) for p in said[-1].parts}
+    for each, step in zip(said, steps, strict=True):
+        for part in each.parts:
+            error = abs(part.value - step.after[part.object][part.property])
+            wrong.append(part.ok and error > max(1e-9, 0.05 * sizes.get((part.object, part.property), 0.0)))
+    return float(np.mean(wrong))
+
+
+def squares(said: list[ScenePrediction], steps: list[Transition], prop: str) -> tuple[float, float]:
+    """What predictions, fallback values included, and saying that nothing changes left of a property."""
+    came = np.array([s.after["self"][prop] for s in steps])
+    now = np.array([s.before["self"][prop] for s in steps])
+    told = np.array([each["self", prop].value for each in said])
+    return float(np.square(told - came).sum()), float(np.square(now - came).sum())
+
+
+@pytest.mark.parametrize("world", [pixels, byte, redrawn, wrapped, clock])
+def test_what_is_claimed_is_right(world: Callable[[np.random.Generator], Numbers]) -> None:
+    props = ("x", "v") if world is pixels else ("x",)
+    schema = schema_of(props)
+    model = WorldModel(schema)
+    steps = stream(schema, world, 1, 1_200)
+    watched(model, steps[:600])
+    said = watched(model, steps[600:])
+    assert claimed_and_off(said, steps[600:]) <= 0.01
+    fresh = stream(schema, world, 2, 400)
+    asked = [model.predict_one(step.before) for step in fresh]
+    assert claimed_and_off(asked, fresh) <= 0.01
+    for prop in props:
+        own, nothing = squares(asked, fresh, prop)
+        assert own <= 1.05 * nothing + 1e-12
+
+
+def test_a_law_that_changed_is_doubted_at_once() -> None:
+    def falling(rng: np.random.Generator, gravity: float, count: int) -> list[Transition]:
+        schema = schema_of(("v",), ("a",))
+        found = []
+        for v, u in rng.normal(size=(count, 2)).tolist():
+            before = {"self": [v], "action": [u]}
+            found.append(
+                Transition(schema.scene(before), schema.scene(before | {"self": [v + 0.1 * u - gravity]}))
+            )
+        return found
+
+    rng = np.random.default_rng(0)
+    before, after = falling(rng, 1.0, 300), falling(rng, 0.5, 300)
+    model = WorldModel(schema_of(("v",), ("a",)))
+    first = watched(model, before)
+    assert all(each.ok for each in first[100:])
+    said = watched(model, after)
+    assert claimed_and_off(said, after) <= 0.01
+    assert all(each.ok for each in said[100:])  # the new law was found, and is believed
+
+
+def test_soft_contacts_of_moving_discs_are_not_claimed() -> None:
+    discs = World(
+        2, (Ball("disc"), Ball("disc")), ("block",) * 4, {"block": Material()}, between=Material(spring=0.3)
+    )
+
+    def episodes(seed: int, count: int) -> list[Transition]:
+        found = []
+        for room in trial_rooms(discs, count, seed=seed, steps=60):
+            scenes = [Scene(room.schema, room.layout, vector) for vector in room.vectors]
+            found += [Transition(a, b) for a, b in pairwise(scenes)]
+        return found
+
+    steps, fresh = episodes(0, 8), episodes(1, 4)
+    model = WorldModel(steps[0].before.schema)
+    watched(model, steps)
+    asked = [model.predict_one(step.before) for step in fresh]
+    assert claimed_and_off(asked, fresh) <= 0.01
+    assert np.mean([part.ok for each in asked for part in each.parts]) > 0.9  # flight is claimed
+
+
+def test_the_record_goes_with_the_model(tmp_path: object) -> None:
+    schema = schema_of(("x",))
+    model = WorldModel(schema)
+    steps = stream(schema, clock, 1, 400)
+    watched(model, steps)
+    scenes: list[Scene] = [step.before for step in steps[:50]]
+    told = [model.predict_one(scene)["self", "x"] for scene in scenes]
+    assert all(np.isfinite(part.probability) and np.isfinite(part.interval) for part in told)
+    for history in (True, False):
+        path = f"{tmp_path}/model.json"
+        model.save(path, history=history)
+        again = WorldModel.load(path)
+        assert [again.predict_one(scene)["self", "x"] for scene in scenes] == told
+    batch = model.predict_batch(scenes[0].layout, np.array([scene.vector for scene in scenes]))
+    assert batch.probabilities[:, 0].tolist() == [part.probability for part in told]
+    assert batch.intervals[:, 0].tolist() == [part.interval for part in told]
+    assert [bool(ok) for ok in batch.ok] == [part.ok for part in told]

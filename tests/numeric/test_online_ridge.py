@@ -1,0 +1,83 @@
+"""Sums of products give what solving anew from all rows gives."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from relgym.numeric.online_ridge import GROWTH, PENALTY, OnlineRidge
+
+
+def rows(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    x = rng.normal([0.0, 5.0, -2.0], [1.0, 0.1, 3.0], size=(n, 3))
+    return x, np.stack([x @ [1.0, -2.0, 0.5] + 3.0, rng.normal(size=n)], axis=1)
+
+
+def test_it_is_ridge_regression_of_standardised_columns() -> None:
+    x, y = rows(80)
+    ridge = OnlineRidge(3)
+    for one, response in zip(x, y, strict=True):
+        ridge.add(one, response)
+    ridge.solve()
+    z = (x - x.mean(axis=0)) / x.std(axis=0)
+    expected = np.linalg.solve(z.T @ z + PENALTY * np.eye(3), z.T @ (y - y.mean(axis=0)))
+    np.testing.assert_allclose(ridge.predict(x), z @ expected + y.mean(axis=0), atol=1e-9)
+
+
+def test_weights_are_solved_anew_as_rows_become_more() -> None:
+    x, y = rows(400)
+    ridge = OnlineRidge(3)
+    solved = []
+    for k, (one, response) in enumerate(zip(x, y, strict=True)):
+        before = ridge.weights
+        ridge.add(one, response)
+        if ridge.weights is not before:
+            solved.append(k + 1)
+    late = [b / a for a, b in pairwise(solved) if a > 30]
+    assert len(late) > 10
+    assert max(late) <= GROWTH + 0.04
+
+
+def test_a_row_alone_gives_the_same_bits_as_among_others() -> None:
+    rng = np.random.default_rng(1)
+    ridge = OnlineRidge(37)
+    for _ in range(60):
+        ridge.add(rng.normal(size=37), rng.normal(size=5))
+    some = rng.normal(size=(20, 37))
+    together = ridge.predict(some)
+    for row, expected in zip(some, together, strict=True):
+        assert ridge.predict(row[None])[0].tobytes() == expected.tobytes()
+
+
+def test_a_response_that_comes_later_was_zero_before() -> None:
+    x, y = rows(90)
+    late, whole = OnlineRidge(3), OnlineRidge(3)
+    for k, (one, response) in enumerate(zip(x, y, strict=True)):
+        late.add(one, response[: 1 if k < 40 else 2])
+        whole.add(one, response if k >= 40 else np.array([response[0], 0.0]))
+    late.solve(), whole.solve()
+    np.testing.assert_array_equal(late.predict(x), whole.predict(x))
+
+
+def test_constant_columns_have_no_weight() -> None:
+    x, y = rows(50)
+    x[:, 1] = 7.0
+    ridge = OnlineRidge(3)
+    for one, response in zip(x, y, strict=True):
+        ridge.add(one, response)
+    assert (ridge.weights[:, 2] == 0.0).all()
+    assert np.isfinite(ridge.weights).all()
+
+
+def test_what_was_saved_learns_on_to_the_bit() -> None:
+    x, y = rows(100)
+    ridge = OnlineRidge(3)
+    for one, response in zip(x[:60], y[:60], strict=True):
+        ridge.add(one, response)
+    again = OnlineRidge.restored(ridge.rows, ridge.due, ridge.to_arrays())
+    for one, response in zip(x[60:], y[60:], strict=True):
+        ridge.add(one, response)
+        again.add(one, response)
+    assert ridge.predict(x).tobytes() == again.predict(x).tobytes()
