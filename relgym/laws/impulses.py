@@ -32,6 +32,13 @@ SWEEPS, ROUNDS = 20, 10
 SLACK = 4096.0 * float(np.finfo(np.float64).eps)
 """A row obeys its law up to so many times the velocities of its island."""
 
+LOOSE = 1e-5
+"""Where no impulses satisfy all laws exactly, a row obeys its law up to so many times the velocities of its island.
+
+A body that lies flat touches in two points, at heights that differ by their overlaps: both can't stick while it turns
+by however little. Impulses against each other then grow from sweep to sweep, and engines stop somewhere.
+"""
+
 NULL = 1e-9
 """Singular values below this share of the largest one count as 0."""
 
@@ -72,8 +79,8 @@ class Solved:
     impulse
         Of each row, shape ``(m, r)``.
     settled
-        Whether every row obeys its law, and no other impulses with the same pieces would give other velocities;
-        shape ``(m,)``.
+        Whether every row obeys its law (as far as that can be: `LOOSE`), and no other impulses with the same pieces
+        would give other velocities; shape ``(m,)``.
     """
 
     impulse: FloatArray
@@ -110,6 +117,7 @@ def solve(rows: Rows) -> Solved:
         if not len(active) or round_ == ROUNDS - 1:
             break
         impulse[active] = _swept(rows.of(active), impulse[active])
+    settled[active] = _obeyed(rows.of(active), impulse[active], LOOSE)
     return Solved(impulse, settled)
 
 
@@ -159,13 +167,13 @@ def _tried(rows: Rows, start: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]
     return x, done, fit
 
 
-def _obeyed(rows: Rows, x: FloatArray) -> NDArray[np.bool_]:
+def _obeyed(rows: Rows, x: FloatArray, slack: float = SLACK) -> NDArray[np.bool_]:
     features, sense = _features(rows, x)
     demanded, _ = _law(rows, features)
     reached = sense * (rows.free + _times(rows.gain, x))
     yields = np.diagonal(rows.gain, axis1=1, axis2=2)
     size = np.maximum(np.abs(rows.free), np.abs(rows.now)) + np.abs(yields * x)
-    obeyed: NDArray[np.bool_] = (np.abs(demanded - reached) <= SLACK * size.max(axis=1, keepdims=True)).all(
+    obeyed: NDArray[np.bool_] = (np.abs(demanded - reached) <= slack * size.max(axis=1, keepdims=True)).all(
         axis=1
     )
     return obeyed & np.isfinite(x).all(axis=1)
