@@ -47,8 +47,8 @@ def _tee() -> Compound:
     low = 1.0 - width
     centre = (width * (low + width / 2.0) + width * low * low / 2.0) / (width + width * low)
     top, joint, foot, half = 1.0 - centre, low - centre, -centre, width / 2.0
-    bar = ((-0.5, joint), (0.5, joint), (0.5, top), (-0.5, top))
-    return Compound((bar, ((-half, foot), (half, foot), (half, joint), (-half, joint))))
+    beam = ((-0.5, joint), (0.5, joint), (0.5, top), (-0.5, top))
+    return Compound((beam, ((-half, foot), (half, foot), (half, joint), (-half, joint))))
 
 
 TEE: Final = _tee()

@@ -20,7 +20,7 @@ from relgym.scene.objects import ACTION, POSE, Float2D, Kinematics, ObjectType, 
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Compound, Prism, Shape, Sphere
 
-__all__ = ["BARS", "SHAPES", "Setting", "body_rooms", "body_schema"]
+__all__ = ["BEAMS", "SHAPES", "Setting", "body_rooms", "body_schema"]
 
 Array = NDArray[np.float64]
 
@@ -30,11 +30,11 @@ def _regular(corners: int) -> Prism:
     return Prism(tuple((0.5 * math.cos(a), 0.5 * math.sin(a)) for a in angles.tolist()))
 
 
-def _bars() -> Compound:
-    """A T in the unit square whose centroid is the origin: a cross bar, and a stem below it."""
-    bar, stem, low = 0.3, 0.3, 0.7
-    # Areas and centroids of both bars, measured from the lower edge.
-    centre = (bar * (low + bar / 2.0) + stem * low * low / 2.0) / (bar + stem * low)
+def _beams() -> Compound:
+    """A T in the unit square whose centroid is the origin: a cross beam, and a stem below it."""
+    beam, stem, low = 0.3, 0.3, 0.7
+    # Areas and centroids of both beams, measured from the lower edge.
+    centre = (beam * (low + beam / 2.0) + stem * low * low / 2.0) / (beam + stem * low)
     top, joint, foot = 1.0 - centre, low - centre, -centre
     return Compound(
         (
@@ -44,14 +44,14 @@ def _bars() -> Compound:
     )
 
 
-BARS: Final = _bars()
+BEAMS: Final = _beams()
 """A T."""
 
 SHAPES: Final[Mapping[str, Shape]] = {
     "box": Box(),
     "hexagon": _regular(6),
     "triangle": _regular(3),
-    "tee": BARS,
+    "tee": BEAMS,
     "puck": Sphere(),
 }
 """Shapes of bodies that are pushed, by the names of their types."""
@@ -59,7 +59,7 @@ SHAPES: Final[Mapping[str, Shape]] = {
 ROOM: Final = 2.0
 """Half the width of the room between the walls."""
 
-_PARENT = "block"
+_PARENT = "pushed"
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,7 +82,7 @@ class ConvexPolyhedron:
 @refusing_fields(ShapeError)
 @dataclass(frozen=True, slots=True)
 class Compound:
-    """Convex polygons that hang together, such as the two bars of a T, each extruded like a `Prism`.
+    """Convex polygons that hang together, such as the two beams of a T, each extruded like a `Prism`.
 
     Planar schemas only, and the array geometry.
 

@@ -15,7 +15,7 @@ from relgym.scene.geometry.arrays import ArrayGeometry, Bodies
 from relgym.scene.objects import POSE
 from relgym.scene.shapes import Box, Sphere
 
-BARS = Compound(
+BEAMS = Compound(
     (
         ((-0.5, 0.1), (0.5, 0.1), (0.5, 0.4), (-0.5, 0.4)),
         ((-0.15, -0.6), (0.15, -0.6), (0.15, 0.1), (-0.15, 0.1)),
@@ -25,18 +25,18 @@ BARS = Compound(
 
 def schema(*, planar: bool = True) -> SceneSchema:
     types = (
-        ObjectType("bar", POSE, BARS),
+        ObjectType("beam", POSE, BEAMS),
         ObjectType("box", POSE, Box()),
         ObjectType("disc", POSE, Sphere()),
     )
-    objects = (("bar", "bar"), ("other", "bar"), ("box", "box"), ("disc", "disc"))
+    objects = (("beam", "beam"), ("other", "beam"), ("box", "box"), ("disc", "disc"))
     return SceneSchema(types, objects, planar=planar)
 
 
 def outlines_of(pose: np.ndarray, kind: int) -> object:  # type: ignore[type-arg]
     if kind == 3:
         return Point(pose[0], pose[1]).buffer(0.5 * pose[6], quad_segs=4_000)
-    parts = BARS.parts if kind < 2 else (((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)),)
+    parts = BEAMS.parts if kind < 2 else (((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)),)
     whole = unary_union([Polygon(part) for part in parts])
     scaled = affinity.scale(whole, pose[6], pose[7], origin=(0, 0))
     turned = affinity.rotate(scaled, pose[5], origin=(0, 0), use_radians=True)
@@ -65,7 +65,7 @@ def test_distances_are_those_of_the_nearest_parts(rng: np.random.Generator) -> N
 
 def test_bounding_boxes_hold_all_parts() -> None:
     geometry = ArrayGeometry(
-        Extractor(schema()).axes, Bodies(("disc", "bar", "box"), (Sphere(), BARS, Box()))
+        Extractor(schema()).axes, Bodies(("disc", "beam", "box"), (Sphere(), BEAMS, Box()))
     )
     pose = np.zeros((9, 3, 1))
     pose[6:] = 1.0
@@ -76,12 +76,12 @@ def test_bounding_boxes_hold_all_parts() -> None:
 
 
 def test_files_hold_compounds() -> None:
-    assert shape_from_json(shape_to_json(BARS)) == BARS
+    assert shape_from_json(shape_to_json(BEAMS)) == BEAMS
 
 
 def test_compounds_need_a_plane_and_the_array_geometry() -> None:
     world = schema(planar=False)
-    with pytest.raises(ShapeError, match="'bar' is a compound of polygons: use a planar schema"):
+    with pytest.raises(ShapeError, match="'beam' is a compound of polygons: use a planar schema"):
         Extractor(world).extract(world.layout(), np.ones((1, world.layout().width)))
     flat = schema()
     with pytest.raises((ShapeError, ConfigError), match="use geometry='arrays', which measures each part"):

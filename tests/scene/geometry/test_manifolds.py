@@ -22,13 +22,13 @@ def regular(corners: int) -> Prism:
     return Prism(tuple((0.5 * float(np.cos(a)), 0.5 * float(np.sin(a))) for a in angles))
 
 
-BARS = Compound(
+BEAMS = Compound(
     (
         ((-0.5, 0.1), (0.5, 0.1), (0.5, 0.4), (-0.5, 0.4)),
         ((-0.15, -0.6), (0.15, -0.6), (0.15, 0.1), (-0.15, 0.1)),
     )
 )
-SHAPES: tuple[Shape, ...] = (Sphere(), Box(), Wedge(), regular(3), regular(6), BARS)
+SHAPES: tuple[Shape, ...] = (Sphere(), Box(), Wedge(), regular(3), regular(6), BEAMS)
 ROUND, BOX = 0, 1
 
 
@@ -122,7 +122,7 @@ def test_a_disc_at_a_corner() -> None:
 
 
 def test_parts_of_a_compound_touch_on_their_own() -> None:
-    # A wide box under a T that lies on its side: the cross bar's end and the stem's end rest on it.
+    # A wide box under a T that lies on its side: the cross beam's end and the stem's end rest on it.
     found = touch(pose(0.0, 0.45, np.pi / 2.0), 5, pose(0.0, -1.0, 0.0, 4.0, 2.0), BOX)
     assert len(found) == 2
     assert sorted(found.first[0].tolist()) == pytest.approx([-0.4, -0.1])
