@@ -8,6 +8,7 @@ if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` lo
     from relgym.envs.ball_box_ramp import BallBoxRampEnv
     from relgym.envs.ball_goal import BallGoalEnv
     from relgym.envs.base import EnvState, SceneEnv
+    from relgym.envs.box_push import BoxPushEnv
     from relgym.envs.flat import FlatSpec, Flattener
     from relgym.envs.learned_model import LearnedModelEnv
     from relgym.envs.learned_model_rewards import in_batches
@@ -28,6 +29,7 @@ _HOMES = {
     "AgentsSpace": "relgym.envs.agents",
     "BallBoxRampEnv": "relgym.envs.ball_box_ramp",
     "BallGoalEnv": "relgym.envs.ball_goal",
+    "BoxPushEnv": "relgym.envs.box_push",
     "EnvState": "relgym.envs.base",
     "FlatSpec": "relgym.envs.flat",
     "Flattener": "relgym.envs.flat",
@@ -47,6 +49,7 @@ __all__ = [
     "AgentsSpace",
     "BallBoxRampEnv",
     "BallGoalEnv",
+    "BoxPushEnv",
     "EnvState",
     "FlatSpec",
     "Flattener",

@@ -18,7 +18,7 @@ from relgym.scene.axes import Axes
 from relgym.scene.geometry.vectors import rotation
 from relgym.scene.hull import outline_of
 from relgym.scene.objects import POSE, Float1D, Float2D, Scene, SceneObject
-from relgym.scene.shapes import ConvexPolyhedron, Sphere, outline
+from relgym.scene.shapes import ConvexPolyhedron, Sphere, outline, outlines
 
 __all__ = ["Camera", "SceneViewer", "View", "render_scene", "scene_view"]
 
@@ -31,6 +31,8 @@ _INK: Colour = (45, 52, 60)
 _GOAL: Colour = (255, 214, 92)
 _COLOURS: dict[str, Colour] = {
     "ball": (230, 126, 34),
+    "pusher": (230, 126, 34),
+    "rail": (188, 190, 193),
     "box": (93, 142, 190),
     "ramp": (106, 168, 121),
     "truck": (196, 84, 77),
@@ -333,10 +335,13 @@ class _Pen:
 def _bodies(scene: Scene) -> list[_Drawn]:
     poses = scene.pose()
     names = [scene.layout.names[i] for i in scene.layout.bodies]
-    return [_drawn(scene, scene[name], pose) for name, pose in zip(names, poses, strict=True)]
+    return [
+        part for name, pose in zip(names, poses, strict=True) for part in _drawn(scene, scene[name], pose)
+    ]
 
 
-def _drawn(scene: Scene, body: SceneObject, pose: Float1D) -> _Drawn:
+def _drawn(scene: Scene, body: SceneObject, pose: Float1D) -> list[_Drawn]:
+    """What a body looks like, part by part."""
     axes = Axes.of(scene.schema)
     first, up, depth = axes.canonical
     z = 0.0 if axes.planar else float(pose[depth])
@@ -344,9 +349,10 @@ def _drawn(scene: Scene, body: SceneObject, pose: Float1D) -> _Drawn:
     kind = scene.schema.ancestry(body.type.name)[-1]
     colour = _colour(kind)
     if isinstance(body.type.shape, Sphere):
-        return _Drawn(body, colour, centre, z, None, float(pose[POSE.index("sx")]) / 2)
-    corners = centre + _outline(axes, body, pose)
-    return _Drawn(body, colour, centre, z, corners, 0.0, wheeled=kind in _WHEELED and _upright(corners))
+        return [_Drawn(body, colour, centre, z, None, float(pose[POSE.index("sx")]) / 2)]
+    parts = [centre + corners for corners in _outlines(axes, body, pose)]
+    wheeled = kind in _WHEELED
+    return [_Drawn(body, colour, centre, z, part, 0.0, wheeled=wheeled and _upright(part)) for part in parts]
 
 
 def _upright(corners: Float2D) -> bool:
@@ -355,18 +361,16 @@ def _upright(corners: Float2D) -> bool:
     return len(corners) == 4 and bool((np.isclose(corners, low) | np.isclose(corners, high)).all())
 
 
-def _outline(axes: Axes, body: SceneObject, pose: Float1D) -> Float2D:
-    """Corners of a body's outline around its centre, as seen along the depth axis."""
+def _outlines(axes: Axes, body: SceneObject, pose: Float1D) -> list[Float2D]:
+    """Corners of the outlines of a body's parts around its centre, as seen along the depth axis."""
     shape, scale, angles = body.type.shape, pose[6:], pose[3:6]
     assert shape is not None, "only bodies are drawn"
     first, up, depth = axes.canonical
-    flat = outline(shape, (first, up))
     if axes.planar:
         angle = axes.turn * angles[depth]
-        u, w = flat[:, 0] * scale[first], flat[:, 1] * scale[up]
-        return np.stack(
-            [math.cos(angle) * u - math.sin(angle) * w, math.sin(angle) * u + math.cos(angle) * w], axis=1
-        )
+        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        return [(flat * scale[[first, up]]) @ turn for flat in outlines(shape, (first, up))]
+    flat = outline(shape, (first, up))
     if isinstance(shape, ConvexPolyhedron):
         corners = np.array(shape.vertices)
     else:
@@ -374,7 +378,7 @@ def _outline(axes: Axes, body: SceneObject, pose: Float1D) -> Float2D:
         corners[:, [first, up]] = np.concatenate([flat, flat])
         corners[:, depth] = np.repeat([-0.5, 0.5], len(flat))
     turned = (corners * scale) @ np.array(rotation(angles)).T
-    return outline_of(turned[:, [first, up]])
+    return [outline_of(turned[:, [first, up]])]
 
 
 def _extent(drawn: _Drawn) -> tuple[Float1D, Float1D]:

@@ -15,10 +15,12 @@ from relgym.envs.truck_push import BOX_MASS, GRAVITY, TRUCK_MASS
 from relgym.envs.truck_scenes import loads, stacks_of
 from relgym.scene.objects import Scene, SceneObject
 
-__all__ = ["ball_home", "push_as_if_unstacked", "push_knowing"]
+__all__ = ["ball_home", "deliver", "push_as_if_unstacked", "push_knowing"]
 
 _NEAR = 0.01  # units from the goal at which to stop: float32 actions leave less
 _CERTAIN = 0.98  # of the greatest deceleration: what is left makes sure that the last step ends at rest
+
+_STRIDE = 0.2  # units that a pusher goes in a decision of 10 steps
 
 _OVER, _BELOW = 0.3, 0.05  # units within which a ball counts as over its goal, and not under it
 _SPARE = 1.3  # radii over an obstacle's top
@@ -95,6 +97,46 @@ def ball_home(scene: Scene) -> NDArray[np.float32]:
     if ball["py"] < _clearance(scene):
         return _thrust(ball, 0.0, along)
     return _thrust(ball, goal["dx"], 1.0)
+
+
+def deliver(scene: Scene) -> NDArray[np.float32]:
+    """Go behind the parcel, seen from the goal, and push it there; go round it again when it slips away.
+
+    Parameters
+    ----------
+    scene
+        A scene of ``BoxPush-v0``.
+
+    Returns
+    -------
+    An action, shape ``(2,)``; good for decisions of 1 to 10 steps.
+    """
+    pusher, parcel, goal = scene["pusher"], scene["parcel"], scene["goal"]
+    way = np.array([goal["dx"], goal["dy"]])
+    ahead = way / max(float(np.hypot(*way)), 1e-9)
+    side = np.array([-ahead[1], ahead[0]])
+    from_parcel = np.array([pusher["px"] - parcel["px"], pusher["py"] - parcel["py"]])
+    behind, beside = -float(from_parcel @ ahead), float(from_parcel @ side)
+    radius, reach = pusher["sx"] / 2.0, float(np.hypot(parcel["sx"], parcel["sy"])) / 2.0
+    if behind > radius and abs(beside) < 0.3 * reach:
+        # Pushing on one side of the centre turns the parcel: pushing at the middle needs to be corrected all the time.
+        wanted = ahead - 5.0 * beside * side
+    else:
+        wanted = _round_to(from_parcel, -(reach + radius + 0.1) * ahead, reach + radius + 0.04) / _STRIDE
+    return np.asarray(wanted / max(1.0, float(np.abs(wanted).max())), dtype=np.float32)
+
+
+def _round_to(place: NDArray[np.float64], there: NDArray[np.float64], clear: float) -> NDArray[np.float64]:
+    """Direction from a place to another one, round a circle about the origin where that is in the way."""
+    way = there - place
+    along = float(np.clip(-(place @ way) / max(float(way @ way), 1e-12), 0.0, 1.0))
+    if float(np.hypot(*(place + along * way))) >= clear:
+        return way
+    out = place / max(float(np.hypot(*place)), 1e-9)
+    round_ = np.array([-out[1], out[0]])
+    if float(round_ @ way) < 0.0:
+        round_ = -round_
+    return _STRIDE * round_ + 3.0 * max(0.0, clear + 0.02 - float(np.hypot(*place))) * out
 
 
 def _thrust(ball: SceneObject, way: float, up: float) -> NDArray[np.float32]:

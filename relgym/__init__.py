@@ -20,6 +20,7 @@ __all__ = ["Dataset", "WorldModel", "__version__", "data", "envs", "fit", "progr
 # Entry points are strings: importing relgym loads neither pymunk nor the learner.
 gymnasium.register("relgym/BallBoxRamp-v0", "relgym.envs.ball_box_ramp:BallBoxRampEnv", max_episode_steps=200)
 gymnasium.register("relgym/BallGoal-v0", "relgym.envs.ball_goal:BallGoalEnv", max_episode_steps=500)
+gymnasium.register("relgym/BoxPush-v0", "relgym.envs.box_push:BoxPushEnv", max_episode_steps=1_000)
 gymnasium.register(
     "relgym/LearnedModel-v0",
     "relgym.envs.learned_model:LearnedModelEnv",

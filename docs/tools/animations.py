@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,8 @@ from gymnasium.wrappers import TimeLimit
 from PIL import Image, ImageDraw, ImageFont
 
 from relgym.envs import LearnedModelEnv
-from relgym.envs.scripted import ball_home, push_knowing
-from relgym.wrappers import ModelLearner
+from relgym.envs.scripted import ball_home, deliver, push_knowing
+from relgym.wrappers import ActionRepeat, ModelLearner
 
 FOLDER = Path(__file__).resolve().parents[1] / "envs"
 WIDTH = 560
@@ -51,6 +52,18 @@ def ball_goal() -> Frames:
     yield from _watched(env, lambda: ball_home(env.get_wrapper_attr("scene")), every=4)
 
 
+def box_push() -> Frames:
+    """Two episodes of the scripted policy: a box and a T are delivered."""
+    for seed, parcel in ((3, "box"), (9, "tee")):
+        env = gym.make("relgym/BoxPush-v0", n_boxes=3, parcel=parcel, render_mode="rgb_array")
+        env.reset(seed=seed, options={"count": 3})
+        yield from _watched(ActionRepeat(env, 10), partial(_delivering, env), every=1)
+
+
+def _delivering(env: gym.Env[Any, Any]) -> Any:
+    return deliver(env.get_wrapper_attr("scene"))
+
+
 def learned_model() -> Frames:
     """A ball in the world and, beside it, in a model that has watched 4,000 steps of other scenes."""
     watched = ModelLearner(gym.make("relgym/BallBoxRamp-v0"))
@@ -75,6 +88,7 @@ def learned_model() -> Frames:
 ANIMATIONS: dict[str, tuple[Callable[[], Frames], int]] = {
     "ball-box-ramp": (ball_box_ramp, 40),
     "ball-goal": (ball_goal, 40),
+    "box-push": (box_push, 80),
     "learned-model": (learned_model, 40),
     "truck-push": (truck_push, 140),
 }

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from relgym.laws.book import LawBook
 from relgym.laws.composition import Engaged, compose
-from relgym.laws.frames import axes_of, axis_names
+from relgym.laws.frames import axes_of, axis_names, turned
+from relgym.laws.impulses import solve
 from relgym.laws.records import AxisLaw, Piece
 from relgym.laws.touching import Contacts, Group
+from relgym.laws.turning import eases, rows_of
 from relgym.scene.geometry.vectors import FloatArray, dot
 
 __all__ = ["AxisAccount", "ContactAccount", "accounts", "happens"]
@@ -91,12 +93,60 @@ def accounts(
     engaged = book.engaged(contacts.cast)
     if engaged is None:
         return ()
+    if contacts.points is not None:
+        return tuple(_of_points(book, engaged, contacts, vectors, digits, motion.known[0]))
     return tuple(
         account
         for group in contacts.groups()
         if motion.known[0, contacts.cast.first[group.pairs[0]]].all()
         for account in _of_group(book, engaged, contacts, vectors, group, digits)
     )
+
+
+def _of_points(
+    book: LawBook,
+    engaged: Engaged,
+    contacts: Contacts,
+    vectors: NDArray[np.float64],
+    digits: int,
+    known: NDArray[np.bool_],
+) -> Iterator[ContactAccount]:
+    """Every point of contact, in the order of the islands."""
+    cast, points = contacts.cast, contacts.points
+    assert points is not None, "checked by the caller"
+    now, free, columns = book.free_motion(cast, vectors)
+    yields = eases(book.inertia, contacts, columns)
+    sense = np.array([1.0, 1.0, cast.axes.turn])[:, None, None]
+    moves = np.isin(np.arange(len(cast.layout.bodies)), cast.movers)
+    for island in points.islands(cast.first, cast.second, moves):
+        rows, _ = rows_of(island, cast, yields, engaged.law, engaged.chosen, sense * now, sense * free)
+        count = island.rows.shape[1]
+        for m in range(len(island.rows)):
+            pairs = island.points.pair[m]
+            if not known[cast.first[pairs]].all():
+                continue
+            one = rows.of(np.array([m]))
+            impulse = solve(one).impulse
+            others = (one.free + (one.gain * impulse[:, None]).sum(axis=2)) - np.diagonal(
+                one.gain[0]
+            ) * impulse
+            for k, pair in enumerate(pairs.tolist()):
+                normal = island.points.normal[:, m, k]
+                side = turned(normal) * (-1.0 if others[0, count + k] < 0.0 else 1.0)
+                axes = [normal[:, None], side[:, None]]
+                # Velocities of the point's surfaces against each other; along t the other row's impulse counts as well.
+                before, without = (
+                    values[0, k] * normal + values[0, count + k] * turned(normal)
+                    for values in (one.now, others)
+                )
+                told = _axes(
+                    engaged, pair, axes, before[:, None], without[:, None], digits, SLACK * book.tolerance,
+                    one.gain[0, count + k, count + k] / one.gain[0, k, k],
+                )  # fmt: skip
+                names = [
+                    cast.layout.names[cast.layout.bodies[side_[pair]]] for side_ in (cast.first, cast.second)
+                ]
+                yield ContactAccount((names[0], names[1]), engaged.law.frame, tuple(told))
 
 
 def _of_group(
@@ -130,6 +180,7 @@ def _axes(
     others: FloatArray,
     digits: int,
     slack: float,
+    pressed: float = 1.0,
 ) -> Iterator[AxisAccount]:
     letters = axis_names(engaged.law.frame, len(before))
     features: dict[str, FloatArray] = {}
@@ -140,14 +191,15 @@ def _axes(
         free = features[f"u_{letter}"]
         values = [float(piece.values(features, free)[0]) for piece in law.pieces]
         holds = int(np.argmax(values) if law.operator == "max" else np.argmin(values))
-        features[f"J_{letter}"] = np.array([values[holds]]) - free
+        impulse = values[holds] - float(free[0])
+        features[f"J_{letter}"] = np.array([pressed * impulse])
         yield AxisAccount(
             letter,
             tuple(float(c) + 0.0 for c in axis[:, 0]),
             law.formula(digits),
             law.pieces[holds].formula(digits),
             values[holds],
-            float(features[f"J_{letter}"][0]),
+            impulse,
             happens(law.pieces[holds], letter, float(features[f"v_{letter}"][0]), slack),
         )
 

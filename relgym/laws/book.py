@@ -9,16 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.html import html_table
-from relgym.laws.columns import Sources
+from relgym.laws.columns import Sources, vector_types
 from relgym.laws.composition import Engaged, compose, within
 from relgym.laws.frames import POINT
 from relgym.laws.free import free_motion
+from relgym.laws.impulses import Solved, solve
+from relgym.laws.inertia import Inertia
 from relgym.laws.joints import Joints
-from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
+from relgym.laws.points import Points
+from relgym.laws.records import ONE, FreeLaw, Kind, PairLaw, Share
 from relgym.laws.shares import EXTENT, share_values
 from relgym.laws.touching import Cast, Contacts, Group
+from relgym.laws.turning import eases, precedented, push, rows_of
 from relgym.scene.geometry.vectors import FloatArray
-from relgym.scene.objects import SceneLayout
+from relgym.scene.objects import SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LawBook", "Motion"]
@@ -72,6 +76,10 @@ class LawBook:
         The law of touching pairs, once there is one.
     shares
         Shares of moving pairs, by kind.
+    inertia
+        What is known of masses and moments, where bodies turn.
+    turning
+        Whether a type turns that isn't round: then laws are about points of contact.
     tolerance
         Largest residual of an explained velocity component.
     """
@@ -82,6 +90,8 @@ class LawBook:
         self.free: dict[str, FreeLaw] = {}
         self.pair: PairLaw | None = None
         self.shares: dict[Kind, Share] = {}
+        self.inertia = Inertia()
+        self.turning = any(s.turns for s in sources.values())
         self.tolerance = 1e-15
         self._casts: dict[SceneLayout, Cast] = {}
         self._rounded: dict[SceneLayout, NDArray[np.intp]] = {}
@@ -116,7 +126,8 @@ class LawBook:
     def components(self, type_name: str) -> tuple[str, ...]:
         """Properties of a type that the laws predict: its velocity, and its spin if contacts act on surfaces."""
         sources = self.sources[type_name]
-        return sources.moving if self.pair is not None and self.pair.frame == POINT else sources.velocity
+        surfaces = self.turning or (self.pair is not None and self.pair.frame == POINT)
+        return sources.moving if surfaces else sources.velocity
 
     def forget(self) -> None:
         """The laws changed: forget what was worked out from them."""
@@ -139,9 +150,52 @@ class LawBook:
         for body in cast.movers:
             stated[:, body] = np.isfinite(velocity[: self._count(cast, body), :, body]).all(axis=0)
         motion = Motion(velocity, stated.copy(), stated, np.zeros_like(stated), columns)
+        if contacts.points is not None:
+            self._push(contacts, contacts.points, now, motion)
+            return motion
         for group in contacts.groups():
             self._collide(contacts, group, now, motion)
         return motion
+
+    def _push(self, contacts: Contacts, points: Points, now: FloatArray, motion: Motion) -> None:
+        """Let contacts at points act, island by island, in place."""
+        cast = contacts.cast
+        moves = np.zeros(len(cast.layout.bodies), dtype=bool)
+        moves[list(cast.movers)] = True
+        laws = self._engaged_pairs(cast)
+        yields = eases(self.inertia, contacts, motion.columns)
+        sense = np.array([1.0, 1.0, cast.axes.turn])[:, None, None]
+        before, free = sense * now, sense * motion.velocity
+        after = free.copy()
+        slack = SPREAD * self.tolerance
+        for island in points.islands(cast.first, cast.second, moves):
+            scene = island.points.scene
+            ends = [side[island.points.pair] for side in (cast.first, cast.second)]
+            for end in ends:
+                motion.touched[scene, end] = True
+            sure = np.zeros(len(scene), dtype=bool)
+            stated = sure
+            for number, engaged in enumerate(laws):
+                rows, known = rows_of(island, cast, yields, engaged.law, engaged.chosen, before, free)
+                some = np.flatnonzero(known)
+                solved = Solved(np.zeros(rows.free.shape), np.zeros(len(known), dtype=bool))
+                if len(some):
+                    found = solve(rows.of(some))
+                    solved.impulse[some], solved.settled[some] = found.impulse, found.settled
+                if not number:
+                    first, stated = solved, known
+                    chosen = engaged.chosen[:, island.points.pair]
+                    sure = known & solved.settled & precedented(rows, solved, engaged.law, chosen, slack)
+                    continue
+                # Of impulses that may be shared out differently only what they do to the points counts.
+                change = (rows.gain * (solved.impulse - first.impulse)[:, None]).sum(axis=2)
+                sure &= known & (np.abs(change) <= slack).all(axis=1)
+            if laws:
+                push(island, cast, yields, first, after, stated)
+            for end in ends:
+                motion.stated[scene, end] &= stated[:, None]
+                motion.known[scene, end] &= sure[:, None]
+        motion.velocity[:] = sense * np.where(motion.stated, after, free)
 
     def free_motion(
         self, cast: Cast, vectors: NDArray[np.float64]
@@ -153,11 +207,35 @@ class LawBook:
         for body in cast.movers:
             sources, places = cast.sources[body]
             columns[body] = state[places]
-            law = self.free.get(sources.type.name)
+            law = self.free_law(sources.type.name)
             velocity[: len(sources.moving), :, body] = np.nan
             if law is not None:
                 velocity[: len(law.components), :, body] = free_motion(law, sources.names, columns[body])
         return now, velocity, columns
+
+    def free_law(self, type_name: str) -> FreeLaw | None:
+        """The free law of a type; of one never seen that of its kin, if all types with the same parent agree."""
+        if type_name in self.free:
+            return self.free[type_name]
+        parent = self.schema.type(type_name).parent
+        kin = [
+            law
+            for t in self.schema.types
+            if t.parent == parent and (law := self.free.get(t.name)) is not None
+        ]
+        stated = {tuple(piece.formula(9) for piece in law.components) for law in kin}
+        read = {name for law in kin for piece in law.components for name, _ in piece.terms if name != ONE}
+        known = read <= set(self.sources[type_name].names)
+        return kin[0] if parent is not None and len(stated) == 1 and known else None
+
+    def on(self, schema: SceneSchema, targets: tuple[Target, ...]) -> LawBook:
+        """The same laws for scenes of another schema, of which `targets` are predicted."""
+        book = LawBook(
+            schema, {t.name: Sources.of(schema, t, targets) for t in vector_types(schema, targets)}
+        )
+        book.free, book.pair, book.shares = dict(self.free), self.pair, dict(self.shares)
+        book.inertia, book.tolerance = self.inertia, self.tolerance
+        return book
 
     def _count(self, cast: Cast, body: int) -> int:
         """Number of components that the laws predict of a mover."""

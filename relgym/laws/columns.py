@@ -28,13 +28,13 @@ def vector_types(schema: SceneSchema, targets: tuple[Target, ...]) -> tuple[Obje
 
 
 def spin_of(schema: SceneSchema, t: ObjectType, targets: tuple[Target, ...]) -> str | None:
-    """Name of the property that says how fast a round type spins in the plane; None where none is learned.
+    """Name of the property that says how fast a type spins in the plane; None where none is learned.
 
-    It is the one that is declared as the rate of the rotation about the depth axis. The point of a round body
-    that touches something is known: where its surface faces the other one. So is, with the spin, how fast it moves.
+    It is the one that is declared as the rate of the rotation about the depth axis. The points at which bodies touch
+    are known, and so is, with the spin, how fast they move.
     """
     axes = Axes.of(schema)
-    if not axes.planar or not isinstance(t.shape, Sphere):
+    if not axes.planar or t.shape is None:
         return None
     rotation = f"r{WORLD[axes.depth]}"
     angle = t.pose.get(rotation, rotation)
@@ -76,6 +76,11 @@ class Sources:
         single = [b for b in schema.types if not b.has_body and _count(schema, b) == 1]
         outside = [f"{b.name}.{p}" for b in sorted(single, key=_by_name) for p in b.properties]
         return cls(t, velocity, spin, (*moving, *others, *outside))
+
+    @property
+    def turns(self) -> bool:
+        """Whether the type spins and isn't round: where it is touched depends on how it is turned."""
+        return self.spin is not None and not isinstance(self.type.shape, Sphere)
 
     @property
     def moving(self) -> tuple[str, ...]:

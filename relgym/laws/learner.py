@@ -18,12 +18,16 @@ from numpy.typing import NDArray
 from relgym.laws.book import LawBook, Motion
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
+from relgym.laws.drift import Drift
 from relgym.laws.encounters import EncounterStore
 from relgym.laws.free import FreeLearner
+from relgym.laws.inertia import Inertia
 from relgym.laws.ledger import Ledger
-from relgym.laws.pair import fit_pair
+from relgym.laws.pair import PairFit, fit_pair
+from relgym.laws.points import Points
 from relgym.laws.records import FreeLaw, PairLaw, Share
 from relgym.laws.touching import Cast, Contacts
+from relgym.laws.turning import PushStore
 from relgym.scene.objects import Target
 from relgym.scene.schema import SceneSchema
 
@@ -79,7 +83,11 @@ class LawLearner:
         self.book = LawBook(schema, self.sources)
         self._noise = None if noise_std == "auto" else float(noise_std)
         self._free = {name: FreeLearner(s, seed=seed) for name, s in self.sources.items()}
-        self._store = EncounterStore(schema, self.sources, seed=seed)
+        # Of bodies that turn only contacts in one point tell which impulse did what.
+        self._store: EncounterStore | PushStore = EncounterStore(schema, self.sources, seed=seed)
+        if self.book.turning:
+            self._store = PushStore(schema, self.sources, seed=seed)
+        self._drift = {name: Drift() for name in self.sources}
         self._rng = np.random.default_rng([seed, 3])
         self._ledger = Ledger(self.sources)
         self._news = 0
@@ -92,8 +100,11 @@ class LawLearner:
         return tuple(self.sources)
 
     def ready(self, type_name: str) -> bool:
-        """Whether there are a free law of the type and a law of pairs."""
-        return type_name in self.book.free and self.book.pair is not None
+        """Whether there are a free law of the type and a law of pairs.
+
+        Bodies that turn do what no mode says where they touch: without a law of pairs nothing is claimed there.
+        """
+        return type_name in self.book.free and (self.book.pair is not None or self.book.turning)
 
     def seen(self, type_name: str) -> int:
         """Number of a type's transitions."""
@@ -108,13 +119,17 @@ class LawLearner:
 
         Of examples only some are kept; exceptions among those stand for more.
         """
-        if not self.ready(type_name) or self.book.pair is None:
+        if not self.ready(type_name):
             return float("inf")
         count, free, pair = len(self.book.components(type_name)), self.book.free[type_name], self.book.pair
         forgotten = self._free[type_name].seen / max(1, free.examples) - 1.0
         numbers = len(free.components) * free.unexplained * max(0.0, forgotten)
-        numbers += pair.unexplained * max(0.0, self._store.seen / max(1, pair.examples) - 1.0)
-        numbers += count * (self._ledger.unlearned(type_name) + self._news)
+        numbers += count * self._ledger.unlearned(type_name)
+        if pair is None:
+            return free.bits + EXCEPTION_BITS * (numbers + count * self._store.seen)
+        numbers += (
+            pair.unexplained * max(0.0, self._store.seen / max(1, pair.examples) - 1.0) + count * self._news
+        )
         return free.bits + pair.bits + EXCEPTION_BITS * numbers
 
     # ------------------------------------------------------------------ learning
@@ -158,7 +173,7 @@ class LawLearner:
                     changed |= self._learn_free(cast, body, motion, after[:, body], right[body])
         if changed:
             self._restate()
-        single = self._single(cast, touching.tolist(), degree, stays)
+        single = self._single(cast, touching.tolist(), degree, stays, contacts.points)
         self._count(cast, right, degree, single)
         news = [self._meet(contacts, pair, vector, after, right) for pair in single]
         if any(news) or (news and _doubled(self._store.seen, len(news))):
@@ -192,6 +207,8 @@ class LawLearner:
             return False
         degree = np.zeros(len(cast.layout.bodies), dtype=np.int64)
         touching = [k for k, (a, b) in enumerate(cast.pairs) if b in touched[a]]
+        if touching and self.book.turning:
+            return False  # whether they touch in one point is to be looked at
         for pair in touching:
             degree[list(cast.pairs[pair])] += 1
         free = [body for body in cast.movers if not degree[body]]
@@ -212,9 +229,13 @@ class LawLearner:
         state = cast.padded(vector[None])[:, 0]
         for body in free:
             sources, places = cast.sources[body]
+            d = len(sources.velocity)
+            name = cast.layout.names[cast.layout.bodies[body]]
+            self._drift[sources.type.name].add(name, state[places[:d]], after[:d, body])
             self._free[sources.type.name].confirm(state[places], after[: len(sources.moving), body])
         self._count(cast, dict.fromkeys(cast.movers, True), degree, single)
         for pair in single:
+            assert isinstance(self._store, EncounterStore), "of bodies that turn none is single here"
             self._store.confirm(contacts, cast, pair, vector, after)
         return True
 
@@ -237,10 +258,13 @@ class LawLearner:
     ) -> bool:
         name = cast.sources[body][0].type.name
         learner = self._free[name]
+        d = len(learner.sources.velocity)
+        now = motion.columns[body][:d, 0]
+        self._drift[name].add(cast.layout.names[cast.layout.bodies[body]], now, after[:d])
         after = after[: len(learner.sources.moving)]
         changed = learner.learn_one(motion.columns[body][:, 0], after, right, self.book.tolerance)
         if learner.seen in ESTIMATE_AT and self._noise is None:
-            changed |= self._estimate(learner)
+            changed |= self._estimate(learner, self._drift[name])
         if learner.law is not None:  # more examples may have changed its last digits
             self.book.free[name] = learner.law
         return changed
@@ -251,12 +275,17 @@ class LawLearner:
         touching: Sequence[int],
         degree: NDArray[np.int64],
         stays: Mapping[int, bool] | None = None,
+        points: Points | None = None,
     ) -> list[int]:
-        """Pairs whose bodies touch nothing else; what a body that never moves touches is all the same."""
+        """Pairs whose bodies touch nothing else; what a body that never moves touches is all the same.
+
+        Of bodies that turn those that touch in a single point.
+        """
         found = []
         for pair in touching:
             a, b = int(cast.first[pair]), int(cast.second[pair])
             alone = degree[a] == 1 and (degree[b] == 1 or not cast.both[pair])
+            alone = alone and (points is None or int((points.pair == pair).sum()) == 1)
             if alone and (stays is None or (stays[cast.layout.bodies[a]] and stays[cast.layout.bodies[b]])):
                 found.append(pair)
         return found
@@ -292,20 +321,39 @@ class LawLearner:
 
     def _derive(self) -> bool:
         """Seek the law of pairs among the contacts kept; whether it changed."""
-        encounters = self._store.encounters(self.book)
-        if encounters is None or len(encounters) < FEWEST_CONTACTS:
+        before = self._says()
+        found = self._found()
+        if found is None:
             return False
         self._news = 0
-        found = fit_pair(encounters, rng=self._rng)
-        before = (None if self.book.pair is None else self.book.pair.says(), self.book.shares)
         self.book.pair = found.law
-        self.book.shares = self._store.shares(self.book)
         self._stored_wrong = int((~found.explained).sum())
-        changed = before != (found.law.says(), self.book.shares)
+        changed = before != self._says()
         if changed:
             self._settle()
         self.book.forget()
         return changed
+
+    def _found(self) -> PairFit | None:
+        """The law of pairs that the contacts kept give, and how bodies share what it says; None if too few do."""
+        book, store = self.book, self._store
+        if isinstance(store, PushStore):
+            if len(store) < FEWEST_CONTACTS:
+                return None
+            book.inertia = store.inertia(book.free, book.tolerance, rng=self._rng)
+            return store.fit(book.free, book.inertia, book.tolerance, rng=self._rng)
+        encounters = store.encounters(book)
+        if encounters is None or len(encounters) < FEWEST_CONTACTS:
+            return None
+        found = fit_pair(encounters, rng=self._rng)
+        book.pair = found.law
+        book.shares = store.shares(book)
+        return found
+
+    def _says(self) -> tuple[Any, ...]:
+        """What the laws of contacts state."""
+        pair = self.book.pair
+        return None if pair is None else pair.says(), dict(self.book.shares), self.book.inertia.says()
 
     def _settle(self) -> None:
         self.book.forget()
@@ -321,9 +369,11 @@ class LawLearner:
         floor = STDS * ROUNDINGS * float(np.finfo(np.float64).eps) * largest
         self.book.tolerance = max(self.book.tolerance, floor)
 
-    def _estimate(self, learner: FreeLearner) -> bool:
+    def _estimate(self, learner: FreeLearner, drift: Drift) -> bool:
         """Estimate the noise where the free law holds for few examples only; whether that gave a law."""
         law = learner.law
+        if not drift.noisy():
+            return False
         if law is not None and law.unexplained <= 0.02 * law.examples:
             return False
         spread = learner.spread()
@@ -338,6 +388,11 @@ class LawLearner:
         """Width of a stored contact, and most of them that are kept."""
         return self._store.shape
 
+    @property
+    def object_columns(self) -> tuple[int, ...]:
+        """Columns of a stored contact that hold numbers of objects: none unless bodies turn."""
+        return self._store.object_columns if isinstance(self._store, PushStore) else ()
+
     def free_shape(self, type_name: str) -> tuple[int, int]:
         """The same of a type's free examples."""
         return self._free[type_name].store.shape
@@ -351,6 +406,7 @@ class LawLearner:
             "shares": [
                 [*kind, s.property, s.power, s.constant] for kind, s in sorted(self.book.shares.items())
             ],
+            "inertia": self.book.inertia.to_json(),
             "ledger": self._ledger.to_json(),
             "stored_wrong": self._stored_wrong,
             "news": self._news,
@@ -360,6 +416,7 @@ class LawLearner:
             data |= {
                 "random": self._rng.bit_generator.state,
                 "store": self._store.to_json(),
+                "drift": [[name, *d.to_json()] for name, d in sorted(self._drift.items())],
                 "learners": [[name, *f.to_json()] for name, f in sorted(self._free.items())],
             }
         return data
@@ -378,6 +435,7 @@ class LawLearner:
         book.free = {law.type: law for law in map(FreeLaw.from_json, data["free"])}
         book.pair = None if data["pair"] is None else PairLaw.from_json(data["pair"])
         book.shares = {(a, b): Share(p, int(k), float(c)) for a, b, p, k, c in data["shares"]}
+        book.inertia = Inertia.from_json(data["inertia"]) if "inertia" in data else Inertia()
         book.forget()
         self._ledger.restore(data["ledger"])
         self._stored_wrong, self._news = int(data["stored_wrong"]), int(data["news"])
@@ -388,6 +446,8 @@ class LawLearner:
             return
         self._rng.bit_generator.state = data["random"]
         self._store.restore(data["store"], _part(arrays, "contacts"))
+        for name, *sums in data.get("drift") or ():
+            self._drift[name].restore(sums)
         for k, (name, *state) in enumerate(data["learners"]):
             self._free[name].restore(state, _part(arrays, f"free{k}"))
 

@@ -90,6 +90,11 @@ def law_rows(book: LawBook, types: Iterable[str], digits: int = 7) -> tuple[LawR
     for (a, b), share in sorted(book.shares.items()):
         statement = f"A's velocity takes {share.formula(digits)} of the change, B's the rest"
         rows.append(LawRow(f"{a} A touching {b} B", statement, book.pair.frame, 0, 0))
+    for sentence in book.inertia.sentences(digits):
+        subject, _, statement = (
+            sentence.partition(": ") if "over mass" in sentence else sentence.partition(" go as ")
+        )
+        rows.append(LawRow(subject, statement, book.pair.frame, 0, 0))
     for grip, kinds in _grips(book.pair).items():
         statement = f"velocities take {grip:.{digits}g} of the change along t, spins the rest"
         rows.append(LawRow(f"touching {kinds}", statement, book.pair.frame, 0, 0))

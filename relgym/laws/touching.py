@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from relgym.laws.columns import Sources
 from relgym.laws.frames import Bearings
+from relgym.laws.points import Points, find_points
 from relgym.laws.records import Kind
 from relgym.scene.axes import Axes
 from relgym.scene.contacts import velocity_columns
+from relgym.scene.geometry.areas import mean_squares
+from relgym.scene.geometry.manifolds import Manifolds
 from relgym.scene.geometry.vectors import FloatArray, norm
-from relgym.scene.objects import SceneLayout, poses
+from relgym.scene.objects import ObjectType, SceneLayout, poses
 from relgym.scene.relations import Relations
 from relgym.scene.schema import SceneSchema
 
@@ -48,6 +51,10 @@ class Cast:
         Whether a body's spin is learned, shape ``(K,)``.
     pairs
         `first` and `second` of each pair.
+    manifolds
+        Finds the points of contacts, where bodies turn that aren't round; else None.
+    squares
+        Area and mean squares of the bodies' canonical shapes (`mean_squares`), shape ``(3, K)``; empty otherwise.
     """
 
     axes: Axes
@@ -61,6 +68,8 @@ class Cast:
     velocities: NDArray[np.intp]
     spins: NDArray[np.bool_]
     pairs: tuple[tuple[int, int], ...]
+    manifolds: Manifolds | None
+    squares: FloatArray
 
     @classmethod
     def of(cls, schema: SceneSchema, layout: SceneLayout, sources: Mapping[str, Sources]) -> Cast:
@@ -94,6 +103,7 @@ class Cast:
             np.where(columns < 0, layout.width + 1, columns),
             spin >= 0,
             tuple(pairs),
+            *_geometry(axes, types, sources),
         )
 
     @property
@@ -105,6 +115,16 @@ class Cast:
         """State vectors, columns first, with NaN and 0 behind them, shape ``(width + 2, n)``."""
         n = len(vectors)
         return np.concatenate([vectors.T, np.full((1, n), np.nan), np.zeros((1, n))])
+
+
+def _geometry(
+    axes: Axes, types: list[ObjectType], sources: Mapping[str, Sources]
+) -> tuple[Manifolds | None, FloatArray]:
+    """What finds the points of contacts and what masses follow from, if something turns that isn't round."""
+    if not any(s.turns for s in sources.values()):
+        return None, np.empty((3, 0))
+    shapes = [t.shape for t in types if t.shape is not None]
+    return Manifolds(axes, shapes), mean_squares(shapes, (axes.used[0], axes.used[1]))
 
 
 def _spin_columns(layout: SceneLayout, sources: Mapping[str, Sources]) -> NDArray[np.intp]:
@@ -141,18 +161,26 @@ class Contacts:
     ----------
     hits
         Which pairs of the cast touch, shape ``(n, P)``.
+    points
+        At which points, where bodies turn that aren't round.
     """
 
     cast: Cast
     relations: Relations
     pose: NDArray[np.float64]
     hits: NDArray[np.bool_]
+    points: Points | None = None
 
     @classmethod
     def of(cls, cast: Cast, relations: Relations, vectors: NDArray[np.float64]) -> Contacts:
         """Find the contacts of n scenes."""
-        hits = relations.touching(cast.first, cast.second)
-        return cls(cast, relations, poses(cast.layout, vectors), hits)
+        hits, pose = relations.touching(cast.first, cast.second), poses(cast.layout, vectors)
+        if cast.manifolds is None:
+            return cls(cast, relations, pose, hits)
+        points = find_points(cast.manifolds, pose, hits, cast.first, cast.second)
+        met = np.zeros_like(hits)
+        met[points.scene, points.pair] = True
+        return cls(cast, relations, pose, met, points)
 
     def groups(self) -> Iterator[Group]:
         """Scenes by their number of contacts, those without any left out."""

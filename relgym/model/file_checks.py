@@ -40,6 +40,7 @@ from relgym.model.file_format import (
     ClustererRecord,
     DefinitionRecord,
     ExemplarsRecord,
+    InertiaRecord,
     LandingRecord,
     LawsRecord,
     LearnedLawsRecord,
@@ -534,11 +535,12 @@ def _check_laws(record: LawsRecord, learner: LawLearner, arrays: _Arrays | None)
         for terms in law.components:
             _check_terms(terms, {*own.names, ONE}, "laws.free")
     _distinct(record.governed, "laws.governed")
-    ready = set(free) if laws.pair is not None else set()
+    ready = set(free) if laws.pair is not None or learner.book.turning else set()
     _require(ready.issuperset(record.governed), "laws.governed", f"expected some of {sorted(ready)}")
     if laws.pair is not None:
         _check_pair_law(laws, learner)
     names = {name: {EXTENT, *(n for n in s.names if "." not in n)} for name, s in sources.items()}
+    _check_inertia(laws, learner)
     _distinct([(a, b) for a, b, *_ in laws.shares], "laws.shares")
     for a, b, prop, _, _ in laws.shares:
         _require(a in sources and b in sources, "laws.shares", f"no law is learned of {a!r} and {b!r}")
@@ -551,6 +553,24 @@ def _check_laws(record: LawsRecord, learner: LawLearner, arrays: _Arrays | None)
     _require(whole, "laws", "random, store and learners go with the history")
     if laws.store is not None and laws.learners is not None and arrays is not None:
         _check_kept(laws, learner, arrays)
+
+
+def _check_inertia(laws: LearnedLawsRecord, learner: LawLearner) -> None:
+    """What masses and moments are functions of is looked up name by name: a name that nothing has says nothing."""
+    inertia = laws.inertia
+    _require(
+        learner.book.turning or inertia == InertiaRecord(), "laws.inertia", "nothing turns in these scenes"
+    )
+    if inertia.mass is not None:
+        _distinct([name for name, _ in inertia.mass.constants], "laws.inertia.mass.constants")
+        _require(
+            all(value > 0.0 for _, value in inertia.mass.constants),
+            "laws.inertia.mass",
+            "expected constants above 0",
+        )
+    for gyration in inertia.gyrations:
+        for name in gyration.types:
+            _require(name in learner.sources, "laws.inertia.gyrations", f"no law is learned of {name!r}")
 
 
 def _check_terms(terms: Sequence[tuple[str, float]], known: Collection[str], where: str) -> None:
@@ -604,12 +624,19 @@ def _check_kept(laws: LearnedLawsRecord, learner: LawLearner, arrays: _Arrays) -
     _distinct(laws.store.kinds, "laws.store.kinds")
     names = sorted(learner.sources)
     _require([name for name, *_ in laws.learners] == names, "laws.learners", f"expected {names}")
+    _require(
+        laws.drift is None or [name for name, *_ in laws.drift] == names, "laws.drift", f"expected {names}"
+    )
     width, limit = learner.store_shape
     rows = _stored(arrays, "laws.contacts", width, limit, laws.store.store.seen, 2 * len(laws.store.kinds))
     if rows.size:
         kinds = rows[:, 0]
         _require(_within(kinds, 0, len(laws.store.kinds)), "laws.contacts", "expected kinds of contacts")
         _require((kinds == np.floor(kinds)).all(), "laws.contacts", "expected numbers of kinds")
+        for column in learner.object_columns:
+            numbers = rows[:, column]
+            _require(_within(numbers, 0, len(laws.store.objects)), "laws.contacts", "expected objects")
+            _require((numbers == np.floor(numbers)).all(), "laws.contacts", "expected numbers of objects")
     for k, (name, _, _, store) in enumerate(laws.learners):
         width, limit = learner.free_shape(name)
         _stored(arrays, f"laws.free{k}", width, limit, store.seen, 2)

@@ -86,7 +86,18 @@ class PolyhedronRecord(Record, tag_field="kind", tag="polyhedron"):
     vertices: Annotated[list[Point3], Meta(min_length=4, max_length=1_000)]
 
 
-ShapeRecord: TypeAlias = SphereRecord | BoxRecord | WedgeRecord | PrismRecord | PolyhedronRecord
+class CompoundRecord(Record, tag_field="kind", tag="compound"):
+    """Convex polygons that hang together, extruded along the depth axis."""
+
+    parts: Annotated[
+        list[Annotated[list[Point2], Meta(min_length=3, max_length=1_000)]],
+        Meta(min_length=1, max_length=100),
+    ]
+
+
+ShapeRecord: TypeAlias = (
+    SphereRecord | BoxRecord | WedgeRecord | PrismRecord | PolyhedronRecord | CompoundRecord
+)
 
 
 class TypeRecord(Record):
@@ -494,6 +505,33 @@ class PairLawRecord(Record):
     grips: list[tuple[Name, Name, Finite]]
 
 
+class MassRecord(Record):
+    """Masses up to a common factor: a product of powers, times a constant of each type or object."""
+
+    factors: Annotated[list[tuple[str, Literal[1, 2, 3]]], Meta(max_length=4)]
+    by: Literal["", "type", "object"]
+    constants: list[tuple[str, Finite]]
+    examples: Count
+    unexplained: Count
+
+
+class GyrationRecord(Record):
+    """Moment over mass of some types, or of all: a linear function; null where contacts don't turn them."""
+
+    types: list[Name]
+    whole: bool
+    terms: Terms | None
+    examples: Count
+    unexplained: Count
+
+
+class InertiaRecord(Record):
+    """How hard bodies are to move and to turn."""
+
+    mass: MassRecord | None = None
+    gyrations: list[GyrationRecord] = []
+
+
 class StoreRecord(Record):
     """How many examples ever came, and how those kept are chosen; the examples are arrays."""
 
@@ -502,14 +540,15 @@ class StoreRecord(Record):
 
 
 class ContactsRecord(Record):
-    """Kinds of contacts (types of the two bodies), and their store."""
+    """Kinds of contacts (types of the two bodies), names of the objects if bodies turn, and their store."""
 
     kinds: list[Pair]
     store: StoreRecord
+    objects: list[str] = []
 
 
 class LearnedLawsRecord(Record):
-    """The laws; the last three fields only with history."""
+    """The laws; the last four fields only with history."""
 
     tolerance: Noise
     free: list[FreeLawRecord]
@@ -519,9 +558,11 @@ class LearnedLawsRecord(Record):
     stored_wrong: Count
     news: Count
     seen: Count
+    inertia: InertiaRecord = field(default_factory=InertiaRecord)
     random: Random | None = None
     store: ContactsRecord | None = None
     learners: list[tuple[Name, Count, Random, StoreRecord]] | None = None
+    drift: list[tuple[Name, Count, Count, tuple[Finite, Finite, Finite], Amount, Amount]] | None = None
 
 
 class LawsRecord(Record):

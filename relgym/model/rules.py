@@ -165,6 +165,7 @@ def _motion(model: WorldModel) -> MotionRules | None:
         "".join(letters),
         tuple(sorted(book.shares.items())),
         book.tolerance,
+        book.inertia,
     )
 
 

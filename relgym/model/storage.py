@@ -29,7 +29,7 @@ from relgym.files.reading import (
 from relgym.files.writing import write_whole
 from relgym.scene.objects import Kinematics, ObjectType, Target
 from relgym.scene.schema import SceneSchema
-from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
+from relgym.scene.shapes import Box, Compound, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
 
 __all__ = [
     "FORMAT",
@@ -54,6 +54,7 @@ _SHAPES: dict[str, type] = {
     "wedge": Wedge,
     "prism": Prism,
     "polyhedron": ConvexPolyhedron,
+    "compound": Compound,
 }
 
 
@@ -252,6 +253,8 @@ def _type_from_json(data: dict[str, Any]) -> ObjectType:
 def shape_to_json(shape: Shape) -> dict[str, Any]:
     """Plain data that `shape_from_json` reads back."""
     kind = next(name for name, cls in _SHAPES.items() if type(shape) is cls)
+    if isinstance(shape, Compound):
+        return {"kind": kind, "parts": [[list(c) for c in part] for part in shape.parts]}
     corners = getattr(shape, "vertices", None)
     return {"kind": kind} if corners is None else {"kind": kind, "vertices": [list(c) for c in corners]}
 
@@ -259,6 +262,8 @@ def shape_to_json(shape: Shape) -> dict[str, Any]:
 def shape_from_json(data: dict[str, Any]) -> Shape:
     """Read what `shape_to_json` wrote."""
     cls = _SHAPES[data["kind"]]
+    if "parts" in data:
+        return Compound(tuple(tuple((float(x), float(y)) for x, y in part) for part in data["parts"]))
     if "vertices" not in data:
         plain: Shape = cls()
         return plain

@@ -13,6 +13,7 @@ from relgym.laws.account import happens
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
 from relgym.laws.frames import FRAMES, POINT
+from relgym.laws.inertia import AREA, NOTHING, SQUARE, By, Gyration, Inertia, Mass
 from relgym.laws.records import ONE, AxisLaw, FreeLaw, Kind, Operator, PairLaw, Piece, Share
 from relgym.laws.text import DIRECTIONS
 from relgym.reporting.functions import number_of, parse_sum, whole_of
@@ -46,6 +47,8 @@ class MotionRules:
         How two moving bodies share an impulse.
     tolerance
         Largest residual of an explained velocity.
+    inertia
+        Masses and moments, where bodies turn.
     """
 
     free: tuple[FreeLaw, ...]
@@ -54,6 +57,7 @@ class MotionRules:
     letters: str = "nt"
     shares: tuple[tuple[Kind, Share], ...] = ()
     tolerance: float = 0.0
+    inertia: Inertia = NOTHING
 
     def text(self, digits: int = 7) -> str:
         """The laws as text."""
@@ -76,9 +80,11 @@ class MotionRules:
             lines.append(
                 f"  of a change along t between {a} and {b}, velocities take {grip:.{digits}g}, spins the rest"
             )
+        lines += [f"  {sentence}" for sentence in self.inertia.sentences(digits)]
         if self.pair is not None:
             lines.append(f"  frame: {self.pair.frame}")
-        return "\n".join([*lines, *_LEGEND])
+        legend = _POINTS if self.inertia != NOTHING else _LEGEND
+        return "\n".join([*lines, *legend])
 
     def _stats(self, examples: int, unexplained: int) -> str:
         wrong = f", {unexplained:,} unexplained" if unexplained else ""
@@ -116,6 +122,7 @@ class MotionRules:
         book.free = {law.type: law for law in self.free}
         book.pair, book.shares = self.pair, dict(self.shares)
         book.tolerance = self.tolerance
+        book.inertia = self.inertia
         return book
 
     def _repr_html_(self) -> str:
@@ -127,6 +134,14 @@ class MotionRules:
 _LEGEND = (
     "  # v: velocity now; u: what the next one would be without this contact; v': what it is with it; all of them",
     "  # relative to the other body. J_n = v'_n - u_n is the impulse. Several contacts act until nothing changes.",
+)
+
+
+_POINTS = (
+    "  # v: velocity now; u: what the next one would be without this point's impulse along that axis; v': what it is",
+    "  # with it; all of them of one surface against the other. J_n: what the impulse along n would change along t.",
+    "  # An impulse moves a body by 1 / mass, and turns it by arm / moment. All points act until nothing changes.",
+    f"  # {AREA}: a body's area; {SQUARE}: mean square distance of its points from its position.",
 )
 
 
@@ -161,6 +176,8 @@ _OTHER = re.compile(
 _TURN = re.compile(r"    where that turns the motion to v'_\w (?P<side>[<>]) 0: no prediction")
 _SHARE = re.compile(r"  of a change between (\S+) A and (\S+) B, A takes (.*), B the rest")
 _GRIP = re.compile(r"  of a change along t between (\S+) and (\S+), velocities take (\S+), spins the rest")
+_MASS = re.compile(r"  masses go as (?P<factors>.*?)(?:; by (?P<by>type|object), times (?P<constants>.*))?")
+_GYRATION = re.compile(r"  moment over mass(?: of (?P<types>.*?))?: (?P<piece>.*)")
 _POWER = re.compile(r"(?P<name>\w+)_B(?:\^(?P<power>\d))? / \(.*\)")
 
 
@@ -173,6 +190,8 @@ class _Draft:
     axes: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     shares: list[tuple[Kind, Share]] = field(default_factory=list)
     grips: list[tuple[Kind, float]] = field(default_factory=list)
+    mass: Mass | None = None
+    gyrations: list[Gyration] = field(default_factory=list)
     frame: str = "contact"
     tolerance: float = 0.0
     law: dict[str, Any] = field(default_factory=dict)
@@ -213,6 +232,15 @@ class _Draft:
             self.shares.append(((match[1], match[2]), _share(match[3])))
         elif match := _GRIP.fullmatch(line):
             self.grips.append(((match[1], match[2]), number_of(match[3])))
+        elif match := _MASS.fullmatch(line):
+            pairs = [part.rpartition(": ") for part in (match["constants"] or "").split(", ") if part]
+            constants = tuple((name, number_of(value)) for name, _, value in pairs)
+            by: By = "type" if match["by"] == "type" else "object" if match["by"] else ""
+            self.mass = Mass(_powers(match["factors"]), by, constants)
+        elif match := _GYRATION.fullmatch(line):
+            types = tuple(match["types"].split(", ")) if match["types"] else ()
+            piece = None if match["piece"] == "infinite" else _piece(match["piece"])
+            self.gyrations.append(Gyration(types, piece, not types))
         return match is not None
 
     def _of_free(self, line: str) -> bool:
@@ -245,6 +273,7 @@ def parse_motion(lines: list[str]) -> MotionRules:
         "".join(draft.axes),
         tuple(draft.shares),
         draft.tolerance,
+        Inertia(draft.mass, tuple(draft.gyrations)),
     )
 
 
@@ -280,3 +309,9 @@ def _share(text: str) -> Share:
     if match is None:
         return Share(constant=number_of(text))
     return Share(match["name"], int(match["power"] or 1))
+
+
+def _powers(text: str) -> tuple[tuple[str, int], ...]:
+    """Names and powers in a product such as ``shape.area mass^2``; 1 is the empty one."""
+    parts = [part.partition("^") for part in text.split(" ") if part != ONE]
+    return tuple((name, int(power or 1)) for name, _, power in parts)

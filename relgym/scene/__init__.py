@@ -5,13 +5,14 @@ from relgym.scene.context import canonical_order, signature
 from relgym.scene.objects import Kinematics, ObjectType, Scene, SceneLayout, SceneObject, Target, Transition
 from relgym.scene.relations import TOUCH_EPS, Extractor, Relations, unary
 from relgym.scene.schema import SceneSchema
-from relgym.scene.shapes import Box, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
+from relgym.scene.shapes import Box, Compound, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
 from relgym.scene.state import RelationalState, relational_state
 
 __all__ = [
     "CONTACT_FEATURES",
     "TOUCH_EPS",
     "Box",
+    "Compound",
     "ConvexPolyhedron",
     "Extractor",
     "Kinematics",

@@ -22,7 +22,7 @@ from relgym.arguments import refusing_fields
 from relgym.errors import ShapeError
 from relgym.scene.hull import check_polygon, facets, outline_of
 
-__all__ = ["Box", "ConvexPolyhedron", "Prism", "Shape", "Sphere", "Wedge", "outline"]
+__all__ = ["Box", "Compound", "ConvexPolyhedron", "Prism", "Shape", "Sphere", "Wedge", "outline", "outlines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,33 @@ class ConvexPolyhedron:
         facets(self.vertices)
 
 
-Shape: TypeAlias = Sphere | Box | Wedge | Prism | ConvexPolyhedron
+@refusing_fields(ShapeError)
+@dataclass(frozen=True, slots=True)
+class Compound:
+    """Convex polygons that hang together, such as the two beams of a T, each extruded like a `Prism`.
+
+    Planar schemas only, and the array geometry.
+
+    Parameters
+    ----------
+    parts
+        Corners of each part in order round its outline, in the plane of first and up axis. Parts may share edges;
+        where they overlap, the overlap counts twice in whatever is worked out from areas. `ShapeError` where there is
+        no part, or one isn't strictly convex.
+    """
+
+    parts: tuple[tuple[tuple[float, float], ...], ...]
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            raise ShapeError(
+                "a compound needs at least one part, got none; give the corners of each convex part"
+            )
+        for part in self.parts:
+            check_polygon(part)
+
+
+Shape: TypeAlias = Sphere | Box | Wedge | Prism | ConvexPolyhedron | Compound
 
 _SQUARE = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
 _TRIANGLE = ((-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5))
@@ -91,7 +117,7 @@ def outline(shape: Shape, plane: tuple[int, int] = (0, 1)) -> NDArray[np.float64
     Parameters
     ----------
     shape
-        Any shape but a sphere, whose outline has no corners.
+        Any shape but a sphere, whose outline has no corners, and a compound, which has several (`outlines`).
     plane
         World axes (0, 1, 2) that are first and up.
 
@@ -108,5 +134,16 @@ def outline(shape: Shape, plane: tuple[int, int] = (0, 1)) -> NDArray[np.float64
             return np.array(vertices if check_polygon(vertices) else vertices[::-1], dtype=np.float64)
         case ConvexPolyhedron(corners):
             return outline_of(np.array(corners, dtype=np.float64)[:, list(plane)])
+        case Compound():
+            raise TypeError("a compound has an outline for each of its parts: ask for its outlines")
         case Sphere():
             raise TypeError("a sphere's outline has no corners")
+
+
+def outlines(shape: Shape, plane: tuple[int, int] = (0, 1)) -> tuple[NDArray[np.float64], ...]:
+    """Outlines of a shape's convex parts, as `outline` gives one; a sphere has none."""
+    if isinstance(shape, Sphere):
+        return ()
+    if isinstance(shape, Compound):
+        return tuple(outline(Prism(part), plane) for part in shape.parts)
+    return (outline(shape, plane),)

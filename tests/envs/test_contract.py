@@ -20,14 +20,20 @@ import relgym
 from relgym.envs import BallBoxRampEnv, BallGoalEnv, SceneEnv, TruckPushEnv
 from relgym.errors import ConfigError
 
-IDS = ("relgym/BallBoxRamp-v0", "relgym/BallGoal-v0", "relgym/TruckPush-v0")
-STEPS = {"relgym/BallBoxRamp-v0": 200, "relgym/BallGoal-v0": 500, "relgym/TruckPush-v0": 40}
+IDS = ("relgym/BallBoxRamp-v0", "relgym/BallGoal-v0", "relgym/BoxPush-v0", "relgym/TruckPush-v0")
+STEPS = {
+    "relgym/BallBoxRamp-v0": 200,
+    "relgym/BallGoal-v0": 500,
+    "relgym/BoxPush-v0": 1_000,
+    "relgym/TruckPush-v0": 40,
+}
 ENDLESS: dict[str, dict[str, Any]] = {"relgym/TruckPush-v0": {"task": None}}  # no action ends an episode
 MADE: list[tuple[str, dict[str, Any]]] = [
     *((env_id, {}) for env_id in IDS),
     ("relgym/BallBoxRamp-v0", {"objects": ("box", "ramp", "ramp"), "balls": 3, "type_names": "thesis"}),
     ("relgym/BallBoxRamp-v0", {"objects": ()}),
     ("relgym/BallGoal-v0", {"objects": ("box", "box", "ramp"), "type_names": "thesis", "friction": 0.2}),
+    ("relgym/BoxPush-v0", {"n_boxes": 0, "parcel": "tee", "friction": 0.0}),
     ("relgym/TruckPush-v0", {"n_boxes": 5, "resample": "step", "bystanders": 2}),
     ("relgym/TruckPush-v0", {"task": None}),
     ("relgym/TruckPush-v0", {"bystanders": 2}),

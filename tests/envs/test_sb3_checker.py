@@ -18,6 +18,7 @@ IDS = sorted(name for name in gym.registry if name.startswith("relgym/") and nam
 def test_ids_are_registered() -> None:
     assert "relgym/BallBoxRamp-v0" in IDS
     assert "relgym/BallGoal-v0" in IDS
+    assert "relgym/BoxPush-v0" in IDS
     assert "relgym/TruckPush-v0" in IDS
 
 
@@ -31,7 +32,8 @@ def test_checker_has_nothing_to_say(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "arguments"), [("relgym/TruckPush-v0", {"task": "push"}), ("relgym/BallGoal-v0", {})]
+    ("name", "arguments"),
+    [("relgym/TruckPush-v0", {"task": "push"}), ("relgym/BallGoal-v0", {}), ("relgym/BoxPush-v0", {})],
 )
 def test_checker_has_nothing_to_say_of_flat_views(name: str, arguments: dict[str, str]) -> None:
     from stable_baselines3.common.env_checker import check_env

@@ -14,7 +14,7 @@ from relgym.scene.geometry.planar import Planar
 from relgym.scene.geometry.simple import aligned_boxes, spheres
 from relgym.scene.geometry.solid import Solid
 from relgym.scene.geometry.vectors import FloatArray, dot
-from relgym.scene.shapes import Box, Shape, Sphere
+from relgym.scene.shapes import Box, Compound, Prism, Shape, Sphere
 
 __all__ = ["ArrayGeometry", "Bodies", "Geometry", "Measured", "Solids", "check_extents", "pairs_of"]
 
@@ -24,7 +24,9 @@ _Found: TypeAlias = tuple[FloatArray, FloatArray]
 _ROUND = 1e-9
 """Relative difference of extents above which a sphere is no sphere."""
 
-_SOLIDS, _MIXED, _SPHERES, _BOXES = range(4)  # kinds of pairs: the first three are the number of spheres
+_SOLIDS, _MIXED, _SPHERES, _BOXES, _COMPOUNDS = range(
+    5
+)  # of pairs: the first three are the number of spheres
 
 _MAX_PLANS = 256
 """Subsets of pairs whose index arrays are kept."""
@@ -156,9 +158,18 @@ class ArrayGeometry:
         self._axes, self._bodies = axes, bodies
         round_ = np.array([isinstance(shape, Sphere) for shape in bodies.shapes], dtype=bool)
         self._spheres: _Indices = np.flatnonzero(round_)
-        self._polyhedra: _Indices = np.flatnonzero(~round_)
-        self._slot: _Indices = np.cumsum(~round_) - 1
-        cornered = [shape for shape in bodies.shapes if not isinstance(shape, Sphere)]
+        # Of a compound each part is placed on its own; what is cornered has one or more of them.
+        parts = [_parts(shape) for shape in bodies.shapes]
+        self._count: _Indices = np.array([len(own) for own in parts], dtype=np.intp)
+        self._polyhedra: _Indices = np.repeat(np.arange(len(parts)), self._count)
+        self._slot: _Indices = np.cumsum(self._count) - self._count
+        self._starts: _Indices = self._slot[self._count > 0]
+        cornered = [part for own in parts for part in own]
+        if not axes.planar and (self._count > 1).any():
+            name = bodies.names[int(self._count.argmax())]
+            raise ShapeError(
+                f"object {name!r} is a compound of polygons: use a planar schema, or one part per type"
+            )
         self._kernel: Planar | Solid = (Planar if axes.planar else Solid)(axes, cornered)
         self._used = np.array(axes.used)
         self._turns = np.array([3 + axes.depth] if axes.planar else [3, 4, 5])
@@ -166,6 +177,7 @@ class ArrayGeometry:
         boxes = np.array([isinstance(shape, Box) for shape in bodies.shapes], dtype=bool)
         self._kind = round_[self._first].astype(int) + round_[self._second]
         self._kind[boxes[self._first] & boxes[self._second]] = _BOXES
+        self._kind[(self._count[self._first] > 1) | (self._count[self._second] > 1)] = _COMPOUNDS
         self._plans: dict[bytes, tuple[tuple[int, _Work], ...]] = {}
         self._memo: _Memo | None = None
 
@@ -225,6 +237,8 @@ class ArrayGeometry:
                 found = self._kernel.sphere_solid(offset, radius.take(work.a, axis=0), solid)
             elif kind == _BOXES:
                 found = self._boxes(pose, solids, work, offset)
+            elif kind == _COMPOUNDS:
+                found = self._compounds(solids, work, offset, radius)
             else:
                 found = self._solids(solids, work, offset)
             distance[work.pairs], normal[:, work.pairs] = found[0], found[1] * work.sign
@@ -239,6 +253,33 @@ class ArrayGeometry:
             return simple
         distance, normal = self._solids(solids, work, offset)
         return np.where(skew, distance, simple[0]), np.where(skew, normal, simple[1])
+
+    def _compounds(self, solids: Solids, work: _Work, offset: FloatArray, radius: FloatArray) -> _Found:
+        """The nearest parts decide; where parts overlap, those that do so farthest."""
+        distance = np.full(offset.shape[1:], np.inf)
+        normal = np.zeros(offset.shape)
+        for p in range(max(1, int(self._count[work.a].max()))):
+            for q in range(int(self._count[work.b].max())):
+                round_ = self._count[work.a] == 0
+                for some, is_round in (
+                    (round_ & (p == 0), True),
+                    (~round_ & (p < self._count[work.a]), False),
+                ):
+                    rows = np.flatnonzero(some & (q < self._count[work.b]))
+                    if not len(rows):
+                        continue
+                    b = solids.placed.take(self._slot[work.b[rows]] + q)
+                    if is_round:
+                        found = self._kernel.sphere_solid(
+                            offset[:, rows], radius.take(work.a[rows], axis=0), b
+                        )
+                    else:
+                        a = solids.placed.take(self._slot[work.a[rows]] + p)
+                        found = self._kernel.solid_solid(offset[:, rows], a, b)
+                    nearer = found[0] < distance[rows]
+                    distance[rows] = np.where(nearer, found[0], distance[rows])
+                    normal[:, rows] = np.where(nearer, found[1], normal[:, rows])
+        return distance, normal
 
     def _solids(self, solids: Solids, work: _Work, offset: FloatArray) -> _Found:
         a, b = (solids.placed.take(self._slot.take(side)) for side in (work.a, work.b))
@@ -287,10 +328,12 @@ class ArrayGeometry:
         Relative to their positions; a sphere counts as its centre.
         """
         lowest = np.zeros(len(bodies))
-        cornered = np.flatnonzero(np.isin(bodies, self._polyhedra))
-        if len(cornered):
-            corners = self._kernel.corners(solids.placed).take(self._slot[bodies[cornered]], axis=2)[..., 0]
-            lowest[cornered] = dot(directions[:, None, cornered], corners).min(axis=0)
+        for part in range(int(self._count.max(initial=0))):
+            cornered = np.flatnonzero(self._count[bodies] > part)
+            slots = self._slot[bodies[cornered]] + part
+            corners = self._kernel.corners(solids.placed).take(slots, axis=2)[..., 0]
+            least = dot(directions[:, None, cornered], corners).min(axis=0)
+            lowest[cornered] = np.minimum(lowest[cornered], least) if part else least
         return lowest
 
     def _plan(self, stale: NDArray[np.bool_]) -> tuple[tuple[int, _Work], ...]:
@@ -298,7 +341,7 @@ class ArrayGeometry:
         if (plan := self._plans.get(key)) is None:
             if len(self._plans) >= _MAX_PLANS:
                 self._plans.clear()
-            works = ((kind, self._work(np.flatnonzero(stale & (self._kind == kind)))) for kind in range(4))
+            works = ((kind, self._work(np.flatnonzero(stale & (self._kind == kind)))) for kind in range(5))
             plan = self._plans[key] = tuple((kind, work) for kind, work in works if len(work.pairs))
         return plan
 
@@ -317,5 +360,17 @@ class ArrayGeometry:
             radius = 0.5 * pose[6 + self._used[0]].take(self._spheres, axis=0)
             low[:, self._spheres], high[:, self._spheres] = -radius, radius
         if len(self._polyhedra):
-            low[:, self._polyhedra], high[:, self._polyhedra] = solids.bounds()
+            lows, highs = solids.bounds()
+            cornered = self._polyhedra[self._starts]
+            if len(cornered) < len(self._polyhedra):
+                lows = np.minimum.reduceat(lows, self._starts, axis=1)
+                highs = np.maximum.reduceat(highs, self._starts, axis=1)
+            low[:, cornered], high[:, cornered] = lows, highs
         return low, high
+
+
+def _parts(shape: Shape) -> tuple[Shape, ...]:
+    """What the kernels place of a shape: nothing of a sphere, each part of a compound."""
+    if isinstance(shape, Sphere):
+        return ()
+    return tuple(Prism(part) for part in shape.parts) if isinstance(shape, Compound) else (shape,)

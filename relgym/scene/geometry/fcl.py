@@ -23,11 +23,12 @@ import fcl as library
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.errors import ShapeError
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies, Measured, pairs_of
 from relgym.scene.geometry.mesh import Mesh, mesh, prism
 from relgym.scene.geometry.vectors import FloatArray, dot, norm, rotation
-from relgym.scene.shapes import Box, Shape, Sphere, outline
+from relgym.scene.shapes import Box, Compound, Shape, Sphere, outline
 
 __all__ = ["FclGeometry"]
 
@@ -63,6 +64,11 @@ class FclGeometry:
 
     def __init__(self, axes: Axes, bodies: Bodies) -> None:
         self._axes, self._bodies = axes, bodies
+        for name, shape in zip(bodies.names, bodies.shapes, strict=True):
+            if isinstance(shape, Compound):
+                raise ShapeError(
+                    f"object {name!r} is a compound; use geometry='arrays', which measures each part"
+                )
         self._exact = ArrayGeometry(axes, bodies)
         self._round = np.array([isinstance(shape, Sphere) for shape in bodies.shapes], dtype=bool)
         self._first, self._second = pairs_of(len(bodies.shapes))

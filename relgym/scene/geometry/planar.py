@@ -19,7 +19,7 @@ from relgym.scene.axes import Axes
 from relgym.scene.geometry.vectors import FloatArray, dot, norm, pick, rotate
 from relgym.scene.shapes import Shape, outline
 
-__all__ = ["Planar", "Polygons"]
+__all__ = ["Planar", "Polygons", "gaps", "polygons"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +66,26 @@ class Polygons:
         return dot(self.normals, self.starts)
 
 
+def polygons(corners: FloatArray, edges: FloatArray, extent: FloatArray, angle: FloatArray) -> Polygons:
+    """Polygons of some size, turned, relative to their positions.
+
+    Parameters
+    ----------
+    corners, edges
+        Canonical corners and the vectors to the next ones, shape ``(2, V, ...)``.
+    extent, angle
+        Full extents along the two axes, shape ``(2, ...)``, and angles in radians, shape ``(...)``.
+    """
+    extent = extent[:, None]
+    cos, sin = np.cos(angle), np.sin(angle)
+    edges = edges * extent
+    lengths = norm(edges)
+    across = np.stack([edges[1], -edges[0]]) / lengths
+    turned = rotate(((cos, -sin), (sin, cos)), np.concatenate([corners * extent, across], axis=1))
+    count = corners.shape[1]
+    return Polygons(turned[:, :count], turned[:, count:], lengths)
+
+
 class Planar:
     """Geometry of a planar schema's polygons.
 
@@ -91,16 +111,8 @@ class Planar:
 
     def place(self, pose: FloatArray) -> Polygons:
         """Scale and rotate the polygons; `pose` has the nine components first, shape ``(9, B, n)``."""
-        extent = pose[6:][self._used][:, None]
         angle = np.ascontiguousarray(pose[self._angle]) * self._turn
-        cos, sin = np.cos(angle), np.sin(angle)
-        edges = self._edges * extent
-        lengths = norm(edges)
-        across = np.stack([edges[1], -edges[0]]) / lengths
-        starts_and_normals = np.concatenate([self._corners * extent, across], axis=1)
-        turned = rotate(((cos, -sin), (sin, cos)), starts_and_normals)
-        count = self._corners.shape[1]
-        return Polygons(turned[:, :count], turned[:, count:], lengths)
+        return polygons(self._corners, self._edges, pose[6:][self._used], angle)
 
     def upright(self, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what `bounds` says of polygons that aren't turned, without placing them."""
@@ -141,9 +153,9 @@ class Planar:
     @staticmethod
     def solid_solid(offset: FloatArray, a: Polygons, b: Polygons) -> tuple[FloatArray, FloatArray]:
         """Signed distance and normal of polygons: separating axes if they overlap, else nearest corners."""
-        gaps = np.concatenate([_gaps(offset, a, b), _gaps(-offset, b, a)])
+        both = np.concatenate([gaps(offset, a, b), gaps(-offset, b, a)])
         normals = np.concatenate([b.normals, -a.normals], axis=1)
-        depth, normal = pick(gaps.argmax(axis=0), gaps, normals)
+        depth, normal = pick(both.argmax(axis=0), both, normals)
         apart = depth > 0.0
         if not apart.any():
             return depth, normal
@@ -154,12 +166,12 @@ class Planar:
         return depth, normal
 
 
-def _gaps(offset: FloatArray, a: Polygons, b: Polygons) -> FloatArray:
+def gaps(offset: FloatArray, a: Polygons, b: Polygons) -> FloatArray:
     """Gap along each edge normal of b (separating axis theorem); negative where both overlap along it."""
     # (min - max) + shift, in this order, has the same bits when the two bodies are exchanged.
     support = dot(b.normals[:, None], a.starts[:, :, None]).min(axis=0)
-    gaps: FloatArray = (support - b.offsets) + dot(b.normals, offset[:, None])
-    return gaps
+    found: FloatArray = (support - b.offsets) + dot(b.normals, offset[:, None])
+    return found
 
 
 def _between(offset: FloatArray, a: Polygons, b: Polygons) -> tuple[FloatArray, FloatArray]:

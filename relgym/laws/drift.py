@@ -1,0 +1,72 @@
+"""Whether what no free law explains is noise, or motion that goes on as it did: forces that nothing seen accounts for.
+
+Noise is anew in every step. Of independent changes of velocity d the differences e of consecutive ones have twice the
+variance; where noise is on positions, and so on two velocities each, 20/6 of it. Changes by a force that varies with
+place or speed are nearly the same one step later, and their differences are small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Drift"]
+
+INDEPENDENT = 1.0
+"""Least ratio of the variances of e and d at which changes count as noise: halfway from equal to independent ones."""
+
+FEWEST = 16
+"""Pairs of consecutive changes below which nothing is known."""
+
+
+@dataclass(slots=True)
+class Drift:
+    """Sums over the changes of velocity of a type's free objects.
+
+    Attributes
+    ----------
+    count, pairs
+        Changes, and consecutive ones of one object.
+    total, squares, steps
+        Sum of the changes, of their squares, and of the squares of differences of consecutive ones.
+    """
+
+    count: int = 0
+    pairs: int = 0
+    total: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    squares: float = 0.0
+    steps: float = 0.0
+    _last: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
+
+    def add(self, name: str, now: NDArray[np.float64], after: NDArray[np.float64]) -> None:
+        """Take up an object's velocity in a step, and the next one."""
+        change = after - now
+        self.count += 1
+        self.total[: len(change)] += change
+        self.squares += float((change**2).sum())
+        last = self._last.get(name)
+        if last is not None and np.array_equal(last[0], now):
+            self.pairs += 1
+            self.steps += float(((change - last[1]) ** 2).sum())
+        self._last[name] = after.copy(), change
+
+    def noisy(self) -> bool:
+        """Whether changes are as little alike as noise is, as far as that is known."""
+        if self.pairs < FEWEST:
+            return True
+        variance = self.squares / self.count - float(((self.total / self.count) ** 2).sum())
+        return self.steps / self.pairs >= INDEPENDENT * variance
+
+    def to_json(self) -> list[float | int | list[float]]:
+        """Plain data that `restore` reads back; a change begins a new run."""
+        return [self.count, self.pairs, self.total.tolist(), self.squares, self.steps]
+
+    def restore(self, data: Sequence[float | int | list[float]]) -> None:
+        """Take over what `to_json` wrote."""
+        count, pairs, total, squares, steps = data
+        self.count, self.pairs = int(count), int(pairs)  # type: ignore[arg-type]
+        self.total = np.array(total, dtype=np.float64)
+        self.squares, self.steps = float(squares), float(steps)  # type: ignore[arg-type]
