@@ -36,7 +36,7 @@ from relgym.program import records as ir
 from relgym.scene.axes import Axes
 from relgym.scene.contacts import APPROACH_EPS
 from relgym.scene.objects import TASK, SceneLayout, Target, pose_columns
-from relgym.scene.shapes import Box, Sphere, outline
+from relgym.scene.shapes import Box, Compound, Sphere, outline
 
 __all__ = ["lowered"]
 
@@ -86,6 +86,8 @@ class _Lowering:
         shapes = {type(self.layout.types[i].shape) for i in self.layout.bodies}
         if not self.axes.planar and shapes not in ({Box}, {Sphere}):
             raise ir.BeyondError("a world in space of other bodies than boxes, or spheres")
+        if Compound in shapes:
+            raise ir.BeyondError("bodies of several convex parts")
         if self.perception.extractor.geometry != "arrays":
             raise ir.BeyondError(f"the geometry {self.perception.extractor.geometry!r}")
         if len(self.layout.bodies) > ir.MOST_BODIES:
@@ -198,6 +200,8 @@ class _Lowering:
         if not self.axes.planar:
             raise ir.BeyondError("laws of motion in space")
         book: LawBook = laws.learner.book
+        if book.turning:
+            raise ir.BeyondError("laws at points of bodies that turn")
         cast = book.cast(self.layout)
         movers = tuple(self._mover(book, cast, body) for body in cast.movers)
         engaged = book._engaged_pairs(cast)
@@ -211,7 +215,7 @@ class _Lowering:
             name: self.nan if p == self.layout.width else int(p)
             for name, p in zip(sources.names, places, strict=True)
         }
-        law = book.free.get(sources.type.name)
+        law = book.free_law(sources.type.name)
         free = () if law is None else tuple(_piece(piece, where) for piece in law.components)
         return ir.Mover(body, free, len(book.components(sources.type.name)), len(sources.moving))
 
