@@ -80,17 +80,17 @@ def worlds() -> dict[str, list[Transition]]:
 def spied() -> Iterator[list[Transition]]:
     """The transitions that models learn from meanwhile."""
     seen: list[Transition] = []
-    learn_one = WorldModel.learn_one
+    learn = WorldModel._learn
 
-    def spying(model: WorldModel, transition: Transition) -> Any:
+    def spying(model: WorldModel, transition: Transition, *told: Any) -> Any:
         seen.append(transition)
-        return learn_one(model, transition)
+        return learn(model, transition, *told)
 
-    WorldModel.learn_one = spying  # type: ignore[method-assign]
+    WorldModel._learn = spying  # type: ignore[method-assign]
     try:
         yield seen
     finally:
-        WorldModel.learn_one = learn_one  # type: ignore[method-assign]
+        WorldModel._learn = learn  # type: ignore[method-assign]
 
 
 def _steps(env: gym.Env[Any, Any], **options: Any) -> list[Transition]:
