@@ -14,6 +14,7 @@ from relgym.config import ModelConfig
 from relgym.envs import LearnedModelVectorEnv, drawn_from
 from relgym.experiments.data import ball_episodes
 from relgym.experiments.seeds import TUNING_SEEDS, TUNING_TEST_SEED
+from relgym.model.running import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.wrappers import ModelLearner
 
@@ -43,6 +44,7 @@ def engine(world: str) -> SyncVectorEnv:
 
 def rate(envs: Any, *, rounds: int, steps: int) -> float:
     """Env-steps per second of processor time, the best of some rounds of steps: what other processes don't disturb."""
+    KERNEL.load()
     envs.reset(seed=0)
     envs.action_space.seed(0)
     actions = envs.action_space.sample()

@@ -1,8 +1,9 @@
 """Asking the compiled program of a model: one scene or many, as long as the model stays as it is.
 
-A program is lowered (`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model
-changed that it pays: lowering costs as much as arrays take for a few scenes. Until then, and where there is no program
-for what was learned, arrays answer (`relgym.model.querying`); both give the same bits.
+The kernel is loaded, and compiled where no file holds it, once so much was asked that it pays (`Kernel`). A program
+is lowered (`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model changed that
+it pays, too: lowering costs as much as arrays take for a few scenes. Until then, and where there is no program for what
+was learned, arrays answer (`relgym.model.querying`); all give the same bits.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +34,16 @@ from relgym.scene.objects import Scene, SceneLayout
 if TYPE_CHECKING:
     from types import ModuleType
 
-__all__ = ["Programs"]
+__all__ = ["KERNEL", "Kernel", "Programs"]
 
 PATIENCE = 8
 """Scenes that arrays answer after each change of the model before a program is lowered: that takes about as long."""
+
+ASKING, SCENE = 5e-4, 6e-6
+"""What arrays take to answer, in seconds: each time, and for each scene."""
+
+LOADING, COMPILING = 0.5, 20.0
+"""What it takes to load the kernel from the disk, and to compile it, in seconds."""
 
 _PREDICTED, _UNEXPLAINED, _DEPENDS, _UNSURE = (
     OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.UNEXPLAINED, Outcome.DEPENDS, Outcome.UNSURE)
@@ -84,7 +91,7 @@ class Programs:
         if known is not None and known[0] is layout and known[1] is parts:
             return known[2]
         self._asked += scenes
-        if self._asked < PATIENCE or (kernel := _kernel()) is None:
+        if (kernel := KERNEL.after(scenes)) is None or self._asked < PATIENCE:
             return None
         runner: Runner | None
         try:
@@ -95,25 +102,56 @@ class Programs:
         return runner
 
 
-_loaded: list[ModuleType | None] = []
+class Kernel:
+    """The compiled kernel, as this process has it: none before it pays.
 
+    Loading it takes half a second, compiling it, once on a machine, twenty. Until arrays have taken about as long as
+    that, in all, they answer: nobody waits twice as long as with the better of both ways, and who asks little never
+    waits. What they took is estimated from what was asked, so that nothing depends on a clock.
 
-def _kernel() -> ModuleType | None:
-    """The compiled kernel; None, with a warning the first time, where numba is missing."""
-    if not _loaded:
+    Attributes
+    ----------
+    module
+        The kernel; None: not yet, or it can't be had.
+    spent
+        What arrays took so far, in seconds.
+    """
+
+    def __init__(self) -> None:
+        self.module: ModuleType | None = None
+        self.spent = 0.0
+        self._missing = False
+
+    def after(self, scenes: int) -> ModuleType | None:
+        """The kernel, if it pays to have it now that so many scenes more are asked."""
+        if self.module is None and not self._missing:
+            self.spent += ASKING + SCENE * scenes
+            if self.spent >= LOADING and (found := self._imported()) is not None:
+                if self.spent >= COMPILING or found.is_compiled():
+                    self.module = found
+        return self.module
+
+    def load(self) -> None:
+        """Have it now, whether it pays or not; compiled with the first scene that is asked."""
+        self.module = self._imported()
+
+    def _imported(self) -> ModuleType | None:
         try:
             from relgym.program import kernel
         except ImportError as error:
-            _loaded.append(None)
+            self._missing = True
             warnings.warn(
                 f"numba can't be imported ({error}): models are run by arrays, some 30 times slower; "
                 "pip install numba",
                 SlowWarning,
                 stacklevel=2,
             )
-        else:
-            _loaded.append(kernel)
-    return _loaded[0]
+            return None
+        return kernel
+
+
+KERNEL: Final = Kernel()
+"""That of this process."""
 
 
 class _Told(NamedTuple):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -57,7 +58,7 @@ from relgym.program.tape import (
     WIDTH,
 )
 
-__all__ = ["run"]
+__all__ = ["is_compiled", "run"]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -75,6 +76,15 @@ def entered(function: _F) -> _F:
     except RuntimeError:  # no folder for the cache
         found = numba.njit(error_model="numpy", no_cfunc_wrapper=True)(function)
     return found
+
+
+def is_compiled() -> bool:
+    """Whether a file holds the compiled kernel, of this very text."""
+    folder = getattr(getattr(run, "_cache", None), "cache_path", None)
+    if folder is None:
+        return False
+    written = Path(__file__).stat().st_mtime
+    return any(file.stat().st_mtime >= written for file in Path(folder).glob("kernel.run-*.nbi"))
 
 
 PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS = range(6)

@@ -11,12 +11,14 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from relgym.experiments.dyna_speed import WORLDS, dreams
 from relgym.model.lowering import lowered
+from relgym.model.running import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.program.tape import encoded
 from relgym.scene.objects import Scene
 
 
 def scenes(world: str) -> tuple[WorldModel, list[Scene]]:
+    KERNEL.load()
     envs = dreams(world)
     envs.reset(seed=0)
     shown = envs._setting.shown
@@ -44,6 +46,8 @@ def test_the_kernel_from_its_cache(benchmark: BenchmarkFixture) -> None:
         "import numpy as np, relgym, time\n"
         "from relgym.scene.objects import ObjectType\n"
         "from relgym.scene.schema import SceneSchema\n"
+        "from relgym.model.running import KERNEL\n"
+        "KERNEL.load()\n"
         "s = SceneSchema((ObjectType('b', ('v',)),), (('b', 'b'),))\n"
         "v = np.linspace(1.0, 9.0, 40)[:, None]\n"
         "relgym.WorldModel(s).fit(v, next_observations=0.5 * v).predict_batch(s.layout(), v)"

@@ -24,8 +24,9 @@ from relgym.scene.objects import Scene
 
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Programs are lowered for the first scene that is asked."""
+    """The kernel is there, and programs are lowered for the first scene that is asked."""
     monkeypatch.setattr(running, "PATIENCE", 0)
+    running.KERNEL.load()
 
 
 def assert_fresh(model: WorldModel, scene: Scene) -> None:
@@ -98,8 +99,20 @@ def test_a_program_is_lowered_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(calls) == 1
 
 
+@pytest.mark.parametrize("on_disk", [True, False])
+def test_the_kernel_is_there_once_it_pays(monkeypatch: pytest.MonkeyPatch, on_disk: bool) -> None:
+    monkeypatch.setattr("relgym.program.kernel.is_compiled", lambda: on_disk)
+    kernel = running.Kernel()
+    assert kernel.after(1) is None and kernel.spent > 0.0
+    many = int(1.01 * running.LOADING / running.SCENE)
+    assert (kernel.after(many) is not None) is on_disk
+    assert kernel.after(int(running.COMPILING / running.SCENE)) is not None
+    assert kernel.after(1) is kernel.module
+
+
 def test_without_numba_arrays_answer_and_a_warning_says_so_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "_loaded", [])
+    monkeypatch.setattr(running, "KERNEL", kernel := running.Kernel())
+    kernel.spent = running.LOADING
     monkeypatch.setitem(sys.modules, "relgym.program.kernel", None)
     monkeypatch.delattr("relgym.program.kernel", raising=False)
     model = learned(schema := schema_of(LINE_STEPS, LINE_TARGETS), LINE_STEPS[:60])
