@@ -98,15 +98,14 @@ def taught(name: str, mode: AutoresetMode, seed: int, steps: int) -> dict[tuple[
     alone, fooled = WorldModel(view.schema, config), WorldModel(view.schema, ModelConfig())
     told = [view.with_action(view.scene(seen), action) for seen, action, _ in entries]
     after = [view.scene(following) for *_, following in entries]
-    for scene, following in zip(told, after, strict=True):
-        alone.predict_one(scene)
-        alone.learn_one(Transition(scene, following))
+    for scene, following, (_, *said) in zip(told, after, kept, strict=False):
+        alone.take_up(Transition(scene, following), *said)
     for transition in naive:
         fooled.learn_one(transition)
     same = learner.model.to_json(history=True) == alone.to_json(history=True)
     foreign = sum(
         t.before.vector.tobytes() != b.vector.tobytes() or t.after.vector.tobytes() != a.vector.tobytes()
-        for t, b, a in zip(kept, told, after, strict=False)
+        for (t, *_), b, a in zip(kept, told, after, strict=False)
     ) + abs(len(kept) - len(entries))
     where = f"{name}, {mode.value}"
     print(f"{where}: {len(entries):,} transitions of {steps * ENVS:,} steps; x: {_modes(learner.model)}")
@@ -121,16 +120,16 @@ def taught(name: str, mode: AutoresetMode, seed: int, steps: int) -> dict[tuple[
 
 def _sailed(
     learner: VectorModelLearner, study: Study, seed: int, steps: int
-) -> tuple[list[Transition], list[Transition]]:
-    """Drive a fleet; what its learner took up, and all steps as a learner that knows no ends would see them."""
-    kept, naive = list[Transition](), list[Transition]()
-    learn = learner.model.learn_one
+) -> tuple[list[tuple[Any, ...]], list[Transition]]:
+    """Drive a fleet; what its learner took up, with what it had predicted; and all steps as who knows no ends sees them."""
+    kept, naive = list[tuple[Any, ...]](), list[Transition]()
+    learn = learner.model.take_up
 
-    def learn_one(transition: Transition) -> Any:
-        kept.append(transition)
-        return learn(transition)
+    def take_up(transition: Transition, *told: Any) -> Any:
+        kept.append((transition, *told))
+        return learn(transition, *told)
 
-    learner.model.learn_one = learn_one  # type: ignore[method-assign]
+    learner.model.take_up = take_up  # type: ignore[assignment, method-assign]
     act = _policy(study, learner, seed)
     view = learner.view
     assert isinstance(view, NumbersView), "chosen above"

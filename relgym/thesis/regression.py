@@ -78,7 +78,6 @@ def fit_samples(x: Floats, y: Floats, variance: float) -> tuple[NDArray[np.intp]
     length = np.einsum("bnd,bnd->bd", left, left)
     floor = _DEPENDENT**2 * length
     free = length > 0.0
-    error = np.einsum("bn,bn->b", rest, rest)
     best = np.full(b, np.inf)
     going = np.ones(b, dtype=np.bool_)
     columns: list[NDArray[np.intp]] = []
@@ -93,21 +92,24 @@ def fit_samples(x: Floats, y: Floats, variance: float) -> tuple[NDArray[np.intp]
         along = np.einsum("bnd,bn->bd", left, rest)
         gain = np.where(usable, along**2 / np.where(usable, now, 1.0), -1.0)
         pick = gain.argmax(axis=1)
-        after = np.maximum(error - gain[every, pick], 0.0)
+        axis = left[every, :, pick]
+        norm = np.einsum("bn,bn->b", axis, axis)
+        norm[norm == 0.0] = 1.0
+        height = np.einsum("bn,bn->b", axis, rest) / norm
+        trial = rest - height[:, None] * axis
+        # Of the residuals themselves: what is left of a difference of their squares is rounding, far above S.
+        after = np.einsum("bn,bn->b", trial, trial)
         cp = after / variance - n + 2.0 * taken
         going &= usable[every, pick] & (cp < best)
         if not going.any():
             break
-        axis = np.where(going[:, None], left[every, :, pick], 0.0)
-        norm = np.einsum("bn,bn->b", axis, axis)
-        norm[~going] = 1.0
-        height = np.einsum("bn,bn->b", axis, rest) / norm
+        axis = np.where(going[:, None], axis, 0.0)
+        height = np.where(going, height, 0.0)
         project = np.einsum("bn,bnd->bd", axis, left) / norm[:, None]
         columns.append(np.where(going, pick, -1))
         projections.append(project)
         heights.append(height)
-        rest = rest - height[:, None] * axis
-        error = np.einsum("bn,bn->b", rest, rest)
+        rest = np.where(going[:, None], trial, rest)
         best = np.where(going, cp, best)
         left = left - axis[:, :, None] * project[:, None]
         free[every[going], pick[going]] = False

@@ -47,6 +47,6 @@ def test_samples_are_fitted_as_if_alone() -> None:
 def test_noise_beyond_what_is_expected_takes_more_regressors() -> None:
     rng = np.random.default_rng(4)
     x = rng.normal(size=(200, 6))
-    y = x[:, 0] + rng.normal(scale=1e-3, size=200)
+    y = x[:, 0] + rng.normal(scale=5e-4, size=200)
     assert fit(x, y, 1e-6).columns == (0,)
     assert len(fit(x, y, 1e-9).columns) > 1  # Cp takes the noise for what is left to explain

@@ -164,7 +164,7 @@ def test_one_env_of_many_refutes_it_for_all(mode: AutoresetMode) -> None:
         envs.step(np.full((3, 1), 0.0))  # 0.9 of -1 is off the circle
     assert (envs.withdrawn, properties(envs), envs.model.seen) == (PAIR, PLAIN, 3)
     kept: list[Transition] = []
-    envs.model.learn_one = kept.append  # type: ignore[assignment, method-assign]
+    envs.model.take_up = lambda transition, *_: kept.append(transition)  # type: ignore[assignment, method-assign]
     for _ in range(8):
         *_, truncated, _ = envs.step(np.full((3, 1), 0.02))
         if truncated.any() and mode is AutoresetMode.DISABLED:

@@ -41,16 +41,16 @@ def drive(envs: VectorModelLearner, steps: int = STEPS) -> None:
             envs.reset(options={"reset_mask": over})
 
 
-def record(envs: VectorModelLearner) -> list[Transition]:
-    """The transitions that the model learns from now on."""
-    kept: list[Transition] = []
-    learn = envs.model.learn_one
+def record(envs: VectorModelLearner) -> list[tuple[Any, ...]]:
+    """The transitions that the model learns from now on, each with what was predicted of it and how that came out."""
+    kept: list[tuple[Any, ...]] = []
+    learn = envs.model.take_up
 
-    def learn_one(transition: Transition) -> Any:
-        kept.append(transition)
-        return learn(transition)
+    def take_up(transition: Transition, *told: Any) -> Any:
+        kept.append((transition, *told))
+        return learn(transition, *told)
 
-    envs.model.learn_one = learn_one  # type: ignore[method-assign]
+    envs.model.take_up = take_up  # type: ignore[method-assign]
     return kept
 
 
@@ -60,9 +60,8 @@ def test_every_autoreset_mode_learns_like_a_single_env(mode: AutoresetMode) -> N
     kept = record(envs)
     drive(envs)
     alone = WorldModel(envs.view.schema)
-    for transition in kept:
-        alone.predict_one(transition.before)
-        alone.learn_one(transition)
+    for transition, *told in kept:
+        alone.take_up(transition, *told)
         push = transition.before["action"]["a"]
         now, then = transition.before["self"], transition.after["self"]
         assert then["v"] == 0.8 * now["v"] + 0.5 * push  # no leap from one episode to the next
@@ -189,8 +188,8 @@ def test_actions_outside_their_space_are_learned_from_as_they_were_given() -> No
     kept = record(envs)
     envs.step(np.full((N, 1), 2.0))
     assert envs.env.unwrapped.envs[0].steps == 1  # type: ignore[attr-defined]
-    assert [transition.before["action"]["a"] for transition in kept] == [2.0] * N
-    for transition in kept:
+    assert [transition.before["action"]["a"] for transition, *_ in kept] == [2.0] * N
+    for transition, *_ in kept:
         assert transition.after["self"]["v"] == 0.8 * transition.before["self"]["v"] + 1.0
     envs.step(np.ones((N, 2)))
     assert (envs.model.seen, envs.skipped) == (N, N)
