@@ -121,7 +121,7 @@ def taught(name: str, mode: AutoresetMode, seed: int, steps: int) -> dict[tuple[
 def _sailed(
     learner: VectorModelLearner, study: Study, seed: int, steps: int
 ) -> tuple[list[tuple[Any, ...]], list[Transition]]:
-    """Drive a fleet; what its learner took up, with what it had predicted; and all steps as who knows no ends sees them."""
+    """Drive a fleet; what its learner took up and had predicted, and all steps as who knows no ends sees them."""
     kept, naive = list[tuple[Any, ...]](), list[Transition]()
     learn = learner.model.take_up
 
