@@ -353,7 +353,7 @@ def dyna(
 @app.command()
 def plan(
     out: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("out/plan"),
-    steps: Annotated[int, typer.Option(help="Real steps of learning.", min=1)] = 300,
+    steps: Annotated[int, typer.Option(help="Real steps of learning.", min=1)] = 600,
     episodes: Annotated[int, typer.Option(help="Episodes to plan.", min=1)] = 10,
     seed: Seed = 0,
     as_json: Json = False,

@@ -71,7 +71,7 @@ class PlanDemo:
         )
 
 
-def demonstrate(out: Path, *, steps: int = 300, episodes: int = 10, seed: int = 0) -> PlanDemo:
+def demonstrate(out: Path, *, steps: int = 600, episodes: int = 10, seed: int = 0) -> PlanDemo:
     """Let an agent learn to push a truck to its goal, everything learned, and plan some episodes.
 
     Parameters
