@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.learned_model import LearnedModelEnv
 from relgym.errors import RelgymError
+from relgym.model.running import KERNEL, PATIENCE
 from relgym.model.storage import read_model, write_model
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
@@ -105,6 +106,15 @@ def _steps(env: gym.Env[Any, Any], **options: Any) -> list[Transition]:
     return seen
 
 
+def _compile(path: Path, steps: dict[str, list[Transition]]) -> None:
+    """Have the kernel that runs models, which takes longer to compile than any case may."""
+    KERNEL.load()
+    model, scene = WorldModel.load(path), steps[path.stem][0].before
+    for _ in range(PATIENCE + 1):
+        model.predict_one(scene)
+        model.predict_batch(scene.layout, scene.vector[None])
+
+
 class Fuzzer:
     """Changes the files of the corpus, and uses what is accepted.
 
@@ -122,6 +132,7 @@ class Fuzzer:
         paths = [path for corpus in (CORPUS, SMALL) for path in sorted(corpus.glob("*.relgym"))]
         self.files = {path.stem: _content(path) for path in paths}
         self._mutators: dict[str, Mutator] = {}
+        _compile(next(path for path in paths if path.stem in self.steps), self.steps)
 
     def case(self, number: int) -> tuple[str, dict[str, Any], Arrays | None]:
         """The name of the file that was changed, and what became of it."""
