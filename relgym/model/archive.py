@@ -93,7 +93,7 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     parts.looks = [(name, prop, inert) for name, prop, inert in body.looks]
     if body.saved_cells is not None:
         parts.agenda.saved = body.saved_cells
-    if "screen" in data:
+    if data.get("screen") is not None:
         parts.screen.restore(data["screen"])
     if parts.laws is not None:
         parts.laws.restore(data["laws"], _of(arrays, "laws."))

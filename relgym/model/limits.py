@@ -75,8 +75,8 @@ class Limits:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Limits:
         """Read what `to_json` wrote."""
-        low, least = data.get("low", (NOISE, -np.inf))
-        high, most = data.get("high", (NOISE, np.inf))
+        low, least = data.get("low") or (NOISE, -np.inf)
+        high, most = data.get("high") or (NOISE, np.inf)
         return cls(int(low), int(high), float(least), float(most))
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import base64
+import copy
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -300,3 +301,38 @@ def test_a_number_of_the_next_mode_needs_no_memory(tmp_path: Path) -> None:
     assert WorldModel.load(path).describe(details=True)
     assert tracemalloc.get_traced_memory()[1] < 100 << 20
     tracemalloc.stop()
+
+
+SMALL = Path(__file__).parent.parent / "fuzz" / "corpus"
+
+
+def _fields(value: Any, where: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], dict[str, Any], str]]:
+    """Every field of a body, with the names of the fields that it lies in."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield (*where, key), value, key
+            yield from _fields(inner, (*where, key))
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _fields(inner, where)
+
+
+@pytest.mark.parametrize("name", ["puck", "pay", "discs-frozen"])
+@pytest.mark.parametrize("empty", [None, [], {}], ids=["null", "list", "object"])
+def test_every_field_may_be_empty_or_is_refused(name: str, empty: Any) -> None:
+    """One of each kind; what is accepted describes and saves."""
+    body, stored = read_model(SMALL / f"{name}.relgym")
+    arrays = None if stored is None else dict(stored)
+    kinds = {where[-3:]: (inside, key) for where, inside, key in _fields(body)}
+    for where, (inside, key) in kinds.items():
+        kept, inside[key] = inside[key], copy.copy(empty)
+        try:
+            model = WorldModel._restored(copy.deepcopy(body), arrays)
+            model.describe(details=True)
+            model.to_json()
+        except ModelFileError:
+            pass
+        except Exception as error:
+            raise AssertionError(f"{'.'.join(where)} = {empty}") from error
+        finally:
+            inside[key] = kept
