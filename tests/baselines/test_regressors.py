@@ -47,7 +47,8 @@ def test_one_by_one_and_in_a_batch(name: str) -> None:
     assert name in installed(REGRESSORS)
     assert batch.shape == (40, 2) and np.isfinite(batch).all()
     one = np.stack([model.predict_one(row) for row in X[200:210]])
-    np.testing.assert_allclose(one, batch[:10], rtol=1e-5, atol=1e-6)
+    single = name in ("ensemble", "interactions")  # precision of the nets
+    np.testing.assert_allclose(one, batch[:10], rtol=1e-5 if single else 1e-6, atol=1e-9)
     np.testing.assert_array_equal(X, kept)
 
 
