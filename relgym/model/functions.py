@@ -19,7 +19,7 @@ from relgym.config import ModelConfig
 from relgym.model.casting import Casting
 from relgym.scene.objects import SceneLayout
 
-__all__ = ["ModeFunctions", "Verdict", "bodies_of"]
+__all__ = ["BoundFunctions", "ModeFunctions", "Verdict", "bodies_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,32 @@ class Verdict:
     margins: NDArray[np.float64]
 
 
+class BoundFunctions:
+    """Functions laid over signatures; a cache.
+
+    A refit changes a mode's function and not its id, so each entry remembers whose it is.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_known": {}}  # keyed by identity, which a copy doesn't share
+
+    def of(self, signature: SlotSignature, number: int, mode: Mode) -> Binding | None:
+        """A function over a signature's columns, asked for by number; None where its roles have no objects."""
+        known = self._known.get((id(signature), number))
+        if known is None or known[0] is not mode:
+            known = self._known[id(signature), number] = (mode, bind(mode, signature))
+        return known[1]
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._known.clear()
+
+
 class ModeFunctions:
-    """The functions of a target's modes, with their roles filled; holds only caches.
+    """The functions of a target's modes, with their roles filled.
 
     Parameters
     ----------
@@ -47,21 +71,13 @@ class ModeFunctions:
         self.config = config
         self.clusterer = clusterer
         self.casting = casting
-        self._bindings: dict[tuple[int, int], tuple[Mode, Binding | None]] = {}
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_bindings": {}}  # keyed by identity, which a copy doesn't share
-
-    @property
-    def modes(self) -> tuple[Mode, ...]:
-        """All modes but noise, by id."""
-        return self.clusterer.modes
+        self.bound = BoundFunctions()
 
     def mode(self, number: int) -> Mode:
         """The mode of that id."""
         return self.clusterer.clusters[number].mode
 
-    def _values_many(
+    def values_many(
         self, table: ExampleTable, rows: NDArray[np.integer], ids: tuple[int, ...]
     ) -> NDArray[np.float64]:
         """What the modes predict on rows of the table, shape ``(n, len(ids))``; NaN where roles are open."""
@@ -69,35 +85,34 @@ class ModeFunctions:
         signatures = table.signature_ids[rows]
         for number in np.unique(signatures):
             part = np.flatnonzero(signatures == number)
-            values[part] = self._values(table.signatures[int(number)], table.x[rows[part]], ids)
+            values[part] = self.values(table.signatures[int(number)], table.x[rows[part]], ids)
         return values
 
-    def _binding(self, signature: SlotSignature, mode: int) -> Binding | None:
-        key, present = (id(signature), mode), self.mode(mode)
-        known = self._bindings.get(key)
-        if known is None or known[0] is not present:  # a refit changes the function, not the mode's id
-            known = self._bindings[key] = (present, bind(present, signature))
-        return known[1]
+    def binding(self, signature: SlotSignature, mode: int) -> Binding | None:
+        """A mode's function over a signature's columns; None where its roles have no objects."""
+        return self.bound.of(signature, mode, self.mode(mode))
 
-    def _values(
+    def values(
         self, signature: SlotSignature, x: NDArray[np.float64], ids: tuple[int, ...]
     ) -> NDArray[np.float64]:
+        """What the modes predict on n rows with one signature, shape ``(n, len(ids))``; NaN where roles are open."""
         values = np.full((len(x), len(ids)), np.nan)
         for k, mode in enumerate(ids):
-            binding = self._binding(signature, mode)
+            binding = self.binding(signature, mode)
             if binding is not None and not binding.open:
                 values[:, k] = binding.values(x)[:, 0]
         return values
 
-    def _values_one(self, signature: SlotSignature, x: list[float], ids: tuple[int, ...]) -> list[float]:
+    def values_one(self, signature: SlotSignature, x: list[float], ids: tuple[int, ...]) -> list[float]:
+        """`values` of a single row, bit for bit."""
         values = []
         for mode in ids:
-            binding = self._binding(signature, mode)
+            binding = self.binding(signature, mode)
             known = binding is not None and not binding.open
             values.append(binding.value(x) if known and binding is not None else float("nan"))
         return values
 
-    def _played(self, table: ExampleTable, numbers: NDArray[np.intp], mode: int) -> NDArray[np.int64]:
+    def played(self, table: ExampleTable, numbers: NDArray[np.intp], mode: int) -> NDArray[np.int64]:
         """Bodies in a mode's embodied roles, by the assignment that fits each example best (§3.2.4).
 
         Shape ``(n, roles)``.
@@ -122,7 +137,7 @@ class ModeFunctions:
             played[part] = np.take_along_axis(table.bodies[rows[part]], slots, axis=1)
         return played
 
-    def _recast(self, table: ExampleTable, exemplars: Exemplars) -> None:
+    def recast(self, table: ExampleTable, exemplars: Exemplars) -> None:
         """Bind objects anew to the roles of the remembered examples' modes."""
         numbers = exemplars.rows.astype(np.intp)
         labels = self.clusterer.labels[numbers]
@@ -130,11 +145,11 @@ class ModeFunctions:
         roles[:] = -1
         for mode in np.unique(labels[labels != NOISE]):
             part = np.flatnonzero(labels == mode)
-            played = self._played(table, numbers[part], int(mode))
+            played = self.played(table, numbers[part], int(mode))
             width = min(played.shape[1], roles.shape[1])
             roles[part, :width] = played[:, :width]
 
-    def _cast(
+    def cast(
         self, mode: int, binding: Binding, example: Example, order: NDArray[np.intp], layout: SceneLayout
     ) -> tuple[int, ...] | None:
         """Slots of a mode's open roles, by the role classifiers; None if they can't be filled."""

@@ -75,7 +75,7 @@ def _settled(
         one = replace(one, mode=model.latest, roles=one.roles[:1])
     spread = one.spread
     if told.speaker == GUESS:
-        best = model.guess_at(percept, index, following)
+        best = model.fallback.guess_at(percept, index, following)
         spread = spread if best is None else best.mode.sigma
     elif told.speaker != OWN:
         spread = np.nan if told.speaker == PERSISTENCE else told.spread
@@ -105,8 +105,8 @@ def _experts_one(
     found[PERSISTENCE] = present
     if math.isfinite(own):
         found[OWN] = own
-    if model.guesses_something:
-        guessed = model.guessed(percept, index, following[None])
+    if model.fallback.guesses_something:
+        guessed = model.fallback.guessed(percept, index, following[None])
         found[GUESS] = math.nan if guessed is None else float(guessed[0])
     if parts.governs(target):
         return tuple(found)
@@ -139,7 +139,7 @@ def _experts(
     found = np.full((len(own), len(EXPERTS)), np.nan)
     present = following[:, percept.layout.column(index, target.property)]
     found[:, OWN], found[:, PERSISTENCE] = np.where(np.isfinite(own), own, np.nan), present
-    guessed = model.guessed(percept, index, following) if model.guesses_something else None
+    guessed = model.fallback.guessed(percept, index, following) if model.fallback.guesses_something else None
     if guessed is not None:
         found[:, GUESS] = np.where(np.isfinite(guessed), guessed, np.nan)
     latest = None if parts.governs(target) else model.latest_values(percept, index, following)

@@ -161,7 +161,7 @@ def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> T
         pairs,
         _role_rows(part),
         advice,
-        tuple(as_relations(tests, part.flags) for tests in part.scope.beyond()),
+        tuple(as_relations(tests, part.flags) for tests in part.fallback.scope.beyond()),
         _record(part),
     )
 

@@ -209,7 +209,7 @@ def doubted(rules: RuleList, models: Iterable[PropertyModel]) -> RuleList:
 
 def _doubt(part: PropertyModel) -> str:
     """Why a property's list predicts nothing; empty if it does."""
-    if part._lost:
+    if part.lost:
         return "no law of the form that is looked for describes it"
     if not part.modes:
         return "no mode learned yet"
@@ -490,7 +490,7 @@ def _at_rest(part: PropertyModel, view: View) -> Iterator[_Atom]:
 # ------------------------------------------------------------------ what modes don't say
 def _beyond(part: PropertyModel) -> tuple[Branch, ...]:
     """Branches of the places where no mode speaks."""
-    tree = part.scope.tree
+    tree = part.fallback.scope.tree
     if tree is None:
         return ()
     leaves = [leaf for leaf in tree.leaves if not tree.says_yes(leaf)]
@@ -514,8 +514,11 @@ def _path(tree: DecisionTree, leaf: int, flags: frozenset[str]) -> Condition:
 
 
 def _bounds(part: PropertyModel) -> Iterator[Bound]:
-    if part.clusterer.approximate and np.isfinite([part.scope.least, part.scope.most]).all():
-        yield Bound("change within", part.scope.least, part.scope.most)
+    if (
+        part.clusterer.approximate
+        and np.isfinite([part.fallback.scope.least, part.fallback.scope.most]).all()
+    ):
+        yield Bound("change within", part.fallback.scope.least, part.fallback.scope.most)
     limits, counts = part.limits, _counts(part)
     for mode, kind, value in ((limits.low, "at least", limits.least), (limits.high, "at most", limits.most)):
         if mode in limits:

@@ -390,12 +390,12 @@ def _alike(
 
 def _plain(model: PropertyModel, *, governed: bool) -> bool:
     """Whether none but a target's modes or laws, and that nothing changes, have values for it."""
-    if model.guess is not None or model.guess_beyond is not None:
+    if model.fallback.guesses_something:
         return False
     if governed:
         return True
     former = model.latest in model.clusterer.clusters and not model.bounds(model.latest)
-    doubted = model._record.doubts(_PREDICTED, model.config.claim_probability)
+    doubted = model.record.doubts(_PREDICTED, model.config.claim_probability)
     return not model.rough and not (former and doubted and len(model.classifier.modes) > 1)
 
 

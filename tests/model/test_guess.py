@@ -55,7 +55,7 @@ def test_what_is_not_explained_is_guessed_and_said_not_to_be(model: WorldModel) 
     assert one.informed and not one.ok
     assert one.spread == pytest.approx(1.0, rel=0.15)
     assert off(model, fresh) == pytest.approx(1.0, rel=0.2)
-    guess = model.property_model("self", "v").guess
+    guess = model.property_model("self", "v").fallback.guess
     assert guess is not None
     weights = dict(guess.mode.roles[0].terms)
     assert weights["v"] == pytest.approx(1.0, abs=0.2)
@@ -65,13 +65,13 @@ def test_what_is_not_explained_is_guessed_and_said_not_to_be(model: WorldModel) 
 
 def test_what_is_explained_is_not_guessed(model: WorldModel) -> None:
     assert formulas(model, "x") == ["x' = x + v"]
-    assert model.property_model("self", "x").guess is None
+    assert model.property_model("self", "x").fallback.guess is None
 
 
 def test_a_guess_that_is_no_better_than_no_change_is_none() -> None:
     model = learned(SCHEMA, strollers(400))
     one = model.predict_one(strollers(1)[0].before)["self", "v"]
-    assert model.property_model("self", "v").guess is None
+    assert model.property_model("self", "v").fallback.guess is None
     assert not one.informed and one.value == strollers(1)[0].before["self"]["v"]
 
 
@@ -132,8 +132,8 @@ def test_a_guess_takes_no_place_of_modes_that_other_laws_read(tmp_path: Path) ->
     model = learned(SCHEMA, steps[:400])
     assert formulas(model, "x") == ["x' = x + v'"]
     part, scene = model.property_model("self", "v"), steps[400].before
-    part.guesses.errors[:] = [[1.0, 1.0], [0.5, 0.5]]
-    assert part.guesses.superior
+    part.fallback.guesses.errors[:] = [[1.0, 1.0], [0.5, 0.5]]
+    assert part.fallback.guesses.superior
     assert part.leaned_on and not model.property_model("self", "x").leaned_on
     assert model.predict_one(scene).ok
     model.save(tmp_path / "model.json")
@@ -153,7 +153,7 @@ def test_what_depends_on_what_is_kept_follows_from_it() -> None:
     steps = transitions(SCHEMA, moved, rng.normal(size=(400, 2)), rng.normal(size=(400, 1)))
     model = learned(SCHEMA, steps)
     assert formulas(model, "x") == ["x' = x + v'"]
-    assert model.property_model("self", "v").guess is None
+    assert model.property_model("self", "v").fallback.guess is None
     scene = SCHEMA.scene({"self": [2.0, 3.0], "action": [0.0]})
     said = model.predict_one(scene)
     assert said["self", "x"].outcome is Outcome.DEPENDS
@@ -186,7 +186,7 @@ def test_a_guess_replaces_modes_that_err_more(
     for k in range(1000):
         guesses.compare(rare if k % 20 == 0 else usual, own)
     assert not guesses.superior  # there is none
-    guesses.best = model.property_model("self", "v").guess
+    guesses.best = model.property_model("self", "v").fallback.guess
     assert guesses.superior is better
     again = Guesses.from_json(V, guesses.to_json())
     assert again.superior is better

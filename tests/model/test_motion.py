@@ -9,7 +9,7 @@ import pytest
 
 from relgym.config import ModelConfig
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
-from relgym.envs.learned_model import LearnedModelEnv
+from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import ConfigError
 from relgym.experiments.data import ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode

@@ -58,7 +58,7 @@ def model() -> WorldModel:
 def test_an_approximation_speaks_where_it_is_good(model: WorldModel) -> None:
     part = model.property_model("self", "v")
     assert part.clusterer.approximate
-    assert part.scope.beyond() == ("leg > 0.5",)
+    assert part.fallback.scope.beyond() == ("leg > 0.5",)
     for step in lander(100, seed=1):
         said = model.predict_one(step.before)["self", "v"]
         if step.before["self"]["leg"]:
@@ -70,12 +70,12 @@ def test_an_approximation_speaks_where_it_is_good(model: WorldModel) -> None:
 
 def test_beyond_a_guess_of_what_happens_there_stands_in(model: WorldModel) -> None:
     part = model.property_model("self", "v")
-    assert part.guess_beyond is not None
+    assert part.fallback.guess_beyond is not None
     steps = [t for t in lander(1000, seed=2) if t.before["self"]["leg"]]
     said = [model.predict_one(t.before)["self", "v"] for t in steps]
     off = [one.value - t.after["self"]["v"] for one, t in zip(said, steps, strict=True)]
     assert np.std(off) == pytest.approx(1.0, rel=0.3)  # what was thrown changes by 2.3
-    assert {one.spread for one in said} == {part.guess_beyond.mode.sigma}
+    assert {one.spread for one in said} == {part.fallback.guess_beyond.mode.sigma}
 
 
 def test_where_an_approximation_is_nearly_right_it_speaks() -> None:
@@ -91,16 +91,18 @@ def test_where_an_approximation_is_nearly_right_it_speaks() -> None:
     part = learned(SCHEMA, steps, features=("trig(x)",)).property_model("self", "v")
     assert part.clusterer.approximate
     assert part.clusterer.noise_examples > 30
-    assert part.scope.beyond() == ()
+    assert part.fallback.scope.beyond() == ()
 
 
 def test_far_off_nothing_changes_by_far_more_than_was_seen(model: WorldModel) -> None:
     part = model.property_model("self", "v")
     changes = [t.after["self"]["v"] - t.before["self"]["v"] for t in lander(760)]
-    assert part.scope.most - part.scope.least == pytest.approx(2.0 * np.ptp(changes), rel=0.2)
+    assert part.fallback.scope.most - part.fallback.scope.least == pytest.approx(
+        2.0 * np.ptp(changes), rel=0.2
+    )
     for step in lander(50, seed=3, steepest=100.0):
         change = model.predict_one(step.before)["self", "v"].value - step.before["self"]["v"]
-        assert part.scope.least - 1e-9 <= change <= part.scope.most + 1e-9
+        assert part.fallback.scope.least - 1e-9 <= change <= part.fallback.scope.most + 1e-9
 
 
 def test_one_by_one_and_in_batches_with_the_same_bits(model: WorldModel) -> None:
@@ -131,7 +133,7 @@ def test_a_law_has_no_bounds() -> None:
     starts = np.column_stack([rng.normal(size=(200, 2)), np.zeros(200)])
     steps = transitions(SCHEMA, lambda s, u: [s[0], s[1] + s[0], s[2]], starts, rng.normal(size=(200, 1)))
     model = learned(SCHEMA, steps)
-    assert model.property_model("self", "v").scope is EVERYWHERE
+    assert model.property_model("self", "v").fallback.scope is EVERYWHERE
     far = SCHEMA.scene({"self": [1e6, 1.0, 0.0], "action": [0.0]})
     assert model.predict_one(far)["self", "v"].value == pytest.approx(1e6 + 1.0)
 
@@ -139,7 +141,7 @@ def test_a_law_has_no_bounds() -> None:
 def test_a_rare_end_is_not_predicted_as_the_others() -> None:
     model = learned(ROOM, strolls())
     assert len(model.modes("task", "reward")) == 1
-    (beyond,) = model.property_model("task", "reward").scope.beyond()
+    (beyond,) = model.property_model("task", "reward").fallback.scope.beyond()
     assert beyond.startswith("self.x") and " <= -" in beyond
 
     def predicted(x: float) -> tuple[Outcome, float]:
@@ -175,15 +177,15 @@ def test_what_lies_scattered_has_no_place() -> None:
     )
     part = model.property_model("self", "v")
     assert part.clusterer.approximate and part.clusterer.noise_examples > 25
-    assert part.scope.tree is None
+    assert part.fallback.scope.tree is None
 
 
 def test_a_loaded_model_speaks_where_it_did(model: WorldModel, tmp_path: Path) -> None:
     model.save(tmp_path / "lander.relgym")
     again = WorldModel.load(tmp_path / "lander.relgym")
     part, known = again.property_model("self", "v"), model.property_model("self", "v")
-    assert part.scope == known.scope
-    assert part.guesses.to_json() == known.guesses.to_json()
+    assert part.fallback.scope == known.fallback.scope
+    assert part.fallback.guesses.to_json() == known.fallback.guesses.to_json()
     for step in lander(50, seed=5, steepest=10.0):
         said, before = again.predict_one(step.before), model.predict_one(step.before)
         assert said.scene.vector.tobytes() == before.scene.vector.tobytes()
@@ -204,8 +206,8 @@ def test_a_law_that_is_slightly_off_speaks_where_nobody_guesses() -> None:
     starts = np.column_stack([rng.uniform(-1.0, 1.1, 400), rng.normal(size=400), np.zeros(400)])
     model = learned(SCHEMA, transitions(SCHEMA, moved, starts, rng.normal(size=(400, 1))))
     part = model.property_model("self", "v")
-    assert part.clusterer.noise_examples >= 10 and not part.inexact
-    assert part.scope.tree is None
+    assert part.clusterer.noise_examples >= 10 and not part.fallback.inexact
+    assert part.fallback.scope.tree is None
     one = model.predict_one(SCHEMA.scene({"self": [1.05, 0.0, 0.0], "action": [2.0]}))["self", "v"]
     assert one.value == pytest.approx(2.0)
 
@@ -233,7 +235,7 @@ def fanned(n: int) -> tuple[SceneSchema, WorldModel]:
 
 def test_what_the_tree_looks_at_is_found_by_name() -> None:
     schema, model = fanned(600)
-    scope = model.property_model("cart", "v").scope
+    scope = model.property_model("cart", "v").fallback.scope
     assert scope.tree is not None and scope.beyond() == tuple(t for t in scope.beyond() if "fan.s" in t)
     blown = model.predict_one(schema.scene({"cart": [-0.5], "fan": [0.9]}))
     assert blown.parts[0].outcome is Outcome.UNEXPLAINED

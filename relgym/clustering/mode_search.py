@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from relgym.clustering.discovery import (
     SEARCH,
     counts,
     find_mode,
-    least_examples,
     searched,
     verifying_bits,
 )
@@ -25,14 +24,12 @@ from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
 from relgym.clustering.suspects import Evidence, likeliest, suspects
 from relgym.clustering.unification import reordered
-from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit
-from relgym.scene.objects import Target
 from relgym.scheduling.agenda import Budget
 from relgym.scheduling.work import CALL, Task
 
-__all__ = ["Prospector", "Search"]
+__all__ = ["ModeSearch", "Search"]
 
 HOPELESS = 200
 """Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
@@ -95,37 +92,36 @@ class Hunt:
     late: bool = False
 
 
-class Prospector(Population):
-    """Examples and modes, and the search for further modes; when there is reason to is the clusterer's business.
+class ModeSearch:
+    """The search for further modes of a target's examples; when there is reason to is the clusterer's business.
 
     Parameters
     ----------
-    target, config
-        As of `Population`.
+    population
+        The examples, and the modes so far: what is found goes there.
     seed
         Seed of the random draws.
-
-    Attributes
-    ----------
-    approximate
-        Whether the noise assumed is what an approximation leaves, no exact law being known.
     """
 
-    def __init__(self, target: Target, config: ClusteringConfig, *, seed: int) -> None:
-        super().__init__(target, config)
-        self.approximate = False
+    def __init__(self, population: Population, *, seed: int) -> None:
+        self.population = population
         self._rng = np.random.default_rng(seed)
         self._searches: dict[int, Search] = {}
         self._hunt: Hunt | None = None
 
     @property
-    def _needed(self) -> int:
-        """Examples that found a mode: each verifies it by as many bits as tell it from all values seen."""
-        return least_examples(self.y, self.scale, self.config)
+    def under_way(self) -> bool:
+        """Whether there is a search to be gone on with."""
+        return self._hunt is not None
 
-    def _discover(self, table: ExampleTable, example: int, budget: Budget) -> None:
+    def start_over(self) -> None:
+        """All examples are news again."""
+        self._hunt = None
+        self._searches.clear()
+
+    def discover(self, table: ExampleTable, example: int, budget: Budget) -> None:
         """An example is news: search for modes among its like, unless that is in vain, or one is under way."""
-        signature = int(table.signature_ids[self.rows[example]])
+        signature = int(table.signature_ids[self.population.rows[example]])
         search = self._searches.setdefault(signature, Search())
         search.waiting += 1
         slots = table.signatures[signature]
@@ -134,15 +130,15 @@ class Prospector(Population):
             self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)  # costs little
             return
         self._hunt = Hunt(signature, search.waiting)
-        self._pursue(table, budget)
+        self.pursue(table, budget)
 
-    def _pursue(self, table: ExampleTable, budget: Budget) -> None:
+    def pursue(self, table: ExampleTable, budget: Budget) -> None:
         """Go on with the search that is under way, as far as the budget goes."""
         while (hunt := self._hunt) is not None:
             search = self._searches.setdefault(hunt.signature, Search())
             if hunt.task is None:
                 pool = self._pool(table, hunt.signature)
-                if not hunt.left or len(pool) < self._needed:  # not a failure: nothing was searched
+                if not hunt.left or len(pool) < self.population.needed:  # not a failure: nothing was searched
                     self._give_up(table, search, pool)
                     return
                 self._begin(table, hunt, pool, budget)
@@ -159,7 +155,7 @@ class Prospector(Population):
             search.failures = 0
             fit = reordered(found.fit, hunt.order)
             if not hunt.late or self._wanted(table, hunt.signature, fit):
-                self._adopt(table, hunt.signature, fit)
+                self.adopt(table, hunt.signature, fit)
 
     def _give_up(self, table: ExampleTable, search: Search, pool: NDArray[np.intp]) -> None:
         """End the search that is under way; what has come since it began is news to the next one."""
@@ -170,25 +166,26 @@ class Prospector(Population):
 
     def _begin(self, table: ExampleTable, hunt: Hunt, pool: NDArray[np.intp], budget: Budget) -> None:
         """Begin to search unexplained examples for one mode, as they now are."""
+        population = self.population
         slots = table.signatures[hunt.signature]
-        order, stages = slots.preference(self.target)
+        order, stages = slots.preference(population.target)
         pool = pool[-max(2 * SEARCH, MOST_CELLS // max(1, len(order))) :]
-        rows = self.rows[pool]
+        rows = population.rows[pool]
         part = searched(len(pool), hunt.fresh, self._rng)
         several = len(np.unique(table.strata[rows[part]])) > 1
         hunt.order = order
         hunt.task = Task(
             find_mode,
             slots.matrix(table.x[rows], order),
-            self.y[pool],
+            population.y[pool],
             table.strata[rows],
             stages=stages,
             fresh=hunt.fresh,
-            scale=self.scale,
-            config=self.config,
+            scale=population.scale,
+            config=population.config,
             rng=self._rng,
-            needed=self._needed,
-            counting=counts(self.y, self.scale),
+            needed=population.needed,
+            counting=counts(population.y, population.scale),
             rows=part,
             apart=table.differences(rows[part]) if several else None,
         )
@@ -196,8 +193,9 @@ class Prospector(Population):
 
     def _wanted(self, table: ExampleTable, signature: int, fit: LinearFit) -> bool:
         """Whether a function still explains enough of what none explains."""
-        cluster = self._known(table).cluster(fit, signature)
-        return len(self._explained(table, cluster, self._noise())) >= self._needed
+        population = self.population
+        cluster = population.known(table).cluster(fit, signature)
+        return len(population.explained(table, cluster, population.noise())) >= population.needed
 
     def _extend(
         self,
@@ -209,8 +207,10 @@ class Prospector(Population):
         flags: bool = False,
     ) -> None:
         """Extend modes by terms that new examples show; what one mode tells, older examples of others confirm."""
-        while (wider := extended(self._known(table), signature, pool, fresh=fresh, flags=flags)) is not None:
-            self._adopt(table, signature, wider)
+        while (
+            wider := extended(self.population.known(table), signature, pool, fresh=fresh, flags=flags)
+        ) is not None:
+            self.adopt(table, signature, wider)
             left = self._pool(table, signature)
             if len(left) >= len(pool):
                 return
@@ -222,62 +222,68 @@ class Prospector(Population):
         It is longer where searches are dear, for features, or may be in vain, since nobody said that there are laws.
         Where they are cheap it may take many to find the first law of many, and none is given up.
         """
-        lost = dear and self._log.seen >= HOPELESS and 2 * self.noise_examples > self._log.seen
-        if self.approximate or lost:  # what an approximation leaves is mostly its own tail
+        population = self.population
+        lost = dear and population.seen >= HOPELESS and 2 * population.noise_examples > population.seen
+        if population.approximate or lost:  # what an approximation leaves is mostly its own tail
             return search.failures * search.failures
         return search.failures if doubtful else search.failures // 6
 
     def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
         """Noise examples of one signature that aren't some mode's tail, oldest first."""
-        pool: NDArray[np.intp] = np.flatnonzero(self.labels == NOISE)
-        pool = pool[table.signature_ids[self.rows[pool]] == signature]
-        if len(pool) and self.clusters:
-            pool = pool[self._least_errors(table, pool) > self.scale.tail]
+        population = self.population
+        pool: NDArray[np.intp] = np.flatnonzero(population.labels == NOISE)
+        pool = pool[table.signature_ids[population.rows[pool]] == signature]
+        if len(pool) and population.clusters:
+            pool = pool[population.least_errors(table, pool) > population.scale.tail]
         return pool
 
-    def _review(self, table: ExampleTable) -> bool:
+    def review(self, table: ExampleTable) -> bool:
         """Where noise is large, look for modes whose examples others explain by chance, and assign all anew."""
-        by_chance = not self.scale.misfit and verifying_bits(self.y, self.scale) <= CHANCY * EXACT
+        population = self.population
+        by_chance = (
+            not population.scale.misfit and verifying_bits(population.y, population.scale) <= CHANCY * EXACT
+        )
         # In a world of one state all examples are where they are; there noise that depends on the action would give
         # its quiet actions a mode of their own, and leave the loud ones without any (LunarLander's engine).
-        states = table.strata[self.rows]
-        self._chancy = self.config.review and by_chance and bool((states != states[0]).any())
-        if not self._chancy:
+        states = table.strata[population.rows]
+        population.chancy = population.config.review and by_chance and bool((states != states[0]).any())
+        if not population.chancy:
             return False
-        ids = table.signature_ids[self.rows]
+        ids = table.signature_ids[population.rows]
         for signature in np.unique(ids).tolist():
             there = np.flatnonzero(ids == signature)
             for _ in range(MOST_DISCOVERIES):
                 found = self._among_suspects(table, signature, there)
                 if found is None or not self._take_over(table, signature, *found):
                     break
-        self._reassign_all(table)
-        self._prune(table)
+        population.reassign_all(table)
+        population.prune(table)
         return True
 
     def _among_suspects(
         self, table: ExampleTable, signature: int, examples: NDArray[np.intp]
     ) -> tuple[LinearFit, NDArray[np.intp]] | None:
         """A function of the object's own state that explains suspects well enough, and those that it takes over."""
+        population = self.population
         slots = table.signatures[signature]
-        order, stages = slots.preference(self.target)
+        order, stages = slots.preference(population.target)
         order = order[: stages[0]]
-        known = self._least_errors(table, examples)
-        strata = table.strata[self.rows[examples]]
-        part = suspects(strata, known, self.scale)
-        rows = self.rows[examples[part]]
+        known = population.least_errors(table, examples)
+        strata = table.strata[population.rows[examples]]
+        part = suspects(strata, known, population.scale)
+        rows = population.rows[examples[part]]
         evidence = Evidence(
             slots.matrix(table.x[rows], order),
-            self.y[examples[part]],
+            population.y[examples[part]],
             known[part],
-            scale=self.scale,
-            spread=float(np.ptp(self.y)),
+            scale=population.scale,
+            spread=float(np.ptp(population.y)),
         )
-        found = likeliest(evidence, strata[part], rng=self._rng, most=self.config.max_terms)
+        found = likeliest(evidence, strata[part], rng=self._rng, most=population.config.max_terms)
         if found is None:
             return None
-        taken = examples[part[evidence.close(found) & (known[part] > SURPRISING * self.scale.sigma)]]
-        if 2 * len(taken) < self._needed:
+        taken = examples[part[evidence.close(found) & (known[part] > SURPRISING * population.scale.sigma)]]
+        if 2 * len(taken) < population.needed:
             return None
         return reordered(found, order), taken
 
@@ -285,53 +291,37 @@ class Prospector(Population):
         self, table: ExampleTable, signature: int, fit: LinearFit, taken: NDArray[np.intp]
     ) -> bool:
         """Make a mode of suspects' function; whether that leaves more modes, and none worse explained for it."""
-        known = self._known(table)
+        population = self.population
+        known = population.known(table)
         cluster, absorbed = generalise(known, known.cluster(fit, signature), taken, rng=self._rng)
-        kept = [c for i, c in self.clusters.items() if i not in absorbed]
-        if absorbed and self._misfit(table, [*kept, cluster]) > self._misfit(table, self.clusters.values()):
+        kept = [c for i, c in population.clusters.items() if i not in absorbed]
+        if absorbed and population.misfit(table, [*kept, cluster]) > population.misfit(
+            table, population.clusters.values()
+        ):
             return False  # another of the same, that suits these better and all others worse
-        self.labels[taken] = NOISE
-        self._install(table, cluster, absorbed)
+        population.labels[taken] = NOISE
+        population.install(table, cluster, absorbed)
         return not absorbed
 
-    def _misfit(self, table: ExampleTable, clusters: Iterable[Cluster]) -> float:
-        """Sum of all examples' squared errors by the mode that explains each best, in squares of the tail."""
-        least = self._least_errors(table, np.arange(len(self._log)), clusters)
-        return float(np.square(np.minimum(least / self.scale.tail, 1.0)).sum())
-
-    def _least_errors(
-        self, table: ExampleTable, examples: NDArray[np.intp], clusters: Iterable[Cluster] | None = None
-    ) -> NDArray[np.float64]:
-        """Error of the mode that explains each example best, infinite where none applies; default: of all modes."""
-        least = np.full(len(examples), np.inf)
-        for cluster in self.clusters.values() if clusters is None else clusters:
-            errors, _ = cluster.errors(table, self.rows[examples], self.y[examples], self.scale)
-            least = np.minimum(least, errors)
-        return least
-
-    def _adopt(self, table: ExampleTable, signature: int, fit: LinearFit) -> None:
+    def adopt(self, table: ExampleTable, signature: int, fit: LinearFit) -> None:
         """Make a mode of a function: unify it with the known ones (§3.2.5), reassign examples (§3.2.4)."""
-        known = self._known(table)
-        self._admit(table, known, known.cluster(fit, signature))
+        known = self.population.known(table)
+        self.admit(table, known, known.cluster(fit, signature))
 
-    def _known(self, table: ExampleTable) -> Known:
-        return Known(
-            table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
-        )
-
-    def _admit(self, table: ExampleTable, known: Known, cluster: Cluster) -> int:
+    def admit(self, table: ExampleTable, known: Known, cluster: Cluster) -> int:
         """Take up a mode that has no id yet; the id that it gets."""
-        members = self._explained(table, cluster, self._noise())
-        return self._install(table, *generalise(known, cluster, members, rng=self._rng))
+        population = self.population
+        members = population.explained(table, cluster, population.noise())
+        return population.install(table, *generalise(known, cluster, members, rng=self._rng))
 
-    def _install(self, table: ExampleTable, cluster: Cluster, absorbed: tuple[int, ...]) -> int:
-        """Put a mode in the place of those it absorbed; its id."""
-        inherited = sum(self._log.forgotten.pop(i, 0) for i in absorbed)
-        for i in absorbed:
-            self._remove(i)
-        new = self._next_id
-        self._next_id += 1
-        self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
-        self._log.forgotten[new] += inherited
-        self._reassign(table, new)
-        return new
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `restore` reads back: when to search, and the state of the random numbers."""
+        return {
+            "searches": [[i, s.waiting, s.failures] for i, s in sorted(self._searches.items())],
+            "random": self._rng.bit_generator.state,
+        }
+
+    def restore(self, data: dict[str, Any]) -> None:
+        """Take over what `to_json` wrote."""
+        self._searches = {int(i): Search(int(w), int(f)) for i, w, f in data["searches"]}
+        self._rng.bit_generator.state = data["random"]

@@ -8,15 +8,13 @@ from numpy.typing import NDArray
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.mode import NOISE
-from relgym.clustering.roles import Binding, bind
-from relgym.config import ModelConfig
-from relgym.model.casting import Casting
-from relgym.model.functions import ModeFunctions
+from relgym.clustering.roles import Binding
+from relgym.model.functions import BoundFunctions
 from relgym.model.guess import Guess, Guesses
 from relgym.model.perception import Percept
 from relgym.model.scope import EVERYWHERE
 
-__all__ = ["StandIns"]
+__all__ = ["Fallback"]
 
 ROUGH = 4.0
 """So many times the rounding noise can't be rounding."""
@@ -25,13 +23,13 @@ _BEYOND = -1
 """In the place of a mode's id: the guess beyond the scope of approximations."""
 
 
-class StandIns(ModeFunctions):
+class Fallback:
     """The guesses of one target, and how far they and its modes go.
 
     Parameters
     ----------
-    clusterer, casting, config
-        As of `ModeFunctions`.
+    clusterer
+        Knows the modes.
 
     Attributes
     ----------
@@ -39,13 +37,16 @@ class StandIns(ModeFunctions):
         The best guess, where nothing is explained.
     scope
         Where modes are used, and how far guesses and approximations go.
+    unexplained
+        Whether there is no law, as far as is known by now.
     """
 
-    def __init__(self, clusterer: ModeClusterer, casting: Casting, config: ModelConfig) -> None:
-        super().__init__(clusterer, casting, config)
+    def __init__(self, clusterer: ModeClusterer) -> None:
+        self.clusterer = clusterer
         self.guesses = Guesses()
         self.scope = EVERYWHERE
-        self._unexplained = False
+        self.unexplained = False
+        self.bound = BoundFunctions()
 
     @property
     def inexact(self) -> bool:
@@ -54,19 +55,19 @@ class StandIns(ModeFunctions):
         return self.clusterer.approximate or (rough and self.clusterer.config.noise_std == "auto")
 
     @property
-    def _guessable(self) -> bool:
+    def guessable(self) -> bool:
         """Whether nothing is explained, or nothing exactly."""
-        return self._unexplained or self.inexact
+        return self.unexplained or self.inexact
 
     @property
     def guess(self) -> Guess | None:
         """The best guess, where it stands in for what isn't explained: nothing is, or nothing exactly."""
-        return self.guesses.best if self._guessable else None
+        return self.guesses.best if self.guessable else None
 
     @property
     def guess_beyond(self) -> Guess | None:
         """The guess used where approximations aren't, if it is better than the best guess of all."""
-        return self.guesses.beyond if self._guessable and self.scope.tree is not None else None
+        return self.guesses.beyond if self.guessable and self.scope.tree is not None else None
 
     @property
     def guesses_something(self) -> bool:
@@ -95,7 +96,7 @@ class StandIns(ModeFunctions):
         Arguments as of `predict_batch`.
         """
         signature = percept.situation(index).signature
-        whole, beyond = self._guessing(signature), self._guessing(signature, beyond=True)
+        whole, beyond = self.guessing(signature), self.guessing(signature, beyond=True)
         if whole is None and beyond is None:
             return None
         x = percept.rows(index, following, ordered=False)
@@ -105,15 +106,13 @@ class StandIns(ModeFunctions):
             values = np.where(self.scope.covers(x, signature), values, beyond.values(x)[:, 0])
         return self.scope.within(values, signature, x, target)
 
-    def _guessing(self, signature: SlotSignature, *, beyond: bool = False) -> Binding | None:
+    def guessing(self, signature: SlotSignature, *, beyond: bool = False) -> Binding | None:
         """A guess over a signature's columns: the best one of all, or that beyond the scope of approximations."""
         best, key = (self.guess, NOISE) if not beyond else (self.guess_beyond, _BEYOND)
         if best is None:
             return None
-        known = self._bindings.get((id(signature), key))
-        if known is None or known[0] is not best.mode:
-            known = self._bindings[id(signature), key] = (best.mode, bind(best.mode, signature))
-        return None if known[1] is None or known[1].open else known[1]
+        bound = self.bound.of(signature, key, best.mode)
+        return None if bound is None or bound.open else bound
 
     def within(self, value: float, signature: SlotSignature, row: NDArray[np.float64]) -> float:
         """What a mode predicts for a row ``(1, d)``, or as far as approximations go."""
