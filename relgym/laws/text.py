@@ -6,13 +6,16 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
 from relgym.clustering.mode import sum_text
 from relgym.errors import ConfigError
-from relgym.laws.book import LawBook
 from relgym.laws.frames import NORMAL_FRAMES, POINT, axis_names
 from relgym.laws.records import ALIKE, ONE, Kind, PairLaw, Piece
 from relgym.scene.axes import Axes
+
+if TYPE_CHECKING:
+    from relgym.laws.book import LawBook
 
 __all__ = ["DIRECTIONS", "LEGEND", "LawRow", "WorldRow", "law_rows", "world_rows"]
 
