@@ -16,8 +16,8 @@ from relgym.experiments.dyna import EPISODES, solved_at
 from relgym.planning import EnvSimulator, Objective, Planner, PlanningAgent, Steps, TreeSearch
 from relgym.scene.objects import Float1D, Float2D, Scene
 from relgym.wrappers.action_repeat import ActionRepeat
-from relgym.wrappers.sb3.acting import acting_all
-from relgym.wrappers.sb3.trainer import ModelTrainer
+from relgym.wrappers.dyna.acting import acting_all
+from relgym.wrappers.dyna.trainer import ModelTrainer
 
 __all__ = ["ARMS", "COURSES", "Arm", "Course", "Tests", "ceiling", "learning"]
 

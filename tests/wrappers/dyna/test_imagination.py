@@ -14,10 +14,10 @@ from relgym.envs.actions import acting
 from relgym.envs.tasks import TaskOutcome
 from relgym.errors import ConfigError
 from relgym.wrappers.action_repeat import ActionRepeat
-from relgym.wrappers.sb3.acting import acting_all
-from relgym.wrappers.sb3.imagination import Imagination
-from relgym.wrappers.sb3.lens import Lens
-from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.dyna.acting import acting_all
+from relgym.wrappers.dyna.imagination import Imagination
+from relgym.wrappers.dyna.lens import Lens
+from relgym.wrappers.dyna.recorder import TransitionRecorder
 
 LAYOUT = SCHEMA.layout(("cart", "other", "mark"))
 
@@ -171,7 +171,7 @@ def test_a_recorders_schema_knows_how_coarse_its_scenes_are() -> None:
 
 
 def test_a_recorder_nobody_asks_forgets_the_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("relgym.wrappers.sb3.recorder._MOST", 3)
+    monkeypatch.setattr("relgym.wrappers.dyna.recorder._MOST", 3)
     env = TransitionRecorder(LineEnv())
     env.reset(seed=0)
     for push in (0.1, 0.2, 0.3, 0.4, 0.5):

@@ -23,17 +23,17 @@ from relgym.envs.arguments import (
     checked_mask,
     checked_options,
 )
-from relgym.envs.learned_model_batch import DreamStep, Stepped
-from relgym.envs.learned_model_infos import masked, told_of
-from relgym.envs.learned_model_rewards import (
+from relgym.envs.dreams.infos import masked, told_of
+from relgym.envs.dreams.rewards import (
     BatchSceneFunction,
     BatchStepEvaluator,
     TaskFunctions,
     check_reward_functions,
     marked,
 )
-from relgym.envs.learned_model_setting import Setting, check_knowledge
-from relgym.envs.learned_model_starts import BatchStart, Drawn
+from relgym.envs.dreams.setting import Setting, check_knowledge
+from relgym.envs.dreams.starts import BatchStart, Drawn
+from relgym.envs.dreams.step import DreamStep, Stepped
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import BatchPrediction

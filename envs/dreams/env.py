@@ -20,16 +20,16 @@ from relgym.envs.arguments import (
     checked_least,
     checked_options,
 )
-from relgym.envs.learned_model_ends import Cause, explained, horizon_reached, parts_of
-from relgym.envs.learned_model_rewards import (
+from relgym.envs.dreams.ends import Cause, explained, horizon_reached, parts_of
+from relgym.envs.dreams.rewards import (
     SceneFunction,
     StepEvaluator,
     TaskFunctions,
     check_reward_functions,
     marked,
 )
-from relgym.envs.learned_model_setting import Setting, check_knowledge
-from relgym.envs.learned_model_starts import Start
+from relgym.envs.dreams.setting import Setting, check_knowledge
+from relgym.envs.dreams.starts import Start
 from relgym.envs.views import View
 from relgym.errors import ConfigError
 from relgym.model.prediction import ScenePrediction

@@ -35,7 +35,7 @@ from worlds import line, room
 import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv, drawn_from, in_batches
 from relgym.envs.arguments import checked_actions
-from relgym.envs.learned_model_shown import BoxesShown, ViewShown
+from relgym.envs.dreams.shown import BoxesShown, ViewShown
 from relgym.envs.views import NumbersView, Static, TaskView
 from relgym.errors import ActionError, ConfigError, ObservationError, QueryError
 from relgym.model.world_model import WorldModel

@@ -30,7 +30,7 @@ from plain_envs import Drifter, Visited
 from worlds import ROOM_TARGETS, room, scene, schema_of
 
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
-from relgym.envs.learned_model_shown import BoxesShown
+from relgym.envs.dreams.shown import BoxesShown
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views import NumbersView, Rows, TableView, TaskView

@@ -11,11 +11,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from relgym.envs.learned_model_shown import Boxes, ViewDeeds, is_plain, shown_at_once
+from relgym.envs.dreams.shown import Boxes, ViewDeeds, is_plain, shown_at_once
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import Float2D, Scene, SceneLayout
-from relgym.wrappers.sb3.acting import acting_all
-from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.dyna.acting import acting_all
+from relgym.wrappers.dyna.recorder import TransitionRecorder
 
 __all__ = ["Lens", "Observations", "picked"]
 

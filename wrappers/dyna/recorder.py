@@ -14,7 +14,7 @@ from relgym.envs.arguments import checked_action
 from relgym.envs.views import SceneView
 from relgym.scene.objects import Scene, Transition
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.sb3.keys import check_keys
+from relgym.wrappers.dyna.keys import check_keys
 from relgym.wrappers.views import ViewLike, recordable, view_of
 
 __all__ = ["Experience", "TransitionRecorder"]

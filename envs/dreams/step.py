@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.envs.learned_model_ends import CAUSES, Cause, causes, explained, horizon_reached, parts_of_row
-from relgym.envs.learned_model_rewards import BatchStepEvaluator, TaskFunctions
-from relgym.envs.learned_model_setting import Setting
-from relgym.envs.learned_model_shown import Deeds
+from relgym.envs.dreams.ends import CAUSES, Cause, causes, explained, horizon_reached, parts_of_row
+from relgym.envs.dreams.rewards import BatchStepEvaluator, TaskFunctions
+from relgym.envs.dreams.setting import Setting
+from relgym.envs.dreams.shown import Deeds
 from relgym.model.prediction import BatchPrediction
 from relgym.scene.objects import Float1D, Float2D, Scene
 

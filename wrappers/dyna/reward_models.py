@@ -22,8 +22,8 @@ from relgym.model.storage import schema_from_json, schema_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, ObjectType, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.sb3.acting import acting_all
-from relgym.wrappers.sb3.file_format import RewardModelBody
+from relgym.wrappers.dyna.acting import acting_all
+from relgym.wrappers.dyna.file_format import RewardModelBody
 
 __all__ = ["Acting", "LearnedRewardModel", "NeuralModel", "NeuralRewardModel", "RewardModel", "check_rewards"]
 

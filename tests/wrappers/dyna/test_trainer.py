@@ -11,11 +11,11 @@ import pytest
 
 import relgym
 from relgym.scene.objects import Transition
-from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
-from relgym.wrappers.sb3.reward_models import LearnedRewardModel
-from relgym.wrappers.sb3.stock import changing
-from relgym.wrappers.sb3.trainer import ModelTrainer
+from relgym.wrappers.dyna.config import DynaConfig
+from relgym.wrappers.dyna.recorder import Experience, TransitionRecorder
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel
+from relgym.wrappers.dyna.stock import changing
+from relgym.wrappers.dyna.trainer import ModelTrainer
 
 
 def make(**arguments: Any) -> Any:

@@ -15,9 +15,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from relgym.envs.actions import check_action_space
+from relgym.envs.dreams.rewards import TaskFunctions
+from relgym.envs.dreams.shown import BoxesShown, Shown, ViewShown, checked_boxes, is_plain
 from relgym.envs.flat import FlatSpec
-from relgym.envs.learned_model_rewards import TaskFunctions
-from relgym.envs.learned_model_shown import BoxesShown, Shown, ViewShown, checked_boxes, is_plain
 from relgym.envs.model_files import EnvRecord, copied, schema_like, world_like
 from relgym.envs.views import REWARD, TERMINATED, TaskView, View, view_from_json
 from relgym.errors import ConfigError, ObservationError, QueryError

@@ -13,8 +13,8 @@ from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, Target, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box
-from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.stock import SceneStock, free_properties, permuted
+from relgym.wrappers.dyna.config import DynaConfig
+from relgym.wrappers.dyna.stock import SceneStock, free_properties, permuted
 
 POSE = ("px", "py", "pz", "rx", "ry", "rz", "sx", "sy", "sz")
 BLOCKS = SceneSchema(

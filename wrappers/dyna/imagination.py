@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
-from relgym.wrappers.sb3.lens import Lens, Observations, picked
-from relgym.wrappers.sb3.reward_models import RewardModel, check_rewards
-from relgym.wrappers.sb3.stock import DreamModel
+from relgym.wrappers.dyna.lens import Lens, Observations, picked
+from relgym.wrappers.dyna.reward_models import RewardModel, check_rewards
+from relgym.wrappers.dyna.stock import DreamModel
 
 __all__ = ["Imagination", "Imagined", "Policy"]
 

@@ -19,10 +19,10 @@ from relgym.errors import ConfigError, ModelFileError
 from relgym.model.storage import read_model, write_model
 from relgym.scene.objects import ObjectType, Target, Transition
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
-from relgym.wrappers.sb3.reward_models import LearnedRewardModel
-from relgym.wrappers.sb3.stock import changing
-from relgym.wrappers.sb3.trainer import ModelTrainer
+from relgym.wrappers.dyna.recorder import Experience, TransitionRecorder
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel
+from relgym.wrappers.dyna.stock import changing
+from relgym.wrappers.dyna.trainer import ModelTrainer
 
 MOVING = {("truck", "vx"), ("truck", "px"), ("goal", "ahead"), ("box", "px")}
 
@@ -89,7 +89,7 @@ def test_it_knows_no_verdict_whose_parts_never_went_together(rng: np.random.Gene
 def test_ends_are_not_forgotten_among_many_steps_that_end_nothing(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("relgym.wrappers.sb3.reward_models._REMEMBERED", 100)
+    monkeypatch.setattr("relgym.wrappers.dyna.reward_models._REMEMBERED", 100)
     steps = [*pushes(200, 0.0, rng), *pushes(400, 0.9, rng)]
     reward_model = LearnedRewardModel(steps[0].start.schema, MOVING)
     others = [step for step in steps if not step.terminated]
@@ -104,7 +104,7 @@ def test_ends_are_not_forgotten_among_many_steps_that_end_nothing(
 def test_what_is_paid_for_elsewhere_is_not_forgotten(
     rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("relgym.wrappers.sb3.reward_models._REMEMBERED", 50)
+    monkeypatch.setattr("relgym.wrappers.dyna.reward_models._REMEMBERED", 50)
     car = ObjectType("car", ("x",))
     schema = SceneSchema((car,), (("car", "car"),), targets=(Target("car", "x"),))
     reward_model = LearnedRewardModel(schema, {("car", "x")})

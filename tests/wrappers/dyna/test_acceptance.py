@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relgym.wrappers.sb3.acceptance import ModelAcceptance, Verdict
+from relgym.wrappers.dyna.acceptance import ModelAcceptance, Verdict
 
 KEY = ("cart", "v")
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.envs.learned_model_batch import DreamStep, Stepped
-from relgym.envs.learned_model_ends import CAUSES, Cause
+from relgym.envs.dreams.ends import CAUSES, Cause
+from relgym.envs.dreams.step import DreamStep, Stepped
 
 __all__ = ["masked", "told_of"]
 

@@ -11,7 +11,7 @@ from relgym.errors import ConfigError
 from relgym.model.prediction import BatchPrediction, ScenePrediction
 from relgym.scene.objects import ACTION, TASK, Float2D, ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.sb3.config import DynaConfig
+from relgym.wrappers.dyna.config import DynaConfig
 
 __all__ = ["DreamModel", "SceneStock", "changing", "free_properties", "permuted"]
 

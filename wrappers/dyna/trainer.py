@@ -8,7 +8,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from relgym.envs.learned_model_setting import check_knowledge
+from relgym.envs.dreams.setting import check_knowledge
 from relgym.errors import ConfigError
 from relgym.model.motion import possible_targets
 from relgym.model.prediction import ScenePrediction
@@ -17,11 +17,11 @@ from relgym.model.scenes import mismatch
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Scene
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.sb3.acceptance import Key, ModelAcceptance, Verdict
-from relgym.wrappers.sb3.config import DynaConfig, checked_config
-from relgym.wrappers.sb3.lens import Lens
-from relgym.wrappers.sb3.recorder import Experience
-from relgym.wrappers.sb3.reward_models import (
+from relgym.wrappers.dyna.acceptance import Key, ModelAcceptance, Verdict
+from relgym.wrappers.dyna.config import DynaConfig, checked_config
+from relgym.wrappers.dyna.lens import Lens
+from relgym.wrappers.dyna.recorder import Experience
+from relgym.wrappers.dyna.reward_models import (
     Acting,
     LearnedRewardModel,
     NeuralModel,
@@ -29,7 +29,7 @@ from relgym.wrappers.sb3.reward_models import (
     RewardModel,
     check_rewards,
 )
-from relgym.wrappers.sb3.stock import DreamModel, SceneStock, changing
+from relgym.wrappers.dyna.stock import DreamModel, SceneStock, changing
 
 __all__ = ["ModelTrainer", "check_model", "checked_reward_model"]
 

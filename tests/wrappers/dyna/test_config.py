@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.config import DynaConfig
+from relgym.wrappers.dyna.config import DynaConfig
 
 
 @pytest.mark.parametrize(

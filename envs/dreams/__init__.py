@@ -1,0 +1,1 @@
+"""A learned model as an env, one dream or thousands: setting, step, rewards, ends, and what is shown of them."""
