@@ -30,8 +30,8 @@ class ModelConfig:
         ``"arrays"`` (default, batched) or ``"fcl"`` (any shapes, scene by scene); a model always uses the same one.
     abstain
         Whether a situation that differs from all seen ones in what the clauses look at is called *outside experience*
-        instead of being predicted, and one where no mode explained what followed *unexplained* (`relgym.model.scope`).
-        Default true; false: the votes decide there as everywhere.
+        instead of being predicted, and one where no mode explained what followed *unexplained*
+        (`relgym.model.target.scope`). Default true; false: the votes decide there as everywhere.
     work_per_step
         Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
         literals examined). Default 400,000, some 20 ms, range 0 to 10**12. Raising it makes rules fresher and single

@@ -15,8 +15,8 @@ from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import ScenePrediction
-from relgym.model.property_model import bodies_of
 from relgym.model.scenes import next_values, stays, unwrapped
+from relgym.model.target.property_model import bodies_of
 from relgym.scene.objects import TASK, Target, Transition
 from relgym.scheduling.agenda import Budget
 

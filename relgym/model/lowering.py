@@ -28,9 +28,9 @@ from relgym.laws.touching import Cast
 from relgym.logic.clause import Clause, Literal
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Perception, Situation
-from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import angle_columns
-from relgym.model.stops import Stop as LearnedStop
+from relgym.model.target.property_model import PropertyModel
+from relgym.model.target.stops import Stop as LearnedStop
 from relgym.numeric.tree import DecisionTree
 from relgym.program import records as ir
 from relgym.scene.axes import Axes

@@ -13,9 +13,9 @@ from relgym.model.calibration import EXPERTS, GUESS, LATEST, LINEAR, OWN, PERSIS
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.property_model import Verdict
 from relgym.model.regression import KINDS
 from relgym.model.scenes import wrap
+from relgym.model.target.property_model import Verdict
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 

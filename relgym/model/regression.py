@@ -26,7 +26,7 @@ FIRST = 64
 """So many rows tell where a column lies and how far it varies; from then on it is regressed on."""
 
 BEYOND = 0.5
-"""Changes may go beyond those that were seen by so much of their range, as in `relgym.model.scope`."""
+"""Changes may go beyond those that were seen by so much of their range, as in `relgym.model.target.scope`."""
 
 
 class Regression:

@@ -24,9 +24,9 @@ from relgym.model.motion import TOUCHING
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.property_model import PropertyModel
-from relgym.model.spread import Spreads, action_columns
-from relgym.model.spread_split import place_of
+from relgym.model.target.property_model import PropertyModel
+from relgym.model.target.spread import Spreads, action_columns
+from relgym.model.target.spread_split import place_of
 from relgym.program.records import Answer, BeyondError, Program
 from relgym.program.tape import encoded
 from relgym.scene.objects import Scene, SceneLayout

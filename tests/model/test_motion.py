@@ -19,7 +19,7 @@ from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.experiments.rollouts import largest_errors
 from relgym.model.motion import FREE, TOUCHING
 from relgym.model.prediction import Outcome
-from relgym.model.report import report
+from relgym.model.reports.report import report
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Target
 

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import RelgymError
+from relgym.model.files.storage import read_model, write_model
 from relgym.model.running import KERNEL, PATIENCE
-from relgym.model.storage import read_model, write_model
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers import ModelLearner

@@ -7,7 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from relgym.files.records import Count, Finite, Pair, Random, Record
-from relgym.model.file_format import SchemaRecord
+from relgym.model.files.format import SchemaRecord
 
 __all__ = ["RewardModelBody"]
 

@@ -16,9 +16,9 @@ from relgym.envs.tasks import RewardFunctions, TaskOutcome
 from relgym.errors import ConfigError, ModelFileError, RelgymError
 from relgym.files.reading import FileLimits
 from relgym.files.records import checked
+from relgym.model.files.storage import schema_from_json, schema_to_json
 from relgym.model.prediction import BatchPrediction
 from relgym.model.scenes import mismatch
-from relgym.model.storage import schema_from_json, schema_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, ObjectType, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema

@@ -16,7 +16,7 @@ import relgym
 from relgym.envs import LearnedModelEnv, LearnedModelVectorEnv
 from relgym.envs.scripted import ball_home, push_knowing
 from relgym.errors import ConfigError, ModelFileError
-from relgym.model.storage import read_model, write_model
+from relgym.model.files.storage import read_model, write_model
 from relgym.scene.objects import ObjectType, Target, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.dyna.recorder import Experience, TransitionRecorder
