@@ -50,9 +50,9 @@ class Module:
         """What running it imports, sooner or later: all imports but those for type checkers."""
         typing = {
             id(node)
-            for block in ast.walk(self.tree)
-            if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
-            for statement in block.body
+            for branch in ast.walk(self.tree)
+            if isinstance(branch, ast.If) and ast.unparse(branch.test) == "TYPE_CHECKING"
+            for statement in branch.body
             for node in ast.walk(statement)
         }
         return tuple(_imports(node for node in ast.walk(self.tree) if id(node) not in typing))
