@@ -17,7 +17,7 @@ from typing import TypeGuard
 import pytest
 from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 
-FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html", "scheduling"})
+FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html", "hypotheses", "scheduling"})
 ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ENGINES | {"clustering", "classification", "laws"}
 CORE = LEARNERS | {"reporting", "program", "model"}
@@ -28,6 +28,7 @@ MAY_IMPORT = {
     "config": frozenset({"errors", "arguments"}),
     "files": frozenset({"errors"}),
     "html": frozenset(),
+    "hypotheses": frozenset({"errors"}),
     "scheduling": frozenset(),
     "scene": FOUNDATION,
     "numeric": FOUNDATION,

@@ -106,7 +106,7 @@ def _go_on(parts: Parts, budget: Budget) -> None:
     for target in parts.targets:
         table = parts.tables[target.type]
         parts.models[target].approximate(table, budget)
-        if parts.models[target].fallback.guesses.underway:
+        if parts.models[target].fallback.guesses.underway or parts.models[target].candidates.under_way:
             parts.models[target].reconsider(table, budget)
     searches = budget.part(SEARCHES)
     for waiting in parts.agenda.waiting:

@@ -390,7 +390,7 @@ def _alike(
 
 def _plain(model: PropertyModel, *, governed: bool) -> bool:
     """Whether none but a target's modes or laws, and that nothing changes, have values for it."""
-    if model.fallback.guesses_something:
+    if model.fallback.guesses_something or model.candidates:
         return False
     if governed:
         return True

@@ -31,6 +31,7 @@ from relgym.laws.frames import axis_names
 from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE
 from relgym.laws.shares import EXTENT
+from relgym.model.calibration import EXPERTS
 from relgym.model.files.format import (
     AxisLawRecord,
     Body,
@@ -106,7 +107,7 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
     for name, hindsight in body.hindsight.items():
         _require(name in known, "hindsight", f"{name!r} is no target")
         _require(all(wrong <= said for said, wrong in hindsight.steps), "hindsight", "more wrong than said")
-    _check_calibration(body, known)
+    _check_calibration(body, known, len(EXPERTS) + len(body.config.hypotheses))
     pairs = {(t.type, t.property) for t in targets}
     _check_regressions(body, parts, pairs)
     _require(all((name, prop) in pairs for name, prop, _ in body.looks), "looks", "expected targets")
@@ -121,7 +122,7 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
         _check_laws(body.laws, parts.laws.learner, arrays)
 
 
-def _check_calibration(body: Body, known: set[str]) -> None:
+def _check_calibration(body: Body, known: set[str], experts: int) -> None:
     for name, calibration in body.calibration.items():
         _require(name in known, "calibration", f"{name!r} is no target")
         _distinct([cell.key for cell in calibration.cells], "calibration")
@@ -129,6 +130,8 @@ def _check_calibration(body: Body, known: set[str]) -> None:
         records = [record for cell in calibration.cells for record in cell.records]
         for cell in calibration.cells:
             _distinct([who for who, *_ in cell.records], "calibration")
+            whole = len(cell.squares) == experts > max([cell.speaker, *(who for who, *_ in cell.records)])
+            _require(whole, "calibration", f"expected {experts} experts: six, and config.hypotheses")
         _require(
             all(hits <= trials for _, trials, hits, _, _ in records), "calibration", "more hits than trials"
         )
@@ -193,6 +196,9 @@ class _TargetCheck:
             least, most = model.scope.reach
             _require(least <= most, f"{self.where}.scope.reach", "expected the smaller change first")
         self._check_bounds(model, ids)
+        names = self.parts.config.hypotheses
+        laws = [] if model.candidates is None else model.candidates.laws
+        _require(len(laws) == len(names), f"{self.where}.candidates", f"expected laws or none of {names}")
 
     def _alone(self, mode: ModeRecord) -> int:
         """Number of roles that bodiless objects play."""

@@ -348,6 +348,18 @@ class GuessRecord(Record):
     due: Count = 64
 
 
+class CandidatesRecord(Record):
+    """Laws of registered hypothesis classes, in the order of `config.hypotheses`.
+
+    Of each that has one the names of the columns that it reads, and what the class wrote; when they are asked again,
+    and how many proposals there were.
+    """
+
+    laws: list[tuple[list[str], dict[str, Any]] | None]
+    due: Count
+    tried: Count
+
+
 class LimitsRecord(Record):
     """Constant modes beyond which the target never goes, with their values."""
 
@@ -395,6 +407,7 @@ class PropertyRecord(Record):
     guess: GuessRecord = field(default_factory=GuessRecord)
     scope: ScopeRecord = field(default_factory=ScopeRecord)
     limits: LimitsRecord = field(default_factory=LimitsRecord)
+    candidates: CandidatesRecord | None = None
     stops: StopsRecord = field(default_factory=StopsRecord)
     latest: ModeOrNoise = 0
     unsettled: bool = False
@@ -415,7 +428,7 @@ class HindsightRecord(Record):
 
 
 Expert: TypeAlias = Annotated[
-    int, Meta(ge=0, lt=6, description="who gave a value, as a place among all experts")
+    int, Meta(ge=0, description="who gave a value, as a place among all experts: six, and hypotheses")
 ]
 Bins: TypeAlias = list[tuple[int, Weight]]
 
@@ -430,7 +443,7 @@ class CellRecord(Record):
     key: tuple[int, int, int]
     speaker: Expert
     records: list[tuple[Expert, Weight, Weight, int, Bins]]
-    squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6, max_length=6)]
+    squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6)]
 
 
 class CalibrationRecord(Record):

@@ -126,6 +126,8 @@ def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
     Cost: several regressions on at most `ROWS` examples with up to some thousand features, about a second; nothing is
     changed.
     """
+    if model.explained_by is not None:
+        return None
     known, enough = model.hindsight, len(model.clusterer.y) >= LEAST
     if not model.undecided:
         return _lacks(model, table) if enough else None

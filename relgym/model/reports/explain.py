@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from relgym.logic.csp import solutions, world_of
+from relgym.model.calibration import EXPERTS
 from relgym.model.prediction import Prediction
 from relgym.model.reports.rules import functions_of, tested
 from relgym.model.reports.text import amount
@@ -194,6 +195,10 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
                 found.append(Explanation(one, now, digits, laws=lines))
             else:
                 part = model.property_model(target.type, target.property)
+                if one.audit is not None and one.audit.speaker >= len(EXPERTS):
+                    law = part.candidates.statement(one.audit.speaker - len(EXPERTS))
+                    found.append(Explanation(one, now, digits, laws=(law,)))
+                    continue
                 seen = _Seen(model, told, part, scenes, prediction.scene, index, digits)
                 found.append(seen.explained(one, now))
     return tuple(found)

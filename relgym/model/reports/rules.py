@@ -209,6 +209,8 @@ def doubted(rules: RuleList, models: Iterable[PropertyModel]) -> RuleList:
 
 def _doubt(part: PropertyModel) -> str:
     """Why a property's list predicts nothing; empty if it does."""
+    if (law := part.explanation()) is not None:
+        return f"no rule, but a hypothesis tells, {law}"
     if part.lost:
         return "no law of the form that is looked for describes it"
     if not part.modes:

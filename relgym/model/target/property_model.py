@@ -19,10 +19,11 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.model.calibration import LATEST, OWN, Assessment, Calibration, Key
+from relgym.model.calibration import EXPERTS, LATEST, OWN, Assessment, Calibration, Key
 from relgym.model.grouping import distinct, members
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.model.target.candidates import Candidates
 from relgym.model.target.casting import Casting
 from relgym.model.target.conditions import Conditions, needed
 from relgym.model.target.fallback import Fallback
@@ -111,7 +112,8 @@ class PropertyModel:
         self.limits = Limits()
         self.stops = Stops()
         self.hindsight = Hindsight()
-        self.calibration = Calibration(config.claim_probability)
+        self.candidates = Candidates(config.hypotheses)
+        self.calibration = Calibration(config.claim_probability, len(config.hypotheses))
         self.latest = NOISE
         self.leaned_on = False
         self._unsettled = True
@@ -278,9 +280,12 @@ class PropertyModel:
         return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
 
     def reconsider(self, table: ExampleTable, budget: Budget) -> None:
-        """Guess anew where nothing is explained and it is time, as far as the budget goes."""
+        """Guess anew where nothing is explained, and ask for hypotheses, if it is time, as far as the budget goes."""
         if self.fallback.guessable and self.fallback.guesses.stale(self.clusterer.seen):
             self.fallback.guesses.renew(self.clusterer, table, self.fallback.scope, budget)
+        if self.candidates.due(self.clusterer.seen) and len(self.clusterer.rows):
+            for renewed in self.candidates.renew(self.clusterer, table, budget):
+                self.calibration.renewed(len(EXPERTS) + renewed)
 
     def retarget(self, target: Target, table: ExampleTable) -> None:
         """Be given other next values: modes and classifiers are learned again, from what is remembered."""
@@ -292,6 +297,7 @@ class PropertyModel:
         self.fallback.guesses.drop()
         self.hindsight = Hindsight()  # what follows is another model's word
         self.calibration.forget()
+        self.candidates.forget()
         self._follow(table)
         self._widen(table, self.classifier.vocabulary.follows)
 
@@ -343,7 +349,19 @@ class PropertyModel:
     @property
     def unexplained(self) -> bool:
         """Whether it is known by now that modes don't describe the target: just some of its examples, or not when."""
-        return self.fallback.unexplained or self.undecided
+        return (self.fallback.unexplained or self.undecided) and self.explained_by is None
+
+    @property
+    def explained_by(self) -> int | None:
+        """Number of the hypothesis that gives most of the values, if it can be claimed; None where none does."""
+        speakers = self.calibration.speakers() if self.candidates else {}
+        most = max(speakers, key=lambda k: speakers[k], default=OWN) - len(EXPERTS)
+        return most if most >= 0 and self.candidates.laws[most] is not None else None
+
+    def explanation(self) -> str | None:
+        """Name and law of the hypothesis that gives most of the values, for people; None where none does."""
+        number = self.explained_by
+        return None if number is None else self.candidates.statement(number)
 
     @property
     def undecided(self) -> bool:
@@ -366,7 +384,7 @@ class PropertyModel:
 
     def claims(self, told: Assessment) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
-        if told.speaker not in (OWN, LATEST):
+        if told.speaker not in (OWN, LATEST) and told.speaker < len(EXPERTS):
             return False
         least, slips = self.config.claim_probability, self.config.claim_slips
         if self.record.slips > slips:
@@ -628,6 +646,7 @@ class PropertyModel:
             "unsettled": self._unsettled,
             "classifier": self.classifier.to_dict(exemplars=history),
             "casting": self.casting.to_json(),
+            **({"candidates": self.candidates.to_json()} if self.candidates else {}),
             "limits": self.limits.to_json(),
             "stops": self.stops.to_json(),
         }
@@ -647,6 +666,8 @@ class PropertyModel:
         self._unsettled = bool(data.get("unsettled", False))
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
         self.casting.restore(data["casting"])
+        if self.candidates:
+            self.candidates.restore(data["candidates"])
         self.limits = Limits.from_json(data.get("limits", {}))
         self.stops = Stops.from_json(data.get("stops", {}))
         self.functions.bound.clear()
