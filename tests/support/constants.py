@@ -11,6 +11,9 @@ from source_tree import Module, modules
 PACKAGES = ("classification", "clustering", "hypotheses", "laws", "logic", "model", "numeric", "scheduling")
 """What learns and decides; `config` is where constants belong."""
 
+LEFT_OUT = ("relgym.model.files", "relgym.model.reports")
+"""What checks files and what prints: widths, digits and versions tune nothing."""
+
 PLAIN = frozenset({0, 1, 2, 0.5})
 """Numbers that say nothing by themselves: none, one, both, half."""
 
@@ -39,7 +42,12 @@ class Constant:
 
 def constants() -> tuple[Constant, ...]:
     """All constants of the learner, in the order of the files."""
-    return tuple(c for module in modules() if module.package in PACKAGES for c in _constants(module))
+    return tuple(
+        c
+        for module in modules()
+        if module.package in PACKAGES and not module.name.startswith(LEFT_OUT)
+        for c in _constants(module)
+    )
 
 
 def counted() -> dict[str, tuple[int, int]]:
