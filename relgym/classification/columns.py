@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -54,10 +56,18 @@ class Columns:
         self._arrays[name] = self._empty(name, self._capacity())
         self._arrays[name][: self.size] = value
 
-    def append(self) -> int:
-        """Add a row of fill values; its number."""
+    def row_bytes(self, sizes: Mapping[str, int]) -> int:
+        """Memory of a row if named axes are at least so long, in bytes."""
+        lengths = {axis: max(length, sizes.get(axis, 0)) for axis, length in self.sizes.items()}
+        return sum(
+            np.dtype(column.dtype).itemsize * math.prod(lengths[axis] for axis in column.axes)
+            for column in self.columns.values()
+        )
+
+    def append(self, most: int = sys.maxsize) -> int:
+        """Add a row of fill values; its number. There will never be more than `most` rows."""
         if self.size == self._capacity():
-            self._rebuild(2 * self.size)
+            self._rebuild(min(2 * self.size, max(most, self.size + 1)))
         self.size += 1
         row = self.size - 1
         for name, column in self.columns.items():
