@@ -8,6 +8,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import ROUGH, ROUNDINGS
 from relgym.numeric.stepwise import forward_stepwise, least_squares
 
 __all__ = ["estimate_noise", "refuted", "rounding_noise"]
@@ -41,9 +42,6 @@ SINGLES = 2.0
 
 TINY = 1e-38
 """Numbers may all be zero or subnormal; noise is never so small that its square vanishes."""
-
-ROUNDINGS = 32.0
-"""A function of a few terms on differences of stored numbers carries at most about this many roundings."""
 
 
 def rounding_noise(
@@ -121,7 +119,7 @@ def estimate_noise(
     )
     sparse = _quartile([_least_spread(x[part], y[part], floor) for part in windows])
     estimate = simple if simple <= SELECTED * sparse else sparse
-    return estimate if estimate > 4.0 * floor else floor
+    return estimate if estimate > ROUGH * floor else floor
 
 
 def _windows(strata: NDArray[np.integer]) -> list[NDArray[np.intp]]:
