@@ -100,7 +100,8 @@ class Exemplars:
 
     Notes
     -----
-    Cost of `add`: O(R K^2), some 20 µs; memory at most `exemplar_memory`; no randomness: the reservoir's choices are hashes of key and count.
+    Cost of `add`: O(R K^2), some 20 µs; memory at most `exemplar_memory`; no randomness: the
+    reservoir's choices are hashes of key and count.
     """
 
     def __init__(self, vocabulary: Vocabulary, config: ClassificationConfig) -> None:
