@@ -33,7 +33,7 @@ class Periodic:
     def text(self) -> str:
         wave = f"{self.speed:.5g} {self.names[self.clock]}"
         terms = zip(self.weights, (*self.names, "1", f"sin({wave})", f"cos({wave})"), strict=True)
-        return " + ".join(f"{weight:.4g} {term}" for weight, term in terms)
+        return " + ".join(f"{weight:.4g} {term}" for weight, term in terms if abs(weight) > 1e-9)
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)

@@ -5,7 +5,7 @@ tuned for years, teaches it to every model without touching the core:
 
 1. a `HypothesisClass` *proposes* a `Law` for one property, from examples;
 2. the core *scores* it in bits: the law is kept if it codes the examples, itself included, in fewer bits than that
-   nothing changes, than least squares, and than the law kept before, by `EVIDENCE` bits and those that tell which of
+   nothing changes, than least squares, and than the law kept before, by ten bits and those that tell which of
    the proposals it was;
 3. from then on it is one of the experts of `relgym.model.calibration`: before each step it says what comes next, and
    once it has coded what came in fewer bits than whoever spoke until then, it speaks. How often it was right is
@@ -19,7 +19,7 @@ to it by that name.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
@@ -29,20 +29,14 @@ from numpy.typing import NDArray
 from relgym.errors import ConfigError
 
 __all__ = [
-    "EVIDENCE",
     "Examples",
     "HypothesisClass",
     "Law",
     "Proposal",
-    "classes_of",
     "code_length",
     "register_hypothesis",
     "registered",
 ]
-
-
-EVIDENCE = 10.0
-"""Bits by which a law must lead: evidence of so many misleads once in 2^10 times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,11 +138,6 @@ def registered(name: str) -> HypothesisClass:
             "relgym.hypotheses.register_hypothesis first, as where the model was made"
         )
     return _classes[name]
-
-
-def classes_of(names: Sequence[str]) -> tuple[HypothesisClass, ...]:
-    """The classes of these names."""
-    return tuple(registered(name) for name in names)
 
 
 def code_length(errors: NDArray[np.float64], resolution: float, parameters: int = 0) -> float:

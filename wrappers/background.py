@@ -22,7 +22,7 @@ from relgym.clustering.features import functions_of, register_function
 from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError, RelgymError
-from relgym.hypotheses import classes_of, register_hypothesis
+from relgym.hypotheses import register_hypothesis, registered
 from relgym.model.prequential import Outcomes, Prequential, compared
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
@@ -298,7 +298,7 @@ def _learn(
 
 def _sendable(config: ModelConfig) -> bytes:
     """The users' functions and hypothesis classes that a model needs, for another process."""
-    functions, kinds = functions_of(config.features), classes_of(config.hypotheses)
+    functions, kinds = functions_of(config.features), [registered(name) for name in config.hypotheses]
     try:
         return pickle.dumps((functions, kinds))
     except (pickle.PicklingError, AttributeError, TypeError) as error:

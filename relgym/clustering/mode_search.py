@@ -24,15 +24,13 @@ from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
 from relgym.clustering.suspects import Evidence, likeliest, suspects
 from relgym.clustering.unification import reordered
+from relgym.config.constants import HOPELESS, SEARCHED_CELLS
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scheduling.agenda import Budget
 from relgym.scheduling.work import CALL, Task
 
 __all__ = ["ModeSearch", "Search"]
-
-HOPELESS = 200
-"""Of so many examples modes explain most, or it is doubtful that there are laws to be found."""
 
 CHANCY = 0.5
 """Where an example verifies a function by less than so much of `EXACT`, others' examples fit it by chance."""
@@ -42,10 +40,6 @@ SURPRISING = 2.0
 
 MOST_DISCOVERIES = 4
 """New modes per example at most; what is left in the noise waits for the next one."""
-
-
-MOST_CELLS = 1_000_000
-"""A search looks at the newest unexplained examples, no more numbers than this; at twice `SEARCH` examples at least."""
 
 
 @dataclass(slots=True)
@@ -169,7 +163,7 @@ class ModeSearch:
         population = self.population
         slots = table.signatures[hunt.signature]
         order, stages = slots.preference(population.target)
-        pool = pool[-max(2 * SEARCH, MOST_CELLS // max(1, len(order))) :]
+        pool = pool[-max(2 * SEARCH, SEARCHED_CELLS // max(1, len(order))) :]
         rows = population.rows[pool]
         part = searched(len(pool), hunt.fresh, self._rng)
         several = len(np.unique(table.strata[rows[part]])) > 1

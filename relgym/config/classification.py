@@ -103,9 +103,9 @@ class ClassificationConfig:
     max_exemplars
         Examples kept in all. Default 6000, range 100 to 10,000,000.
     exemplar_memory
-        Memory that they may take, for each target, in MB. Relations are told of all pairs of bodies, so an example of 40
-        bodies takes 21 kB and one of 200 takes 0.5 MB. Default 128, which is 6000 examples of 40 bodies, as many as large
-        scenes are taken apart into; range 1 to 1,000,000. At least 100 examples are kept whatever they take.
+        Memory that they may take, for each target, in MB. Relations are told of all pairs of bodies, so an example of
+        40 bodies takes 21 kB and one of 200 takes 0.5 MB. Default 128, which is 6000 examples of 40 bodies, as many
+        as large scenes are taken apart into; range 1 to 1,000,000. At least 100 examples are kept whatever they take.
     repair
         Whether a contradicted definition is first mended (a threshold moved, a clause dropped or added) and
         only learned anew where that isn't enough (§5.1). Default true.

@@ -30,6 +30,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import EVIDENCE
+
 __all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
 
 EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
@@ -43,9 +45,6 @@ _KNOWN: Final = (LINEAR, LINEAR + 1, PERSISTENCE)
 
 _BY_DEFAULT: Final = (OWN, GUESS, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
-
-EVIDENCE: Final = 10.0
-"""Bits by which evidence must lead: it misleads once in 2^10 times."""
 
 MEMORY: Final = 1024
 """Of more trials than this the older ones count half: a share of 99 % is known to 0.4 % from half as many, and a lead
@@ -360,9 +359,15 @@ class Calibration:
         self._assessed.clear()
 
     def renewed(self, expert: int) -> None:
-        """An expert has another law: it counts for as good as who speaks, until trials of both tell them apart."""
+        """An expert has another law: it begins as if it had been as good as who speaks in the latest few trials.
+
+        Of the first trials alone chance would tell. With `EVIDENCE` of them to begin with, an exact law speaks after as
+        many again.
+        """
         for cell in self._cells.values():
-            cell.squares[expert] = list(cell.squares[cell.speaker])
+            known = cell.squares[cell.speaker]
+            share = min(1.0, EVIDENCE / known[0]) if known[0] else 0.0
+            cell.squares[expert] = [share * each for each in known]
         self._assessed.clear()
 
     def speakers(self) -> dict[int, float]:

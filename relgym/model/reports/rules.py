@@ -4,6 +4,21 @@ The votes are a function of the conditions that classifiers test. So is a decisi
 learned from the examples that the classifiers remember, labelled by who wins the vote there (not by what really held),
 and says the same for each of them. Where several modes predict the same value, the simplest one is named: what rests
 rests, and doesn't bounce with no velocity.
+
+- *From votes to a list* (`relgym.model.reports.rules`). Which mode wins is a function of the conditions that the
+  pairs' classifiers test. So is a decision list over the same conditions (`relgym.numeric.decision_list`), learned
+  from the remembered examples, labelled by who wins the vote, not by what held. It repeats every vote among them, but
+  for up to 0.02 % that no mode explains anyway. Where no short list does so, it is long.
+- *The simplest that says the same.* Where modes agree on the value, the one with fewest parameters is named: a ball
+  that rests isn't said to bounce with no velocity.
+- *Contexts are printed.* ``some struck B [...]``, ``no close B [...]``: what a variable ranges over is part of the
+  condition.
+- *Names.* Long conditions get a name from what happens where they hold (`bouncing`, ``at rest``, `drifting`);
+  `WorldModel.name_condition` gives another one, kept in the file.
+- *Explanations* (`relgym.model.reports.explain`) are told from the list: the branch that decided, its conditions, and
+  for each branch before it one condition that fails there, all evaluated in that scene. Where vote and list differ,
+  the vote is told, and only conditions that hold.
+- *Files* keep the list's text and the advice: what was learned from isn't needed to tell them.
 """
 
 from __future__ import annotations

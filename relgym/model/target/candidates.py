@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
+from relgym.config.constants import EVIDENCE
 from relgym.errors import ConfigError
-from relgym.hypotheses import EVIDENCE, Examples, Law, classes_of, code_length, registered
+from relgym.hypotheses import Examples, Law, code_length, registered
 from relgym.model.target.scope import alike, spread_out
 from relgym.scene.objects import TASK
 from relgym.scheduling.agenda import Budget
@@ -46,7 +47,8 @@ class Candidates:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        classes_of(names)
+        for name in names:
+            registered(name)
         self.names = tuple(names)
         self.laws: list[Law | None] = [None] * len(names)
         self._columns: list[tuple[str, ...]] = [()] * len(names)  # that each law reads, by name

@@ -9,15 +9,13 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.mode import NOISE
 from relgym.clustering.roles import Binding
+from relgym.config.constants import ROUGH
 from relgym.model.perception import Percept
 from relgym.model.target.functions import BoundFunctions
 from relgym.model.target.guess import Guess, Guesses
 from relgym.model.target.scope import EVERYWHERE
 
 __all__ = ["Fallback"]
-
-ROUGH = 4.0
-"""So many times the rounding noise can't be rounding."""
 
 _BEYOND = -1
 """In the place of a mode's id: the guess beyond the scope of approximations."""

@@ -22,6 +22,7 @@ from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
+from relgym.config.constants import SEARCHED_CELLS
 from relgym.model.target.scope import Scope, alike, alike_to, spread_out
 from relgym.numeric.stepwise import LinearFit, fitting_cells, forward_order, least_squares
 from relgym.scene.objects import Target
@@ -33,7 +34,7 @@ __all__ = ["Guess", "Guesses"]
 LEAST, GROWTH = 64, 1.5
 """A first guess after so many examples, another one when their number has grown by this factor."""
 
-MOST_ROWS, MOST_CELLS = 3_000, 1_000_000
+MOST_ROWS = 3_000
 """At most so many examples, evenly spread over time, choose terms: fewer where there are many features."""
 
 FITTED = 12_000
@@ -132,7 +133,7 @@ class Guesses:
     def renew(self, clusterer: ModeClusterer, table: ExampleTable, scope: Scope, budget: Budget) -> None:
         """Guess anew, beyond the scope of approximations too, as far as the budget goes.
 
-        Cost O(`FOLDS` * rows * columns * terms) with at most `MOST_CELLS` for rows times columns, some
+        Cost O(`FOLDS` * rows * columns * terms) with at most `SEARCHED_CELLS` for rows times columns, some
         0.3 s among 500 features.
         """
         if self._trials is None:
@@ -203,7 +204,7 @@ class _Trial:
         widths = [int(present[:stage].sum()) for stage in (stages[:2] if slots.features else stages[:1])]
         order, tasks = order[present], []
         for width in widths:  # few examples choose among many features badly
-            some = spread_out(numbers, min(MOST_ROWS, max(LEAST, MOST_CELLS // width)))
+            some = spread_out(numbers, min(MOST_ROWS, max(LEAST, SEARCHED_CELLS // width)))
             tasks.append(Task(_choice, *_data(clusterer, table, slots, order[:width], some)))
         return cls(slots, order, tasks)
 

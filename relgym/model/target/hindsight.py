@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
+from relgym.config.constants import STDS
 from relgym.model.calibration import OWN, Calibration
 from relgym.model.prediction import ScenePrediction
 
@@ -41,9 +42,6 @@ SHARE, RECOVERED = 0.15, 0.075
 """With a larger share of the predictions wrong than the first, the clauses don't tell which mode holds; with a
 smaller one than the second they do again. In between it stays as it was: within one of Taxi's episodes a tenth is
 wrong, from one to the next a quarter."""
-
-SPREADS = 4.0
-"""A prediction off by at most so many of the standard deviations that go with it is right: it is noise."""
 
 
 class Hindsight:
@@ -146,7 +144,7 @@ def look_back(
             continue
         if not off.isdisjoint(target.given) and not off.isdisjoint(model.needs):
             continue
-        spread = SPREADS * part.spread if part.spread == part.spread else 0.0
+        spread = STDS * part.spread if part.spread == part.spread else 0.0
         if part.audit is not None and part.audit.speaker != OWN:  # another one gave the value, and the spread
             residual, spread = came - part.audit.values[OWN], 0.0
             residual = math.remainder(residual, turn) if turn else residual

@@ -19,6 +19,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
+from relgym.config.constants import HOPELESS
 from relgym.model.calibration import EXPERTS, LATEST, OWN, Assessment, Calibration, Key
 from relgym.model.grouping import distinct, members
 from relgym.model.perception import Percept, Situation
@@ -43,8 +44,8 @@ __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 MEASURE_EVERY = 256
 """Spreads are measured after so many examples, and whenever the modes change."""
 
-HOPELESS, DOUBTFUL = 200, 500
-"""Without a mode after so many examples there is no law; with most of so many recent ones unexplained, hardly one."""
+DOUBTFUL = 500
+"""With most of so many recent examples unexplained there is hardly a law."""
 
 
 RECENT, LEFT = 200, 0.05

@@ -21,6 +21,7 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
+from relgym.config.constants import BEYOND
 from relgym.numeric.tree import DecisionTree, learn_tree
 from relgym.scene.objects import TASK, Target
 
@@ -37,9 +38,6 @@ DEPTH: Final = 4
 
 CLOSE: Final = 0.5
 """A mode that errs by no more than so much of what changes (root mean square) is as good as a guess."""
-
-BEYOND: Final = 0.5
-"""Changes may go beyond those that were seen by so much of their range: on other days somebody flies faster."""
 
 
 @dataclass(frozen=True, slots=True)
