@@ -128,21 +128,35 @@ class Answers(StandIns):
         return told.probability >= least or not self._record.trials
 
     @property
+    def cells(self) -> tuple[Key, ...]:
+        """Kinds of predictions that somebody looked back at, in order."""
+        return self._record.cells
+
+    def assessed(self, key: Key, able: int) -> Assessment:
+        """`assess` where those experts have a value that bits tell; persistence always has."""
+        return self._record.assessed(key, able)
+
+    @property
     def doubtful(self) -> bool:
         """Whether no kind of its modes' predictions came true often enough to be claimed."""
         kinds = [told for _, told in self._record.kinds(_PREDICTED)]
         return bool(kinds) and not any(map(self.claims, kinds))
+
+    @property
+    def asks_latest(self) -> bool:
+        """Whether the mode that held last is asked: not where the vote's winners are mostly right."""
+        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
+        asked = self.rough or self._record.doubts(_PREDICTED, self.config.claim_probability)
+        return known and asked and len(self.classifier.modes) >= 2
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
         """What the mode that held last says of one object of n scenes, shape ``(n,)``; None where nobody asks it.
 
-        Nobody does where the vote's winners are mostly right. NaN where its roles are open.
+        NaN where its roles are open.
         """
-        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
-        asked = self.rough or self._record.doubts(_PREDICTED, self.config.claim_probability)
-        if not known or not asked or len(self.classifier.modes) < 2:
+        if not self.asks_latest:
             return None
         x = percept.rows(index, following, ordered=False)
         return self._values(percept.situation(index).signature, x, (self.latest,))[:, 0]

@@ -87,7 +87,7 @@ def is_compiled() -> bool:
     return any(file.stat().st_mtime >= written for file in Path(folder).glob("kernel.run-*.nbi"))
 
 
-PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS = range(6)
+PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
 """Outcomes, in the order of `relgym.model.prediction.OUTCOMES`."""
 
 BAD_SIZE = 1
@@ -98,6 +98,9 @@ TOO_MANY = 2
 
 TURNED = 3
 """A box in space is turned: that takes arrays."""
+
+OWN, GUESS, LATEST = 0, 1, 4
+"""Who gives a value (`relgym.program.records.EXPERTS`); what nobody does stays as it is."""
 
 FREE, TOUCHING = 1, 2
 VOTE_UNIT = 4294967296.0
@@ -1639,7 +1642,67 @@ def guessed(s, a):
 
 
 @compiled
-def step(s):
+def lead_of(margin):
+    """The bin of a lead (`relgym.model.calibration.key_of`)."""
+    if not margin > 0.0:
+        return 0
+    if margin == math.inf:
+        return 7
+    return min(max(math.frexp(margin)[1] + 2, 1), 6)
+
+
+@compiled
+def find(s, at, count, wanted):
+    """The place of a number among ascending ones; -1: it isn't there."""
+    low, high = np.int64(0), count
+    while low < high:
+        middle = (low + high) // 2
+        if s.code[at + middle] < wanted:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < count and s.code[at + low] == wanted else np.int64(-1)
+
+
+@compiled
+def settled(s, a, k, value, outcome, mode, margin):
+    """Value, outcome and mode, once it is known how right such predictions were (`relgym.model.querying`)."""
+    trust = s.code[a + 25]
+    winner = -mode if s.code[trust + 4] else mode
+    kind = np.int64(PREDICTED if mode else outcome)
+    guess = latest = math.nan
+    able = np.int64(1 if math.isfinite(value) else 0)
+    if s.code[a + 16] or s.code[a + 17]:
+        guess = guessed(s, a)
+        able |= 2 if math.isfinite(guess) else 0
+    if s.code[trust + 6]:
+        latest = total(s, s.code[trust + 6])
+        able |= 16 if math.isfinite(latest) else 0
+    number = ((winner * 16 + lead_of(margin) + 1) * 8 + kind) * 32 + able
+    if s.believed[k, 0] != number:
+        place = find(s, s.code[trust + 1], s.code[trust], number)
+        if place < 0:  # all of the outcome
+            place = find(s, s.code[trust + 1], s.code[trust], kind * 32 + able)
+        s.believed[k, 0], s.believed[k, 1] = number, place
+    place = s.believed[k, 1]
+    said, sure = s.code[trust + 2] + 2 * place, s.code[trust + 3] + 2 * place
+    speaker, claimed = s.code[said], s.code[said + 1]
+    s.sure[k, 0], s.sure[k, 1] = s.numbers[sure], s.numbers[sure + 1]
+    if not claimed:
+        outcome = UNSURE if outcome == PREDICTED else outcome
+    elif outcome == UNEXPLAINED and winner:
+        outcome = PREDICTED
+    if speaker == OWN:
+        return value, outcome, mode
+    if speaker == GUESS:
+        return guess, outcome, mode
+    if speaker == LATEST:
+        return latest, outcome, s.code[trust + 5] if winner else mode
+    return math.nan, outcome, mode
+
+
+@compiled
+def step(s, settling, telling):
     """One step of the scene whose present values stand in `s.x`; 0, or why not."""
     x, width = s.x, s.code[WIDTH]
     if s.code[BODIES]:
@@ -1664,7 +1727,8 @@ def step(s):
                 mode = np.int64(TOUCHING if s.body_flags[2, body] else FREE)
             else:
                 value, outcome, mode, margin = math.nan, OUTSIDE, np.int64(0), 0.0
-            s.touched[k] = hits(s, body)
+            if telling:
+                s.touched[k] = hits(s, body)
         else:
             value, outcome, mode, margin = by_modes(s, a, k)
             s.touched[k] = mode
@@ -1673,20 +1737,23 @@ def step(s):
             if s.lost[s.code[needs + 1 + j]]:
                 outcome, margin = DEPENDS, 0.0
         told = math.isfinite(value)
-        if told:
-            x[width + column] = value
+        if not told and outcome == PREDICTED:
+            outcome = OUTSIDE
+        if not (told and (outcome == PREDICTED or outcome == UNEXPLAINED)):
+            mode = np.int64(0)
+        if settling and s.code[a + 25]:
+            value, outcome, mode = settled(s, a, k, value, outcome, mode, margin)
         else:
-            if outcome == PREDICTED:
-                outcome = OUTSIDE
+            s.sure[k, 0] = s.sure[k, 1] = math.nan
+        if not (told or (settling and s.code[a + 25])):
             value = guessed(s, a)
             s.touched[k] = 0
             if math.isfinite(value):
                 s.touched[k] = -2 if beyond(s, a) else -1
-                x[width + column] = value
-        known = told and outcome == PREDICTED
-        s.outcomes[k], s.margins[k] = outcome, margin
-        s.modes[k] = mode if known or (told and outcome == UNEXPLAINED) else 0
-        if not known:
+        if math.isfinite(value):
+            x[width + column] = value
+        s.outcomes[k], s.modes[k], s.margins[k] = outcome, mode, margin
+        if outcome != PREDICTED:
             s.lost[s.code[a + 1]] = 1
     for k in range(s.code[KINEMATICS]):
         at = s.code[AT_KINEMATICS] + 3 * k
@@ -1708,17 +1775,23 @@ def hits(s, body):
 
 
 @entered
-def run(spaces, vectors, following, outcomes, modes, margins, players, touched):
+def run(spaces, vectors, settling, following, outcomes, modes, margins, sure, players, touched):
     """A step of n scenes.
 
     Parameters
     ----------
     spaces
         Work space with the tape in it, shape ``(1,)`` of `SPACE`.
-    vectors, following
-        State vectors, finite, and copies of them, into which next values are written, shape ``(n, width)``.
+    vectors
+        State vectors, finite, shape ``(n, width)``.
+    settling
+        Whether how right predictions were decides who gives the value, and what is claimed.
+    following
+        Copies of the vectors, into which next values are written.
     outcomes, modes, margins
         Where these go, shape ``(n, answers)``.
+    sure
+        How probably a value is right, and how far off it may be, shape ``(2, n, answers)``; of length 0: nobody asks.
     players, touched
         Bodies that play roles, shape ``(n, answers, roles)``, and, ``(n, answers)``, whom a mover touches, as bits, or
         the mode that gave a value, -1: a guess, -2: one out of scope. Of length 1 where nobody asks.
@@ -1737,7 +1810,7 @@ def run(spaces, vectors, following, outcomes, modes, margins, players, touched):
         for k in range(s.code[NEXTS]):
             column = s.code[nexts + k]
             s.x[width + column] = s.x[column]
-        bad = step(s)
+        bad = step(s, settling, n < players.shape[0])
         if bad:
             return bad
         for k in range(s.code[NEXTS]):
@@ -1745,6 +1818,9 @@ def run(spaces, vectors, following, outcomes, modes, margins, players, touched):
             following[n, column] = s.x[width + column]
         for k in range(s.code[ANSWERS]):
             outcomes[n, k], modes[n, k], margins[n, k] = s.outcomes[k], s.modes[k], s.margins[k]
+        if n < sure.shape[1]:
+            for k in range(s.code[ANSWERS]):
+                sure[0, n, k], sure[1, n, k] = s.sure[k, 0], s.sure[k, 1]
         if n < players.shape[0]:
             for k in range(s.code[ANSWERS]):
                 touched[n, k] = s.touched[k]

@@ -62,6 +62,9 @@ MOST_CODE, MOST_NUMBERS, MOST_ANSWERS = 65536, 16384, 512
 REMEMBERED, REMEMBERED_MODES, REMEMBERED_ROLES = 512, 8, 6
 """Relational states that a kernel remembers answers of (a power of two), and of how many modes and roles."""
 
+NOBODY = -(1 << 62)
+"""No kind of predictions."""
+
 _K = ir.MOST_BODIES
 SPACE = np.dtype(
     [
@@ -100,6 +103,12 @@ SPACE = np.dtype(
         ("modes", np.int64, (MOST_ANSWERS,)),
         ("margins", np.float64, (MOST_ANSWERS,)),
         ("players", np.int64, (MOST_ANSWERS, MOST_ROLES)),  # bodies bound to its roles
+        (
+            "believed",
+            np.int64,
+            (MOST_ANSWERS, 2),
+        ),  # the last kind of an answer's predictions, and what is made of it
+        ("sure", np.float64, (MOST_ANSWERS, 2)),  # probability and interval of each answer
         ("touched", np.int64, (MOST_ANSWERS,)),  # whom a mover touches; or the mode that gave a value
         ("state", np.uint64, (1,)),  # all relations that are known, as a number
         ("memory_keys", np.uint64, (REMEMBERED,)),
@@ -131,8 +140,13 @@ class Tape:
     def space(self) -> NDArray[np.void]:
         """A work space with the tape in it, shape ``(1,)``."""
         found = np.zeros(1, dtype=SPACE)
-        found["code"][0, : len(self.code)], found["numbers"][0, : len(self.numbers)] = self.code, self.numbers
+        self.lay(found)
         return found
+
+    def lay(self, space: NDArray[np.void]) -> None:
+        """Put the tape into a work space, in place of another one; nothing of that is remembered."""
+        space["code"][0, : len(self.code)], space["numbers"][0, : len(self.numbers)] = self.code, self.numbers
+        space["memory_keys"], space["believed"] = 0, NOBODY
 
 
 def encoded(program: ir.Program) -> Tape:
@@ -234,10 +248,6 @@ class _Writer:
         head[READS], head[AT_READS] = len(reads), self.put(*reads)
         head[NEXTS], head[AT_NEXTS] = len(nexts), self.put(*nexts)
 
-    @property
-    def _casts(self) -> bool:
-        return any(mode.roles for a in self.program.answers for mode in a.modes)
-
     def _relation(self, name: str) -> int:
         if name in RELATION_KINDS:
             return RELATION_KINDS[name]
@@ -254,7 +264,7 @@ class _Writer:
         self.col(*b.position[:2], *b.extent[:2], b.angle, *b.velocity, b.spin)
         if self.program.precision or self.program.dimensions == 3:
             self.col(*b.position, *b.extent)
-        if self.program.dimensions == 3 or self._casts:
+        if self.program.dimensions == 3 or self.program.casts:
             self.col(*b.pose)
         return [
             shape,
@@ -451,7 +461,21 @@ class _Writer:
             int(any(mode.roles for mode in a.modes)),
             int(a.vote is not None and _relational(a.vote)),
             int(a.vote is not None and _narrow(a.vote)),
+            self._trust(a.trust),  # 25
         )
+
+    def _trust(self, trust: ir.Trust | None) -> int:
+        """Beliefs in the order of their kinds' numbers: kinds, who speaks and whether that is claimed, and how sure."""
+        if trust is None:
+            return 0
+        if trust.regression is not None:
+            raise ir.BeyondError("values that regressions may give")
+        some = sorted(trust.beliefs, key=_kind)
+        kinds = self.put(*map(_kind, some))
+        said = self.put(*(v for each in some for v in (each.speaker, each.claimed)))
+        at = self.num(*(v for each in some for v in (each.probability, each.interval)))
+        mode, function = (0, 0) if trust.latest is None else (trust.latest[0], self._sum(trust.latest[1]))
+        return self.put(len(some), kinds, said, at, trust.lawful, mode, function)
 
     def _feature(self, feature: ir.Feature) -> int:
         kinds = {"": 0, "sin": 1, "cos": 2}
@@ -463,6 +487,11 @@ class _Writer:
             at = self.num(each.value, each.step, each.bound, each.side)
             return self.put(0, each.mode, *self.col(each.column), at)
         return self.put(1, each.mode, *self.col(each.column), self.num(each.value, each.at, each.slack))
+
+
+def _kind(belief: ir.Belief) -> int:
+    """The number of a kind of predictions, as the kernel works it out."""
+    return ((belief.winner * 16 + belief.lead + 1) * 8 + belief.outcome) * 32 + belief.able
 
 
 def _variables(literal: ir.Literal) -> set[int]:

@@ -9,12 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dreams import line_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from programs import MODELS, arrays, books, crowded, room_schema, scenes_of, with_laws
 
-from relgym.errors import ConfigError
 from relgym.laws.learner import LawLearner
 from relgym.model.lowering import lowered
 from relgym.model.prediction import OUTCOMES, BatchPrediction
@@ -30,10 +28,12 @@ def run(text: str) -> dict[str, Any]:
 
 
 def assert_same(text: str, vectors: Any, known: BatchPrediction) -> None:
-    after, outcomes, modes, margins = run(text)["predict"](vectors)
+    after, outcomes, modes, margins, probabilities, intervals = run(text)["predict"](vectors)
     np.testing.assert_array_equal(outcomes, known.outcomes)
     np.testing.assert_array_equal(modes, known.modes)
     np.testing.assert_array_equal(margins, known.margins)
+    np.testing.assert_array_equal(probabilities, known.probabilities)
+    np.testing.assert_array_equal(intervals, known.intervals)
     np.testing.assert_allclose(after, known.vectors, rtol=1e-12, atol=1e-12)
 
 
@@ -41,10 +41,6 @@ def assert_same(text: str, vectors: Any, known: BatchPrediction) -> None:
 def test_learned_models(name: str) -> None:
     model = MODELS[name]()
     layout, vectors = scenes_of(model, 40)
-    if name == "line with roles":
-        with pytest.raises(ConfigError):
-            model.to_python(layout)
-        return
     assert_same(model.to_python(layout), vectors, arrays(model._parts, layout, vectors))
 
 
@@ -78,10 +74,3 @@ def test_it_needs_numpy_alone(tmp_path: Path) -> None:
 def test_it_can_be_read() -> None:
     text = MODELS["room by laws"]().to_python()
     assert "def free_ball" in text and "largest(u_n, -0.9" in text and "Laws of motion" in text
-
-
-def test_roles_that_are_cast_are_refused() -> None:
-    schema = line_model().schema
-    names = [name for name in schema.order]
-    with pytest.raises(ConfigError, match=r"can't be written as Python.*several objects could play"):
-        line_model().to_python(schema.layout(names))
