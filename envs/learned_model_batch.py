@@ -27,7 +27,8 @@ class Stepped:
     Attributes
     ----------
     vectors
-        State vectors after the step; those before it where the prediction could not be followed.
+        State vectors after the step; those before it where the prediction could not be followed. They may be the
+        prediction's own: who changes them copies them first.
     rewards, terminated, truncated
         As Gymnasium has them.
     causes
@@ -113,10 +114,12 @@ class DreamStep:
         lost = (why >= 0) & (why != _HORIZON)
         if among is not None:
             why[~among] = -1
-        followed = after.copy()
+        followed = after
         if lost.any():
+            followed = after.copy()
             followed[lost] = before[lost]
         if len(self.setting.brought):
+            followed = after.copy() if followed is after else followed
             followed[:, self.setting.brought] = 0.0  # what the next step will bring isn't known
         return Stepped(followed, rewards, ended, why >= 0, why, success, after, prediction)
 

@@ -12,6 +12,8 @@ from relgym.envs.learned_model_ends import CAUSES, Cause
 
 __all__ = ["masked", "told_of"]
 
+_NAMES = tuple(cause.name.lower() for cause in CAUSES)
+
 
 def told_of(step: DreamStep, stepped: Stepped, going: NDArray[np.bool_] | None) -> dict[str, Any]:
     """Infos of a step of many dreams; what happened to none is left out.
@@ -29,7 +31,7 @@ def told_of(step: DreamStep, stepped: Stepped, going: NDArray[np.bool_] | None) 
         reasons, names = (np.full(count, None, dtype=object) for _ in range(2))
         for k in cut.tolist():
             reasons[k] = step.reason(stepped, k)
-            names[k] = CAUSES[stepped.causes[k]].name.lower()
+            names[k] = _NAMES[stepped.causes[k]]
         mask = stepped.truncated.copy()
         infos |= {"reason": reasons, "_reason": mask, "cause": names, "_cause": mask.copy()}
     if stepped.success is not None:

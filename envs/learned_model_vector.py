@@ -325,6 +325,8 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         assert self._vectors is not None, "made by reset"
         if self._cameras:
             self._cameras = {k: camera for k, camera in self._cameras.items() if k not in set(rows.tolist())}
+        if self._last is not None and np.may_share_memory(self._vectors, self._last[0].vectors):
+            self._vectors = self._vectors.copy()  # what the model said stays as it is
         self._vectors[rows] = first
         self._steps[rows] = 0
         self._over[rows] = False
@@ -340,6 +342,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         self._vectors = stepped.vectors
         self._steps += 1
         self._last = stepped.prediction, going
+        stepped.prediction.vectors.flags.writeable = False  # the dreams may be where it says
 
     @property
     def prediction(self) -> BatchPrediction | None:

@@ -196,12 +196,6 @@ class Runner:
 
     def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """Predict what follows n scenes; None: arrays must, or can say why not."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            total = float(vectors.sum())
-        if (
-            not math.isfinite(total) and not np.isfinite(vectors).all()
-        ):  # finite numbers may add up to infinity
-            return None
         if (settling := self._settles()) is None:
             return None
         told = self._told(vectors, settling=settling, told=0)
@@ -258,7 +252,7 @@ class Runner:
         """Run the program. What it writes to is new each time: another thread may ask before this one has read it."""
         n, count = len(vectors), len(self._keys)
         found = _Told(
-            vectors.copy(),
+            np.empty(vectors.shape),
             np.empty((n, count), dtype=np.int8),
             np.empty((n, count), dtype=np.int64),
             np.empty((n, count)),

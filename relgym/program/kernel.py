@@ -10,13 +10,11 @@ looks at the file that a function is defined in, not at what it calls. Importing
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
 
-import numba
 import numpy as np
 
+from relgym.program.compiling import compiled, entered
 from relgym.program.tape import (
     ANGLES,
     ANSWERS,
@@ -28,7 +26,6 @@ from relgym.program.tape import (
     AT_MOVERS,
     AT_NEXTS,
     AT_PAIRS,
-    AT_READS,
     BODIES,
     BODY,
     DIMENSIONS,
@@ -46,7 +43,6 @@ from relgym.program.tape import (
     PART,
     PARTING,
     PRECISION,
-    READS,
     RELATIONS,
     REMEMBERED,
     REMEMBERED_MODES,
@@ -59,23 +55,6 @@ from relgym.program.tape import (
 )
 
 __all__ = ["is_compiled", "run"]
-
-_F = TypeVar("_F", bound=Callable[..., Any])
-
-
-def compiled(function: _F) -> _F:
-    """Compile together with what calls it; nothing else can."""
-    found: _F = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
-    return found
-
-
-def entered(function: _F) -> _F:
-    """Compile when first called; keep what was compiled on disk, where some folder can be written to."""
-    try:
-        found: _F = numba.njit(error_model="numpy", no_cfunc_wrapper=True, cache=True)(function)
-    except RuntimeError:  # no folder for the cache
-        found = numba.njit(error_model="numpy", no_cfunc_wrapper=True)(function)
-    return found
 
 
 def is_compiled() -> bool:
@@ -99,6 +78,9 @@ TOO_MANY = 2
 TURNED = 3
 """A box in space is turned: that takes arrays."""
 
+NOT_FINITE = 4
+"""A number is NaN or infinite: arrays say so."""
+
 OWN, GUESS, LATEST = 0, 1, 4
 """Who gives a value (`relgym.program.records.EXPERTS`); what nobody does stays as it is."""
 
@@ -114,7 +96,7 @@ TURN_AROUND = 2.0 * math.pi
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 MIX_A, MIX_B = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 S30, S27, S31, ONE64, ZERO64 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(1), np.uint64(0)
-BX, LOW_X, HIGH_X, SIZE, SPEED = 0, 3, 6, 9, 10
+BX, LOW_X, HIGH_X, SIZE, SPEED, WHOLE = 0, 3, 6, 9, 10, 11
 BY, LOW_Y, HIGH_Y = 1, 4, 7
 (SHAPE, CORNERS, OUTLINE, COL_X, COL_Y, COL_Z, COL_SX, COL_SY, COL_SZ, COL_ANGLE, COL_VX, COL_VY, COL_VZ) = (
     range(13)
@@ -695,7 +677,7 @@ def move(s):
                 flags[0, k] = flags[1, k] = 0
         return count
     law = s.code[s.code[AT_LAWS]]
-    settled = compose(s, law, count, bodies, spins, 2)
+    settled = compose(s, law, count, bodies, spins, np.int64(2))
     lawful, point = True, s.code[law] == 1
     for k in range(count):
         c, pair = s.contact[k], s.pair[k, 0]
@@ -720,7 +702,7 @@ def move(s):
         flags[3, k] = 1 if stated else 0
         flags[0, k] = 1 if stated and flags[0, k] else 0
     for other in range(1, s.code[LAWS]):
-        compose(s, s.code[s.code[AT_LAWS] + other], count, bodies, spins, 3)
+        compose(s, s.code[s.code[AT_LAWS] + other], count, bodies, spins, np.int64(3))
         for k in range(bodies):
             if flags[2, k]:
                 for d in range(governed):
@@ -846,11 +828,10 @@ def closing(s, a, b):
 
 
 @compiled
-def side(s, a, b):
-    """How body a lies to b: bits of the kinds of relations between their bounding boxes; touching aside."""
-    one, kinds = np.int64(1), np.int64(0)
-    mine = theirs = 0.0
-    over = True
+def sides(s, a, b):
+    """How body a lies to b, and b to a: bits of the kinds of relations between bounding boxes; touching aside."""
+    one, there, back, beside = np.int64(1), np.int64(0), np.int64(0), np.int64(0)
+    over, under = True, True
     for d in range(s.code[DIMENSIONS]):
         low_a, high_a = s.body[a, LOW_X + d], s.body[a, HIGH_X + d]
         low_b, high_b = s.body[b, LOW_X + d], s.body[b, HIGH_X + d]
@@ -859,22 +840,29 @@ def side(s, a, b):
         margin = -(ALIGN_MARGIN * min(wide_a, wide_b))
         less, greater = (low_b - high_a) - offset >= margin, (low_a - high_b) + offset >= margin
         if less:
-            kinds |= one << (5 + d)
+            there |= one << (5 + d)
+            back |= one << (8 + d)
         if greater:
-            kinds |= one << (8 + d)
+            there |= one << (8 + d)
+            back |= one << (5 + d)
         if not (less or greater):
-            kinds |= one << (11 + d)
-        mine, theirs = mine + wide_a * wide_a, theirs + wide_b * wide_b
+            beside |= one << (11 + d)
         if d == s.code[UP]:
-            over = over and greater
-        else:
-            top, bottom = min(high_a + offset, high_b), max(low_a + offset, low_b)
-            over = over and top - bottom >= MIN_OVERLAP * wide_a
+            over, under = over and greater, under and less
+        elif over or under:
+            shared = min(high_a + offset, high_b) - max(low_a + offset, low_b)
+            over = over and shared >= MIN_OVERLAP * wide_a
+            shared = min(high_b - offset, high_a) - max(low_b - offset, low_a)
+            under = under and shared >= MIN_OVERLAP * wide_b
     if over:
-        kinds |= one << 3
-    if SIZE_RATIO * math.sqrt(mine) < math.sqrt(theirs):
-        kinds |= one << 4
-    return kinds
+        there |= one << 3
+    if under:
+        back |= one << 3
+    if SIZE_RATIO * s.body[a, WHOLE] < s.body[b, WHOLE]:
+        there |= one << 4
+    if SIZE_RATIO * s.body[b, WHOLE] < s.body[a, WHOLE]:
+        back |= one << 4
+    return there | beside, back | beside
 
 
 @compiled
@@ -902,28 +890,44 @@ def relate(s, among):
             asked |= one << s.code[at + r]
             for k in range(bodies):
                 s.rows[r, k] = s.columns[r, k] = 0
+    if asked & (one << 4):
+        for k in range(bodies):
+            whole = 0.0
+            for d in range(s.code[DIMENSIONS]):
+                wide = s.body[k, HIGH_X + d] - s.body[k, LOW_X + d]
+                whole += wide * wide
+            s.body[k, WHOLE] = math.sqrt(whole)
     for a in range(bodies):
         if not among & (one << a):
             continue
-        for b in range(bodies):
-            if b == a or not among & (one << b):
+        for b in range(a + 1, bodies):
+            if not among & (one << b):
                 continue
-            kinds = side(s, a, b) if asked & ~7 else np.int64(0)
+            there = back = np.int64(0)
+            if asked & ~7:
+                there, back = sides(s, a, b)
             if touch(s, a, b):
-                kinds |= 4
+                there, back = there | 4, back | 4
                 if asked & 3 and closing(s, a, b) < math.inf:
-                    kinds |= 1
-                    if asked & 2 and fastest(s, a, b):
-                        kinds |= 2
+                    there, back = there | 1, back | 1
+                    if asked & 2:
+                        there |= 2 if fastest(s, a, b) else 0
+                        back |= 2 if fastest(s, b, a) else 0
             else:
-                kinds &= ~(one << 3)
-            kinds &= asked
-            state = (state ^ np.uint64(kinds + 1)) * MIX_A
+                there, back = there & ~(one << 3), back & ~(one << 3)
+            there, back = there & asked, back & asked
+            state = (state ^ np.uint64((there << 16) + back + 1)) * MIX_A
             state ^= state >> S27
-            for r in range(s.code[RELATIONS]):
-                if s.code[at + r] >= 0 and kinds & (one << s.code[at + r]):
-                    s.rows[r, a] |= one << b
-                    s.columns[r, b] |= one << a
+            if there | back:
+                for r in range(s.code[RELATIONS]):
+                    kind = s.code[at + r]
+                    if kind >= 0:
+                        if there >> kind & 1:
+                            s.rows[r, a] |= one << b
+                            s.columns[r, b] |= one << a
+                        if back >> kind & 1:
+                            s.rows[r, b] |= one << a
+                            s.columns[r, a] |= one << b
     s.state[0] = state
 
 
@@ -1332,7 +1336,7 @@ def assign(s, casting, t):
             score = s.numbers[s.code[record + 1] + s.code[record + 3]]
             for k in range(s.code[record + 3]):
                 s.value[0], s.value[1] = t, each
-                if solve(s, s.code[record + 5 + k], everyone, False):
+                if solve(s, s.code[record + 5 + k], everyone, roles < 0):  # a variable: else compiled twice
                     score = s.numbers[s.code[record + 1] + k]
                     break
             if score != score:
@@ -1783,11 +1787,11 @@ def run(spaces, vectors, settling, following, outcomes, modes, margins, sure, pl
     spaces
         Work space with the tape in it, shape ``(1,)`` of `SPACE`.
     vectors
-        State vectors, finite, shape ``(n, width)``.
+        State vectors, shape ``(n, width)``.
     settling
         Whether how right predictions were decides who gives the value, and what is claimed.
     following
-        Copies of the vectors, into which next values are written.
+        Where the next ones go, shape ``(n, width)``.
     outcomes, modes, margins
         Where these go, shape ``(n, answers)``.
     sure
@@ -1801,12 +1805,16 @@ def run(spaces, vectors, settling, following, outcomes, modes, margins, sure, pl
     0, or why some scene can't be.
     """
     s = spaces[0]
-    width, reads, nexts = s.code[WIDTH], s.code[AT_READS], s.code[AT_NEXTS]
+    width, nexts = s.code[WIDTH], s.code[AT_NEXTS]
     s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
     for n in range(vectors.shape[0]):
-        for k in range(s.code[READS]):
-            column = s.code[reads + k]
-            s.x[column] = vectors[n, column]
+        wrong = 0
+        for k in range(width):
+            value = vectors[n, k]
+            s.x[k] = following[n, k] = value
+            wrong += not abs(value) < math.inf
+        if wrong:
+            return NOT_FINITE
         for k in range(s.code[NEXTS]):
             column = s.code[nexts + k]
             s.x[width + column] = s.x[column]

@@ -16,7 +16,7 @@ from relgym.program import records as ir
 
 __all__ = ["Tape", "encoded"]
 
-HEADER = 30
+HEADER = 28
 (
     WIDTH,
     REGISTERS,
@@ -32,7 +32,7 @@ HEADER = 30
     AT_LAWS,
 ) = range(12)
 (KINEMATICS, AT_KINEMATICS, ANGLES, AT_ANGLES, RELATIONS, FACTS, OTHERS) = range(12, 19)
-(OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP, READS, AT_READS, NEXTS, AT_NEXTS) = range(19, 29)
+(OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP, NEXTS, AT_NEXTS) = range(19, 27)
 """Entries of the header."""
 
 (TURN, TOUCH, PART, PRECISION, SLACK) = range(5)
@@ -71,7 +71,7 @@ SPACE = np.dtype(
         ("code", np.int64, (MOST_CODE,)),  # the tape
         ("numbers", np.float64, (MOST_NUMBERS,)),
         ("x", np.float64, (MOST_REGISTERS,)),  # registers
-        ("body", np.float64, (_K, 11)),  # place, bounding box, sizes for coarse numbers
+        ("body", np.float64, (_K, 12)),  # place, bounding box, sizes for coarse numbers, size of the box
         ("placed", np.int64, (_K,)),  # whether a body's edges are worked out
         ("edge", np.float64, (5, _K, MOST_CORNERS)),  # starts, outward normals, lengths
         ("gap", np.float64, (4, _K, _K)),  # distance and normal, first < second
@@ -236,16 +236,14 @@ class _Writer:
             *(v for k, (place, _, rate) in enumerate(p.kinematics) for v in (place, *self.col(rate), at + k))
         )
         head[ANGLES], head[AT_ANGLES] = len(p.angles), self.put(*p.angles)
-        self._note_reads()
+        self._note_nexts()
         return Tape(np.array(self.code, dtype=np.int64), np.array(self.numbers), self.roles)
 
-    def _note_reads(self) -> None:
-        """Which present values a step reads, and which next values it reads or writes."""
+    def _note_nexts(self) -> None:
+        """Which next values a step reads or writes."""
         p, head = self.program, self.code
         written = {a.column for a in p.answers} | {place for place, _, _ in p.kinematics} | set(p.angles)
         nexts = sorted(written | {c - p.width for c in self.reads if p.width <= c < 2 * p.width})
-        reads = sorted({c for c in self.reads if 0 <= c < p.width} | set(nexts))
-        head[READS], head[AT_READS] = len(reads), self.put(*reads)
         head[NEXTS], head[AT_NEXTS] = len(nexts), self.put(*nexts)
 
     def _relation(self, name: str) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -44,6 +46,14 @@ def test_learned_models(name: str) -> None:
     assert_same(model.to_python(layout), vectors, arrays(model._parts, layout, vectors))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODELS)
+def test_learned_models_in_24_000_scenes(name: str) -> None:
+    model = MODELS[name]()
+    layout, vectors = scenes_of(model, 24_000)
+    assert_same(model.to_python(layout), vectors, arrays(model._parts, layout, vectors))
+
+
 @settings(max_examples=3, deadline=None)
 @given(data=st.data(), shapes=st.integers(1, 3), balls=st.integers(1, 3), seed=st.integers(0, 10**6))
 def test_laws_of_any_form(data: st.DataObject, shapes: int, balls: int, seed: int) -> None:
@@ -56,19 +66,34 @@ def test_laws_of_any_form(data: st.DataObject, shapes: int, balls: int, seed: in
         assert_same(text, vectors, arrays(parts, layout, vectors))
 
 
-def test_it_needs_numpy_alone(tmp_path: Path) -> None:
-    model = MODELS["room by laws"]()
-    layout, vectors = scenes_of(model, 2)
-    file = tmp_path / "room.py"
-    file.write_text(model.to_python(layout), encoding="utf-8")
+def test_it_runs_where_there_is_nothing_but_numpy(tmp_path: Path) -> None:
+    """`-I -S` leaves the standard library; numpy is all that is put beside it."""
+    alone = tmp_path / "site"
+    alone.mkdir()
+    home = Path(np.__file__).parent
+    for folder in (home, home.parent / "numpy.libs"):
+        if folder.exists():
+            (alone / folder.name).symlink_to(folder)
+    asked: dict[str, Any] = {}
+    for k, name in enumerate(MODELS):
+        model = MODELS[name]()
+        layout, vectors = scenes_of(model, 3)
+        (alone / f"model{k}.py").write_text(model.to_python(layout), encoding="utf-8")
+        asked[f"model{k}"] = vectors.tolist(), arrays(model._parts, layout, vectors).outcomes.tolist()
     code = (
-        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import room\n"
-        f"print(room.predict({vectors.tolist()!r})[1].tolist())\n"
-        "print(sorted({n.partition('.')[0] for n in sys.modules} & {'relgym', 'scipy', 'gymnasium', 'numba'}))"
+        "import importlib, json, sys\n"
+        f"sys.path.append({str(alone)!r})\n"
+        "for name, (vectors, known) in json.load(sys.stdin).items():\n"
+        "    said = importlib.import_module(name).predict(vectors)[1].tolist()\n"
+        "    assert said == known, (name, said, known)\n"
+        "print(sorted({m.partition('.')[0] for m in sys.modules} - set(sys.stdlib_module_names)))"
     )
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    known = arrays(model._parts, layout, vectors)
-    assert said.splitlines() == [str(known.outcomes.tolist()), "[]"]
+    said = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", code], input=json.dumps(asked), capture_output=True, text=True
+    )
+    assert said.returncode == 0, said.stderr
+    others = {name for name in ast.literal_eval(said.stdout) if not name.startswith(("model", "__"))}
+    assert others == {"numpy"}
 
 
 def test_it_can_be_read() -> None:
