@@ -148,10 +148,15 @@ class DreamStep:
                 success[good] = tells(layout, *steps)
         return rewards, ended, success
 
+    @property
+    def out_of_time(self) -> str:
+        """The sentence for those that have lasted as long as they may."""
+        return horizon_reached(self.horizon)
+
     def reason(self, stepped: Stepped, row: int) -> str:
         """Why a dream was truncated, in a sentence that names objects and properties."""
         if stepped.causes[row] == _HORIZON:
-            return horizon_reached(self.horizon)
+            return self.out_of_time
         if stepped.causes[row] == _NO_REWARD:
             return Cause.NO_REWARD.value
         told = explained(parts_of_row(stepped.prediction, row), self.min_margin, self.evaluator.overruled)

@@ -7,11 +7,11 @@ Python. What that leaves is the same code, in a fraction of the time.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 import numba
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.typed_passes import NoPythonSupportedFeatureValidation
@@ -22,25 +22,51 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 class _Part(JITCodeLibrary):  # type: ignore[misc]
-    """Code that goes into the library of whoever calls it, and is nothing alone.
+    """Code that goes into the library of whoever is entered, and is nothing alone.
 
     Of a numba that calls what is left out here by other names, it is optimised and assembled all the same.
     """
 
+    def __init__(self, codegen: Any, name: str) -> None:
+        super().__init__(codegen, name)
+        self._whole: Any = None
+
     @property
     def codegen(self) -> Any:
         """Who makes code; of what isn't there alone nothing is to be noted."""
-        return _Silent(self._codegen)
+        return _Unnoted(self._codegen)
 
-    def _optimize_final_module(self) -> None:
-        """Leave it to the caller's library."""
-
-    def _finalize_final_module(self) -> None:
+    def finalize(self) -> None:
+        """Take nothing more in; what this calls is linked where it is entered."""
+        self._raise_if_finalized()
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
         self._finalize_dynamic_globals()
         self._finalized = True
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
 
-class _Silent:
+    def _get_module_for_linking(self) -> Any:
+        """The part and all that it calls, each once."""
+        if self._whole is None:
+            self._whole = super()._get_module_for_linking().clone()
+            for library in self._called({id(self)}):
+                own = CPUCodeLibrary._get_module_for_linking(library)
+                self._whole.link_in(own, preserve=True)
+        return self._whole
+
+    def _called(self, seen: set[int]) -> Iterator[CPUCodeLibrary]:
+        """All libraries that this one needs."""
+        for library in self._linking_libraries:
+            if id(library) not in seen:
+                seen.add(id(library))
+                yield library
+                if isinstance(library, _Part):
+                    yield from library._called(seen)
+
+
+class _Unnoted:
     """What makes code, but for noting where the globals of a function lie: read from disk, parts have none either."""
 
     def __init__(self, codegen: Any) -> None:

@@ -878,18 +878,16 @@ def fastest(s, a, b):
 
 @compiled
 def relate(s, among):
-    """Work out all relations that are asked for between some objects."""
+    """Work out all relations that are asked for between some objects: bits of kinds, and a number for all of them."""
     if among & ~s.masks[4] == 0:
         return
     among |= s.masks[4]
-    s.masks[4] = among
+    s.masks[4], s.masks[6] = among, 0
     one, at, bodies = np.int64(1), s.code[AT_BODIES] + BODY * s.code[BODIES], s.code[BODIES]
     asked, state = np.int64(0), mixed(np.uint64(among))
     for r in range(s.code[RELATIONS]):
         if s.code[at + r] >= 0:
             asked |= one << s.code[at + r]
-            for k in range(bodies):
-                s.rows[r, k] = s.columns[r, k] = 0
     if asked & (one << 4):
         for k in range(bodies):
             whole = 0.0
@@ -916,19 +914,32 @@ def relate(s, among):
             else:
                 there, back = there & ~(one << 3), back & ~(one << 3)
             there, back = there & asked, back & asked
+            s.kinds[a, b], s.kinds[b, a] = there, back
             state = (state ^ np.uint64((there << 16) + back + 1)) * MIX_A
             state ^= state >> S27
-            if there | back:
-                for r in range(s.code[RELATIONS]):
-                    kind = s.code[at + r]
-                    if kind >= 0:
-                        if there >> kind & 1:
-                            s.rows[r, a] |= one << b
-                            s.columns[r, b] |= one << a
-                        if back >> kind & 1:
-                            s.rows[r, b] |= one << a
-                            s.columns[r, a] |= one << b
     s.state[0] = state
+
+
+@compiled
+def unfold(s):
+    """Write relations out: for each of them, and for each object, to whom it stands in it, and who does to it."""
+    if s.masks[6]:
+        return
+    s.masks[6] = 1
+    one, among, bodies = np.int64(1), s.masks[4], s.code[BODIES]
+    at = s.code[AT_BODIES] + BODY * bodies
+    for r in range(s.code[RELATIONS]):
+        kind = s.code[at + r]
+        if kind < 0:
+            continue
+        for k in range(bodies):
+            s.rows[r, k] = s.columns[r, k] = 0
+        for a in range(bodies):
+            if among & (one << a):
+                for b in range(bodies):
+                    if b != a and among & (one << b) and s.kinds[a, b] >> kind & 1:
+                        s.rows[r, a] |= one << b
+                        s.columns[r, b] |= one << a
 
 
 # ---------------------------------------------------------------------------------------------- clauses
@@ -1162,6 +1173,7 @@ def situation(s, used, target):
 @compiled
 def seen_before(s, experience, target):
     """Whether the situation was seen in training."""
+    unfold(s)
     number = ZERO64
     for k in range(s.code[experience]):
         number = mixed(number + situation(s, s.code[experience + 3 + k], target))
@@ -1181,6 +1193,7 @@ def seen_before(s, experience, target):
 @compiled
 def rank(s, vote, count, target):
     """Put the modes in order, `s.order[0]`, the winner first; its lead in the last count."""
+    unfold(s)
     lead, totals, alive, order = s.votes, s.order[1], s.order[2], s.order[0]
     for i in range(count):
         for j in range(count):
@@ -1527,6 +1540,7 @@ def players_of(s, a, mode, number, slot, tied):
         for k in range(roles):
             s.cast[0, k] = record[at + 1 + k]
         return record[at] == 1, tied
+    unfold(s)
     if tied < 0:
         tied = 1 if line_up(s, s.code[a + 2]) else 0
     done = assign(s, casting, s.code[a + 2])
@@ -1574,7 +1588,7 @@ def by_modes(s, a, answer):
         else:
             # What has no body stands alone: object 0 of one, in no relation to anything.
             s.masks[0] = s.masks[1] = s.masks[2] = 1
-            s.masks[3], s.masks[4] = -1, 0
+            s.masks[3], s.masks[4], s.masks[6] = -1, 0, 1
             s.told[0, :] = math.nan
             s.rows[:, 0] = 0
             s.columns[:, 0] = 0
@@ -1713,7 +1727,7 @@ def step(s, settling, telling):
         bad = look(s)
         if bad:
             return bad
-        s.masks[3], s.masks[4] = -1, 0
+        s.masks[3], s.masks[4], s.masks[6] = -1, 0, 0
         if s.code[MOVERS] and move(s) < 0:
             return TOO_MANY
     for k in range(s.code[KEYS]):

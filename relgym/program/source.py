@@ -288,18 +288,17 @@ class _Source:
     def _casting(self, name: str, mode: int, casting: ir.Casting) -> None:
         add, described = self.lines.append, list[str]()
         for k, d in enumerate(casting.descriptions):
-            described.append(f"({d.objects}, {name}_{k}, {d.common!r}, {d.places!r})")
+            described.append(f"        ({d.objects}, {name}_{k}, {d.common!r}, {d.places!r}),\n")
             add(f"def {name}_{k}(target, B, shown, stands):")
-            add(f'    """Log-odds that B plays role {", ".join(map(str, d.places))} of mode {mode}."""')
+            add(f'    """Log-odds that B is bound to role {", ".join(map(str, d.places))} of mode {mode}."""')
             for clause, score in d.clauses:
                 add(f"    # {clause.text}")
                 add(f"    if {self._clause(clause)[0]}:\n        return {_number(score)}")
             add(f"    return {_number(d.otherwise)}\n")
         add(f"def {name}(target, scene):")
-        add(f'    """Bodies that play the roles of mode {mode}; None: nobody does, or it is in doubt who."""')
-        add(
-            f"    described = ({', '.join(described)},)  # whom, how well, what all had in common, which roles"
-        )
+        add(f'    """Bodies bound to the roles of mode {mode}; None: none are, or it is in doubt which."""')
+        add("    # whom, how well, what all who did had in common (relations both ways, kinds), which roles")
+        add(f"    described = (\n{''.join(described)}    )")
         add(f"    return players(described, {casting.roles}, {casting.lenient}, target, scene)\n")
 
     def _clipped(self, a: ir.Answer, value: str) -> str:
@@ -829,7 +828,7 @@ def players(described, roles, lenient, target, scene):
 
 
 def nobody(target, scene):
-    """Nothing is known of who plays the roles."""
+    """Nothing is known of who is bound to the roles."""
     return None
 
 

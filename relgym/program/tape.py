@@ -82,11 +82,9 @@ SPACE = np.dtype(
         ("features", np.float64, (6,)),  # what laws read of a contact
         ("body_flags", np.int64, (4, _K)),  # stated, known, involved, stated by the law in force
         ("told", np.float64, (_K, MOST_FEATURES)),  # pair features of a target
-        (
-            "masks",
-            np.int64,
-            (6,),
-        ),  # contexts of a target; whose they are; among whom relations are known; the time
+        # Contexts of a target; whose they are; among whom relations are known; the time; whether they are written out.
+        ("masks", np.int64, (7,)),
+        ("kinds", np.int64, (_K, _K)),  # how bodies stand to each other: bits of kinds of relations
         ("rows", np.int64, (MOST_RELATIONS, _K)),  # to whom an object stands in a relation
         ("columns", np.int64, (MOST_RELATIONS, _K)),  # who stands in a relation to an object
         ("value", np.int64, (MOST_VARIABLES,)),  # objects of variables
