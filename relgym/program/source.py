@@ -268,7 +268,7 @@ class _Source:
         return name
 
     def _mode(self, name: str, mode: ir.Mode) -> None:
-        """A mode as a function of the registers and of the bodies that play its roles."""
+        """A mode as a function of the registers and of the bodies that are bound to its roles."""
         add = self.lines.append
         assert mode.function is not None, "asked of such alone"
         cast = {role.number + 1: _variable(role.place + 1) for role in mode.roles}

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from programs import MODELS, arrays, books, crowded, room_schema, scenes_of, with_laws
+from programs import MODELS, arrays, books, crowded, looked_back, room_schema, scenes_of, with_laws
 
 from relgym.laws.learner import LawLearner
 from relgym.model.lowering import lowered
@@ -42,6 +42,13 @@ def assert_same(text: str, vectors: Any, known: BatchPrediction) -> None:
 @pytest.mark.parametrize("name", MODELS)
 def test_learned_models(name: str) -> None:
     model = MODELS[name]()
+    layout, vectors = scenes_of(model, 40)
+    assert_same(model.to_python(layout), vectors, arrays(model._parts, layout, vectors))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_what_somebody_looked_back_at(name: str) -> None:
+    model = looked_back(MODELS[name]())
     layout, vectors = scenes_of(model, 40)
     assert_same(model.to_python(layout), vectors, arrays(model._parts, layout, vectors))
 
