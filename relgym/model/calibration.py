@@ -293,6 +293,15 @@ class Calibration:
             rows = np.flatnonzero(which.reshape(-1) == number)
             yield rows, self.assess(key, np.where(row, 0.0, np.nan).tolist())
 
+    def assessed(self, key: Key, able: int) -> Assessment:
+        """`assess` where those experts have a value that bits tell (`EXPERTS`); persistence always has."""
+        return self._assess(key, tuple(k for k in range(len(EXPERTS)) if able >> k & 1 or k == PERSISTENCE))
+
+    @property
+    def cells(self) -> tuple[Key, ...]:
+        """The cells there are, and those of all predictions of an outcome (winner and lead -1), in order."""
+        return tuple(sorted(self._cells))
+
     def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
         default = next(k for k in _BY_DEFAULT if k in able)
         whole, cell = self._cells.get(_whole(key)), self._cells.get(key)

@@ -194,7 +194,8 @@ def predict_many(
             column = layout.column(index, target.property)
             values, probability, interval = _settled_many(parts, target, percept, index, following, verdict)
             following[:, column] = values
-            known &= verdict.outcomes == _PREDICTED
+            # What is claimed after all is known, though the answer is undecided.
+            known = verdict.outcomes == _PREDICTED
             probabilities.append(probability)
             intervals.append(interval)
             key = (target.type, target.property)

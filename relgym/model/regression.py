@@ -128,6 +128,21 @@ class Regression:
         clipped: NDArray[np.float64] = np.clip(found, least - slack, most + slack)
         return clipped
 
+    def sums(
+        self, signature: SlotSignature, target: str
+    ) -> (
+        tuple[list[int], list[float], list[float], tuple[tuple[float, ...], ...], tuple[float, float]] | None
+    ):
+        """What `values` works out for a target: columns of a row, their centres and scales, weights, bounds."""
+        if not self._ridges or (places := self._columns(signature)) is None:
+            return None
+        k = self.targets.index(target)
+        weights = tuple(tuple(r.weights[k].tolist()) for r in self._ridges if k < len(r.weights))
+        least, most = self._range[:, k].tolist()
+        slack = BEYOND * (most - least)
+        centre, scale = self._centre.tolist(), self._scale.tolist()
+        return places.tolist(), centre, scale, weights, (least - slack, most + slack)
+
     def _columns(self, signature: SlotSignature) -> NDArray[np.intp] | None:
         """Where the columns lie in a signature's rows; None where one is missing."""
         known = self._places.get(id(signature))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.errors import SlowWarning
-from relgym.model.calibration import OWN, Audit, key_of, lead_bins
+from relgym.model.calibration import OWN, Audit, key_of
 from relgym.model.lowering import lowered
 from relgym.model.motion import TOUCHING
 from relgym.model.parts import Parts
@@ -27,6 +27,7 @@ from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Predicti
 from relgym.model.target.property_model import PropertyModel
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
+from relgym.model.trusting import trusting
 from relgym.program.records import Answer, BeyondError, Program
 from relgym.program.tape import encoded
 from relgym.scene.objects import Scene, SceneLayout
@@ -161,6 +162,7 @@ class _Told(NamedTuple):
     outcomes: NDArray[np.int8]
     modes: _Bits
     margins: NDArray[np.float64]
+    sure: NDArray[np.float64]
     players: _Bits
     noted: _Bits
 
@@ -172,16 +174,13 @@ class Runner:
     ----------
     parts, layout, program, kernel
         The model, the layout, the program for it, and the module that runs it.
-
-    Raises
-    ------
-    BeyondError
-        Others than modes and laws may give values, as far as anybody looked back: arrays know them.
     """
 
     def __init__(self, parts: Parts, layout: SceneLayout, program: Program, kernel: ModuleType) -> None:
-        self._layout = layout
+        self._parts, self._layout = parts, layout
         self.program = program
+        self._looked: tuple[int, ...] = ()
+        self._wordless = False
         tape = encoded(program)
         self._run = kernel.run
         self._roles, self._space = tape.roles, tape.space()
@@ -193,28 +192,17 @@ class Runner:
         self._frames = tuple(frame if a.component >= 0 else "world" for a in program.answers)
         self._tellers = tuple(_Teller(parts, layout, a, frame) for a in program.answers)
         self._needed = frozenset(key for a in program.answers for key in a.needs)
-        if not all(t.plain or not t.model.calibration.trials for t in self._tellers):
-            raise BeyondError("values that guesses, regressions or former modes may give")
         self._plain = all(t.plain for t in self._tellers)
 
     def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """Predict what follows n scenes; None: arrays must, or can say why not."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            total = float(vectors.sum())
-        if (
-            not math.isfinite(total) and not np.isfinite(vectors).all()
-        ):  # finite numbers may add up to infinity
+        if (settling := self._settles()) is None:
             return None
-        calibrated = any(t.model.calibration.trials for t in self._tellers)
-        told = self._told(vectors, len(vectors) if calibrated else 1)
+        told = self._told(vectors, settling=settling, told=0)
         if told is None:
             return None
-        probabilities = intervals = np.full(told.margins.shape, np.nan)
-        if calibrated:
-            probabilities, intervals = probabilities.copy(), intervals.copy()
-            for k in range(len(self._tellers)):
-                if not self._calibrate(k, told, probabilities, intervals):
-                    return None
+        if not settling:
+            told = told._replace(sure=np.full((2, *told.margins.shape), np.nan))
         return BatchPrediction(
             self._layout,
             told.following,
@@ -223,44 +211,30 @@ class Runner:
             told.outcomes,
             told.margins,
             self._frames,
-            probabilities,
-            intervals,
+            *told.sure,
         )
 
-    def _calibrate(
-        self, k: int, told: _Told, probabilities: NDArray[np.float64], intervals: NDArray[np.float64]
-    ) -> bool:
-        """How right an answer's predictions are, in place; False where that changes what others rest on."""
-        teller, outcomes, modes = self._tellers[k], told.outcomes[:, k], told.modes[:, k]
-        a, model = teller.answer, teller.model
-        if a.component >= 0 and (outcomes == _DEPENDS).any():
-            return False  # whether laws had a value isn't told
-        own = outcomes == _PREDICTED if a.component >= 0 else told.noted[:, k] > 0
-        kinds = np.where(modes != 0, np.int8(_PREDICTED), outcomes)
-        for rows in _alike(kinds, modes, told.margins[:, k], own):
-            row, trusted = rows[0], bool(model.calibration.trials)
-            winner = int(-modes[row] if a.component >= 0 else modes[row])
-            key = key_of(int(kinds[row]), winner, float(told.margins[row, k]))
-            value = 0.0 if own[row] else math.nan  # who has a value counts, not which
-            said = model.assess(key, (value, math.nan, math.nan, math.nan, math.nan, 0.0))
-            if said.speaker != OWN and own[row]:
-                return False
-            probabilities[rows, k], intervals[rows, k] = said.probability, said.interval
-            claimed, before = model.claims(said), outcomes[rows]
-            if claimed and not (trusted and winner):
-                continue
-            changed = before == (_UNEXPLAINED if claimed else _PREDICTED)
-            if changed.any() and a.key in self._needed:
-                return False
-            outcomes[rows[changed]] = _PREDICTED if claimed else _UNSURE
-        return True
+    def _settles(self) -> bool | None:
+        """Whether it is known how right predictions were; then the kernel is told. None: it has no words for that."""
+        looked = tuple(t.model.calibration.trials for t in self._tellers)
+        if not any(looked):
+            return False
+        if self._looked != looked:
+            self._looked = looked
+            try:
+                tape = encoded(trusting(self._parts, self._layout, self.program))
+                tape.lay(self._space)
+                self._wordless = False
+            except BeyondError:
+                self._wordless = True
+        return None if self._wordless else True
 
     def one(self, scene: Scene) -> ScenePrediction | None:
         """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not."""
         if not self._plain:
             return None
         now = scene.vector
-        told = self._told(now[None], 1)
+        told = self._told(now[None], settling=False, told=1)
         if told is None:
             return None
         after, players = told.following[0], told.players[0]
@@ -274,18 +248,19 @@ class Runner:
             found.append(one)
         return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
 
-    def _told(self, vectors: NDArray[np.float64], told: int) -> _Told | None:
+    def _told(self, vectors: NDArray[np.float64], *, settling: bool, told: int) -> _Told | None:
         """Run the program. What it writes to is new each time: another thread may ask before this one has read it."""
         n, count = len(vectors), len(self._keys)
         found = _Told(
-            vectors.copy(),
+            np.empty(vectors.shape),
             np.empty((n, count), dtype=np.int8),
             np.empty((n, count), dtype=np.int64),
             np.empty((n, count)),
+            np.empty((2, n if settling else 0, count)),
             np.empty((told, count, self._roles), dtype=np.int64),
             np.zeros((told, count), dtype=np.int64),
         )
-        return None if self._run(self._space, vectors, *found) else found
+        return None if self._run(self._space, vectors, settling, *found) else found
 
 
 class _Teller:
@@ -377,15 +352,6 @@ class _Teller:
         for role in known.roles:
             names[role.number + 1] = self._body_names[int(players[role.number])]
         return tuple(name for name in names if name is not None)
-
-
-def _alike(
-    kinds: NDArray[np.int8], modes: _Bits, margins: NDArray[np.float64], own: NDArray[np.bool_]
-) -> list[NDArray[np.intp]]:
-    """Rows whose predictions are of one kind: of one outcome, mode and lead, with or without a value."""
-    codes = ((modes * 8 + lead_bins(margins)) * 16 + kinds) * 2 + own
-    order = np.argsort(codes, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(codes[order])) + 1) if len(order) else []
 
 
 def _plain(model: PropertyModel, *, governed: bool) -> bool:

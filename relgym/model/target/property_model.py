@@ -383,6 +383,15 @@ class PropertyModel:
         """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
         return self.record.assess_many(key, values)
 
+    @property
+    def cells(self) -> tuple[Key, ...]:
+        """Kinds of predictions that somebody looked back at, in order."""
+        return self.record.cells
+
+    def assessed(self, key: Key, able: int) -> Assessment:
+        """`assess` where those experts have a value that bits tell; persistence always has."""
+        return self.record.assessed(key, able)
+
     def claims(self, told: Assessment) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
         if told.speaker not in (OWN, LATEST) and told.speaker < len(EXPERTS):
@@ -398,16 +407,21 @@ class PropertyModel:
         kinds = [told for _, told in self.record.kinds(_PREDICTED)]
         return bool(kinds) and not any(map(self.claims, kinds))
 
+    @property
+    def asks_latest(self) -> bool:
+        """Whether the mode that held last is asked: not where the vote's winners are mostly right."""
+        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
+        asked = self.rough or self.record.doubts(_PREDICTED, self.config.claim_probability)
+        return known and asked and len(self.classifier.modes) >= 2
+
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
         """What the mode that held last says of one object of n scenes, shape ``(n,)``; None where nobody asks it.
 
-        Nobody does where the vote's winners are mostly right. NaN where its roles are open.
+        NaN where its roles are open.
         """
-        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
-        asked = self.rough or self.record.doubts(_PREDICTED, self.config.claim_probability)
-        if not known or not asked or len(self.classifier.modes) < 2:
+        if not self.asks_latest:
             return None
         x = percept.rows(index, following, ordered=False)
         return self.functions.values(percept.situation(index).signature, x, (self.latest,))[:, 0]
