@@ -58,7 +58,7 @@ FACADE_USERS = frozenset({"experiments", "console", "cli"})
 CORE_LIBRARIES = frozenset({"msgspec", "numpy", "scipy"})
 FCL = "relgym.scene.geometry.fcl"
 """The only module that may import python-fcl."""
-KERNEL = "relgym.program.compiling"
+KERNEL = "relgym.program.kernel"
 """The only module that may import numba."""
 
 HEAVY = (

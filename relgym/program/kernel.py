@@ -10,11 +10,13 @@ looks at the file that a function is defined in, not at what it calls. Importing
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
 
+import numba
 import numpy as np
 
-from relgym.program.compiling import compiled, entered
 from relgym.program.tape import (
     ANGLES,
     ANSWERS,
@@ -55,6 +57,23 @@ from relgym.program.tape import (
 )
 
 __all__ = ["is_compiled", "run"]
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def compiled(function: _F) -> _F:
+    """Compile together with what calls it; nothing else can."""
+    found: _F = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    return found
+
+
+def entered(function: _F) -> _F:
+    """Compile when first called; keep what was compiled on disk, where some folder can be written to."""
+    try:
+        found: _F = numba.njit(error_model="numpy", no_cfunc_wrapper=True, cache=True)(function)
+    except RuntimeError:  # no folder for the cache
+        found = numba.njit(error_model="numpy", no_cfunc_wrapper=True)(function)
+    return found
 
 
 def is_compiled() -> bool:
