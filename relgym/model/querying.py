@@ -19,7 +19,7 @@ from relgym.model.scenes import wrap
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["derive", "predict", "predict_many"]
+__all__ = ["derive", "predict", "predict_many", "settled"]
 
 _PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED, _UNSURE = (
     OUTCOMES.index(o)
@@ -46,17 +46,17 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
                 one = replace(one, outcome=outcome, mode=0, spread=np.nan)
-            one = _settled(parts, target, percept, index, following, one)
+            one = settled(parts, target, percept, index, following, one)
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
-            found.append(replace(one, object=layout.names[index], property=target.property))
+            found.append(one)
     derive(parts.schema, layout, scene.vector[None], following[None])
     wrap(layout, following)
     return ScenePrediction(Scene(scene.schema, layout, following), tuple(found))
 
 
-def _settled(
+def settled(
     parts: Parts,
     target: Target,
     percept: Percept,
@@ -64,29 +64,45 @@ def _settled(
     following: NDArray[np.float64],
     one: Prediction,
 ) -> Prediction:
-    """A prediction with the value of who codes such ones best, and how right that will be."""
+    """A prediction with the value of who codes such ones best, how right that will be, and what it is of.
+
+    Parameters
+    ----------
+    parts, target, percept, index
+        The model, and of which object of which scene what is predicted.
+    following
+        Next values as far as they are predicted, the present one of this property, shape ``(width,)``.
+    one
+        What modes or laws say; its value is NaN where they say nothing.
+    """
     model = parts.models[target]
     values = _experts_one(parts, target, percept, index, following, one.value)
     winner = -one.mode if parts.governs(target) else one.mode
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
     told = model.assess(key, values)
-    if told.speaker == LATEST and one.mode:
-        one = replace(one, mode=model.latest, roles=one.roles[:1])
-    spread = one.spread
+    mode, roles, spread = one.mode, one.roles, one.spread
+    if told.speaker == LATEST and mode:
+        mode, roles = model.latest, roles[:1]
     if told.speaker == GUESS:
         best = model.guess_at(percept, index, following)
         spread = spread if best is None else best.mode.sigma
     elif told.speaker != OWN:
-        spread = np.nan if told.speaker == PERSISTENCE else told.spread
-    return replace(
-        one,
-        value=values[told.speaker],
-        outcome=_outcome(one, claimed=model.claims(told), known=bool(model.calibration.trials)),
-        spread=spread,
-        probability=told.probability,
-        interval=told.interval,
-        audit=Audit(key, values, told.speaker),
+        spread = math.nan if told.speaker == PERSISTENCE else told.spread
+    outcome = _outcome(one, claimed=model.claims(told), known=bool(model.calibration.trials))
+    return Prediction(
+        percept.layout.names[index],
+        target.property,
+        values[told.speaker],
+        outcome,
+        mode,
+        roles,
+        one.margin,
+        one.frame,
+        spread,
+        told.probability,
+        told.interval,
+        Audit(key, values, told.speaker),
     )
 
 
@@ -101,8 +117,7 @@ def _experts_one(
     """`_experts` of a single scene."""
     model = parts.models[target]
     found = [math.nan] * len(EXPERTS)
-    present = float(following[percept.layout.column(index, target.property)])
-    found[PERSISTENCE] = present
+    present = found[PERSISTENCE] = float(following[percept.layout.column(index, target.property)])
     if math.isfinite(own):
         found[OWN] = own
     if model.guesses_something:
@@ -203,7 +218,7 @@ def _settled_many(
     following: NDArray[np.float64],
     verdict: Verdict,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """`_settled` of n scenes: values, probabilities and intervals, shape ``(n,)`` each; outcomes change in place."""
+    """`settled` of n scenes: values, probabilities and intervals, shape ``(n,)`` each; outcomes change in place."""
     model = parts.models[target]
     said = _experts(parts, target, percept, index, following, verdict.values)
     values, probability, interval = (np.full(len(said), np.nan) for _ in range(3))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -18,17 +19,20 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.errors import SlowWarning
-from relgym.model.calibration import OWN, Audit, key_of, lead_bins
+from relgym.model.calibration import OWN, key_of, lead_bins
+from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
 from relgym.model.motion import TOUCHING
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.property_model import PropertyModel
+from relgym.model.querying import derive, settled
+from relgym.model.scenes import wrap
 from relgym.model.spread import Spreads, action_columns
 from relgym.model.spread_split import place_of
 from relgym.program.records import Answer, BeyondError, Program
-from relgym.program.tape import encoded
+from relgym.program.tape import Tape, encoded
 from relgym.scene.objects import Scene, SceneLayout
 
 if TYPE_CHECKING:
@@ -54,6 +58,8 @@ _Bits = NDArray[np.int64]
 class Programs:
     """The programs of one model, by layout; holds only what can be worked out again.
 
+    A program stays as long as the model holds what it was lowered from (`relgym.model.grounds`), whatever is learned.
+
     Attributes
     ----------
     changes
@@ -62,18 +68,17 @@ class Programs:
 
     def __init__(self) -> None:
         self.changes = 0
-        self._known: dict[int, tuple[SceneLayout, Parts, Runner | None]] = {}
+        self._grounds: Grounds | None = None
+        self._known: dict[int, _Known] = {}
         self._asked = 0
+        self._looked = 0  # at the grounds, after so many changes
 
     def __reduce__(self) -> tuple[type[Programs], tuple[()]]:
         return Programs, ()
 
     def changed(self) -> None:
-        """The model isn't what it was: programs are out of date."""
+        """The model isn't what it was: programs may be out of date."""
         self.changes += 1
-        self._asked = 0
-        if self._known:
-            self._known.clear()
 
     def of(self, parts: Parts, layout: SceneLayout, scenes: int) -> Runner | None:
         """What runs the program for a layout; None: arrays answer.
@@ -87,19 +92,43 @@ class Programs:
         scenes
             How many are asked.
         """
+        if (kernel := KERNEL.after(scenes)) is None:
+            return None
+        if self._grounds is None or self._looked != self.changes:
+            self._look(parts)
         known = self._known.get(id(layout))
-        if known is not None and known[0] is layout and known[1] is parts:
-            return known[2]
+        if known is not None and known.layout is layout and known.parts is parts:
+            if known.changes != self.changes and known.runner is not None:
+                known.runner.follow()
+            known.changes = self.changes
+            return known.runner
         self._asked += scenes
-        if (kernel := KERNEL.after(scenes)) is None or self._asked < PATIENCE:
+        if self._asked < PATIENCE:
             return None
         runner: Runner | None
         try:
             runner = Runner(parts, layout, lowered(parts, layout), kernel)
         except BeyondError:
             runner = None
-        self._known[id(layout)] = (layout, parts, runner)
+        self._known[id(layout)] = _Known(layout, parts, runner, self.changes)
         return runner
+
+    def _look(self, parts: Parts) -> None:
+        """Drop all programs if they were lowered from something else than the model now holds."""
+        grounds, self._looked = Grounds.of(parts), self.changes
+        if self._grounds is None or not self._grounds.same(grounds):
+            self._grounds, self._asked = grounds, 0
+            self._known.clear()
+
+
+@dataclass(slots=True)
+class _Known:
+    """What runs the program for a layout, None where there is none, and after how many changes it was up to date."""
+
+    layout: SceneLayout
+    parts: Parts
+    runner: Runner | None
+    changes: int
 
 
 class Kernel:
@@ -173,14 +202,10 @@ class Runner:
     parts, layout, program, kernel
         The model, the layout, the program for it, and the module that runs it.
 
-    Raises
-    ------
-    BeyondError
-        Others than modes and laws may give values, as far as anybody looked back: arrays know them.
     """
 
     def __init__(self, parts: Parts, layout: SceneLayout, program: Program, kernel: ModuleType) -> None:
-        self._layout = layout
+        self._parts, self._layout = parts, layout
         self.program = program
         tape = encoded(program)
         self._run = kernel.run
@@ -193,9 +218,30 @@ class Runner:
         self._frames = tuple(frame if a.component >= 0 else "world" for a in program.answers)
         self._tellers = tuple(_Teller(parts, layout, a, frame) for a in program.answers)
         self._needed = frozenset(key for a in program.answers for key in a.needs)
-        if not all(t.plain or not t.model.calibration.trials for t in self._tellers):
-            raise BeyondError("values that guesses, regressions or former modes may give")
-        self._plain = all(t.plain for t in self._tellers)
+        self._voted = tuple(t.model for t in self._tellers if t.answer.vote is not None)
+        self._votes: list[list[tuple[int, int]] | None] = []
+        self._lay(tape)
+
+    def _lay(self, tape: Tape) -> None:
+        """Take note of where votes stand in the tape that is run, and write those that hold now."""
+        self._places = tape.votes
+        self._votes = [None for places, _ in tape.votes for _ in places]
+        self.follow()
+
+    def follow(self) -> None:
+        """Write the votes that hold now into the program; all else that it says is as it was."""
+        code, k, moved = self._space["code"][0], 0, False
+        for model, (places, by_tie) in zip(self._voted, self._places, strict=True):
+            voting = model.classifier._voting
+            for place, votes in zip(places, voting._votes, strict=True):
+                if votes is not self._votes[k]:  # they are counted into a list of their own
+                    self._votes[k], moved = votes, True
+                    code[place : place + 2 * len(votes)] = [v for pair in votes for v in pair]
+                k += 1
+            first = voting._by_tie(model.classifier.counts)
+            code[by_tie : by_tie + len(first)] = first
+        if moved:
+            self._space["memory_keys"] = 0  # answers that are remembered were voted for as it was before
 
     def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """Predict what follows n scenes; None: arrays must, or can say why not."""
@@ -206,6 +252,8 @@ class Runner:
         ):  # finite numbers may add up to infinity
             return None
         calibrated = any(t.model.calibration.trials for t in self._tellers)
+        if calibrated and not all(_plain(t.model, governed=t.answer.component >= 0) for t in self._tellers):
+            return None  # guesses, regressions or former modes may give values
         told = self._told(vectors, len(vectors) if calibrated else 1)
         if told is None:
             return None
@@ -255,10 +303,12 @@ class Runner:
             outcomes[rows[changed]] = _PREDICTED if claimed else _UNSURE
         return True
 
-    def one(self, scene: Scene) -> ScenePrediction | None:
-        """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not."""
-        if not self._plain:
-            return None
+    def one(self, scene: Scene, percept: Percept) -> ScenePrediction | None:
+        """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not.
+
+        What the program says is what arrays would have said of modes and laws; whose value counts is settled as there
+        (`relgym.model.querying.settled`).
+        """
         now = scene.vector
         told = self._told(now[None], 1)
         if told is None:
@@ -266,13 +316,28 @@ class Runner:
         after, players = told.following[0], told.players[0]
         outcomes, modes = told.outcomes[0].tolist(), told.modes[0].tolist()
         margins, noted = told.margins[0].tolist(), told.noted[0].tolist()
+        following, own = now.copy(), True
         found: list[Prediction] = []
         for k, teller in enumerate(self._tellers):
-            one = teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
-            if one is None or (one.ok != (outcomes[k] == _PREDICTED) and teller.answer.key in self._needed):
+            a = teller.answer
+            raw = teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
+            if raw is None:
+                return None
+            one = settled(self._parts, teller.target, percept, teller.index, following, raw)
+            following[a.column] = one.value
+            if one.value != after[a.column]:
+                own = False
+                if a.key in self._needed:
+                    return None
+            if one.ok != (outcomes[k] == _PREDICTED) and a.key in self._needed:
                 return None
             found.append(one)
-        return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
+        if own:
+            following = after
+        else:
+            derive(scene.schema, self._layout, now[None], following[None])
+            wrap(self._layout, following)
+        return ScenePrediction(Scene(scene.schema, self._layout, following), tuple(found))
 
     def _told(self, vectors: NDArray[np.float64], told: int) -> _Told | None:
         """Run the program. What it writes to is new each time: another thread may ask before this one has read it."""
@@ -295,23 +360,27 @@ class _Teller:
     ----------
     answer, model
         The answer, and the model of its target.
-    plain
-        Whether none but modes, laws, and that nothing changes have values for it (`relgym.model.calibration`).
+    target, index
+        Which property of which object it is of.
     """
 
-    __slots__ = ("_body_names", "_frame", "_modes", "_spreads", "answer", "model", "plain")
+    __slots__ = (
+        *("_body_names", "_frame", "_modes", "_spreads", "_turns"),
+        *("answer", "index", "model", "target"),
+    )
 
     def __init__(self, parts: Parts, layout: SceneLayout, answer: Answer, frame: str) -> None:
         self.answer, self._frame = answer, frame
         self._body_names = tuple(layout.names[i] for i in layout.bodies)
         self._modes = {mode.id: mode for mode in answer.modes}
-        index = layout.index(answer.object)
+        index = self.index = layout.index(answer.object)
         model = self.model = parts.property_model(layout.types[index].name, answer.property)
+        self.target = model.target
+        self._turns = answer.property in layout.types[index].angles
         situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)
         signature = situation.signature
         gather = parts.perception.gather(layout, signature, tuple(situation.plain.tolist())).tolist()
         self._spreads = _spreads(model.spreads, signature, gather) if answer.modes else {}
-        self.plain = _plain(model, governed=answer.component >= 0)
 
     def tell(
         self,
@@ -323,49 +392,28 @@ class _Teller:
         noted: int,
         players: _Bits,
     ) -> Prediction | None:
-        """The prediction of a scene; `noted` is the mode that gave the value, or of laws whom the body touches.
+        """What modes or laws say of a scene; `noted` is the mode that gave the value, or of laws whom the body touches.
 
-        None where it isn't the winner who gives the value, though it has one, or whether it has one isn't told.
+        None where whether they have a value isn't told, or what it was before a turn was taken off.
         """
         a = self.answer
         lawful = a.component >= 0
         if lawful and outcome == _DEPENDS:
             return None
-        own = outcome == _PREDICTED if lawful else noted > 0
-        value, present = float(after[a.column]), float(now[a.column])
+        value = math.nan
+        if outcome == _PREDICTED if lawful else noted > 0:
+            value = float(after[a.column])
+            if self._turns and abs(value - now[a.column]) > math.pi:
+                return None
         roles: tuple[str, ...] = ()
         spread = math.nan
         if lawful and mode:
             roles = (a.object, *(name for k, name in enumerate(self._body_names) if noted >> k & 1))
-        elif own and not lawful:
+        elif noted > 0 and not lawful:
             spread = self._spreads[noted](now) if noted in self._spreads else math.nan
             roles = self._roles(mode, players) if mode else ()
-        nothing = math.nan
-        values = (value if own else nothing, nothing, nothing, nothing, nothing, present)
-        key = key_of(_PREDICTED if mode else outcome, -mode if lawful else mode, margin)
-        said = self.model.assess(key, values)
-        if own and said.speaker != OWN:
-            return None
-        claimed = self.model.claims(said)
-        if outcome == _PREDICTED and not claimed:
-            outcome = _UNSURE
-        elif outcome == _UNEXPLAINED and mode and claimed and self.model.calibration.trials:
-            outcome = _PREDICTED
         frame = self._frame if lawful and mode == TOUCHING else "world"
-        return Prediction(
-            a.object,
-            a.property,
-            value,
-            OUTCOMES[outcome],
-            mode,
-            roles,
-            margin,
-            frame,
-            spread if own else nothing,
-            said.probability,
-            said.interval,
-            Audit(key, values, said.speaker),
-        )
+        return Prediction("", "", value, OUTCOMES[outcome], mode, roles, margin, frame, spread)
 
     def _roles(self, mode: int, players: _Bits) -> tuple[str, ...]:
         known = self._modes.get(mode)
