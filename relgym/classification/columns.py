@@ -66,9 +66,17 @@ class Columns:
 
     def write(self, row: int, values: Mapping[str, Any]) -> None:
         """Set one row's arrays, growing axes as needed; elements that a smaller value leaves get the fill."""
-        arrays = {name: np.asarray(value) for name, value in values.items()}
-        self._grow(arrays)
-        for name, value in arrays.items():
+        known = self._arrays
+        others: dict[str, NDArray[Any]] = {}
+        for name, value in values.items():
+            if np.shape(value) == known[name].shape[1:]:
+                known[name][row] = value
+            else:
+                others[name] = np.asarray(value)
+        if not others:
+            return
+        self._grow(others)
+        for name, value in others.items():
             target = self._arrays[name]
             if value.shape != target.shape[1:]:
                 target[row] = self.columns[name].fill
