@@ -140,8 +140,15 @@ class Laws:
             kind = layout.types[layout.bodies[body]].name
             if said.get(body, 0) != len(self.learner.book.components(kind)):
                 return False
-        vector = percept.vectors[0]
-        return self.learner.confirm(cast, vector, following, touched, off, lambda: self._contacts(percept))
+        perception = percept.perception
+        return self.learner.confirm(
+            cast,
+            percept.vectors[0],
+            following,
+            touched,
+            off,
+            lambda vectors: self._contacts(perception.percept(layout, vectors)),
+        )
 
     def _shorter(self, type_name: str, models: Mapping[Target, PropertyModel]) -> bool:
         """Whether a type's motion takes fewer bits by laws than by modes of every component."""
