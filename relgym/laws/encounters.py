@@ -37,12 +37,10 @@ class _Waiting(NamedTuple):
     after: NDArray[np.float64]
 
     def finite(self) -> bool:
-        """Whether all that is kept of it are numbers; its bodies lie where they can."""
-        bodies = [int(side[self.pair]) for side in (self.cast.first, self.cast.second)]
-        state = self.cast.padded(self.vector[None])[:, 0]
-        read = [state[self.cast.velocities[:, bodies]], self.after[:, bodies]]
-        read += [state[self.cast.sources[body][1]] for body in bodies if body in self.cast.sources]
-        return all(np.isfinite(each).all() for each in read)
+        """Whether all that is kept of it are numbers: those of its scene are, but what is read may not be there."""
+        width, sources = self.cast.layout.width, self.cast.sources
+        read = [sources[body][1] for body in self.cast.pairs[self.pair] if body in sources]
+        return not any((places == width).any() for places in read)
 
 
 class EncounterStore:

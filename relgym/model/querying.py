@@ -76,8 +76,9 @@ def settled(
         What modes or laws say; its value is NaN where they say nothing.
     """
     model = parts.models[target]
-    values = _experts_one(parts, target, percept, index, following, one.value)
-    winner = -one.mode if parts.governs(target) else one.mode
+    lawful = parts.governs(target)
+    values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
+    winner = -one.mode if lawful else one.mode
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
     told = model.assess(key, values)
@@ -113,6 +114,8 @@ def _experts_one(
     index: int,
     following: NDArray[np.float64],
     own: float,
+    *,
+    lawful: bool,
 ) -> tuple[float, ...]:
     """`_experts` of a single scene."""
     model = parts.models[target]
@@ -123,7 +126,7 @@ def _experts_one(
     if model.guesses_something:
         guessed = model.guessed(percept, index, following[None])
         found[GUESS] = math.nan if guessed is None else float(guessed[0])
-    if parts.governs(target):
+    if lawful:
         return tuple(found)
     latest = model.latest_values(percept, index, following[None])
     found[LATEST] = math.nan if latest is None else float(latest[0])
