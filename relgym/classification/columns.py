@@ -55,21 +55,18 @@ class Columns:
         self._arrays[name][: self.size] = value
 
     def append(self) -> int:
-        """Add a row of fill values; its number."""
+        """Add a row, which is to be written; its number."""
         if self.size == self._capacity():
             self._rebuild(2 * self.size)
         self.size += 1
-        row = self.size - 1
-        for name, column in self.columns.items():
-            self._arrays[name][row] = column.fill
-        return row
+        return self.size - 1
 
     def write(self, row: int, values: Mapping[str, Any]) -> None:
-        """Set one row's arrays, growing axes as needed; elements that a smaller value leaves get the fill."""
+        """Set all of a row's arrays, growing axes as needed; elements that a smaller value leaves get the fill."""
         known = self._arrays
         others: dict[str, NDArray[Any]] = {}
         for name, value in values.items():
-            if np.shape(value) == known[name].shape[1:]:
+            if getattr(value, "shape", ()) == known[name].shape[1:]:
                 known[name][row] = value
             else:
                 others[name] = np.asarray(value)

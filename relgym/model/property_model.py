@@ -88,7 +88,7 @@ class PropertyModel(Answers):
         seen = self.clusterer.seen
         if not self.clusterer.clusters:
             return seen >= HOPELESS
-        return seen >= DOUBTFUL and bool((self.clusterer.labels[-DOUBTFUL:] == NOISE).mean() > 0.5)
+        return seen >= DOUBTFUL and _noisy(self.clusterer.labels[-DOUBTFUL:]) > 0.5
 
     @property
     def needs(self) -> frozenset[tuple[str, str]]:
@@ -121,7 +121,7 @@ class PropertyModel(Answers):
         """
         self._compare(situation, example, table.x[row], y)
         report = self.clusterer.learn_one(table, row, y, budget)
-        self._unsettled = float((self.clusterer.labels[-RECENT:] == NOISE).mean()) > LEFT
+        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self._unexplained = self._assess()
@@ -323,3 +323,8 @@ class PropertyModel(Answers):
         self.limits = Limits.from_json(data.get("limits", {}))
         self.stops = Stops.from_json(data.get("stops", {}))
         self._bindings.clear()
+
+
+def _noisy(labels: NDArray[np.int32]) -> float:
+    """Share of some examples, one at least, that no mode explains."""
+    return np.count_nonzero(labels == NOISE) / len(labels)
