@@ -183,7 +183,7 @@ class Answers(StandIns):
         if not self.conditions.pairs:
             return first
         ahead = self.conditions.values(situation.signature, x)[0]
-        return replace(first, own=np.concatenate([first.own, ahead]))
+        return first.with_own(np.concatenate([first.own, ahead]))
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.

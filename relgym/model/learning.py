@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,7 +166,7 @@ def _learn_object(
     x = percept.rows(index, following[None])[0]
     bodies = bodies_of(situation.order[0], layout)
     row = table.add(situation.signature, x, situation.keys[0], bodies)
-    example = replace(situation.examples[0], key=situation.keys[0])
+    example = situation.examples.at(0, situation.keys[0])
     changes: dict[str, float] = {}
     rough = False
     for target in parts.targets:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -133,11 +132,11 @@ class PropertyModel(Answers):
             self._follow(table)
         number = len(self.clusterer.y) - 1
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
-        seen = replace(example, row=number, own=own)
+        seen = example.with_own(own, number)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(self._values_one(situation.signature, x[0].tolist(), self.classifier.modes))
         assigned = UNKNOWN if report.mode == NOISE or self.bounds(report.mode) else report.mode
-        played = self._played(table, np.array([number]), report.mode)[0].tolist()
+        played = self._played_one(table, number, report.mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played)
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
@@ -153,7 +152,7 @@ class PropertyModel(Answers):
             return
         values = self._values_one(situation.signature, row, self.classifier.modes)
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])
-        first = self.classifier.rank(replace(example, own=own), values).modes[0]
+        first = self.classifier.rank(example.with_own(own), values).modes[0]
         said = values[self.classifier.modes.index(first)]
         if np.isfinite(said):
             self.guesses.compare(said - y, binding.value(row) - y)

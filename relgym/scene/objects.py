@@ -85,13 +85,17 @@ class SceneLayout:
     @cached_property
     def places(self) -> Mapping[tuple[str, str], int]:
         """Column of each (object, property)."""
-        names = ((name, prop) for name, t in zip(self.names, self.types, strict=True) for prop in t.properties)
+        names = (
+            (name, prop) for name, t in zip(self.names, self.types, strict=True) for prop in t.properties
+        )
         return {key: column for column, key in enumerate(names)}
 
     @cached_property
     def angles(self) -> frozenset[int]:
         """Columns that hold angles, in radians."""
-        return frozenset(self.places[n, p] for n, t in zip(self.names, self.types, strict=True) for p in t.angles)
+        return frozenset(
+            self.places[n, p] for n, t in zip(self.names, self.types, strict=True) for p in t.angles
+        )
 
     @refusing(QueryError)
     def index(self, name: str) -> int:

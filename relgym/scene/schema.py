@@ -180,7 +180,9 @@ class SceneSchema:
         layout = self.layout(values)
         parts = [values[name] for name in layout.names]
         if not _plain(parts, layout.types):
-            parts = [_checked(name, t, p) for name, t, p in zip(layout.names, layout.types, parts, strict=True)]
+            parts = [
+                _checked(name, t, p) for name, t, p in zip(layout.names, layout.types, parts, strict=True)
+            ]
         vector = np.concatenate(parts) if parts else np.empty(0)
         if not np.isfinite(vector).all():
             for name, t, part in zip(layout.names, layout.types, parts, strict=True):
