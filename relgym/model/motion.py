@@ -96,12 +96,11 @@ class Laws:
         if not self.learner.sources:
             return
         self._seen += 1
-        if told is not None and self._seen % WEIGH_EVERY and self._confirmed(percept, following, stays, told):
-            self._last = None
-            return
-        motion = self._last[2] if self._last is not None and self._last[0] is percept else None
-        contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
-        changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
+        changed = False
+        if told is None or not self._confirmed(percept, following, stays, told):
+            motion = self._last[2] if self._last is not None and self._last[0] is percept else None
+            contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
+            changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
         self._last = None  # what the laws say may have changed
         if changed or self._seen % WEIGH_EVERY == 0:
             self.governed = frozenset(name for name in self.learner.types if self._shorter(name, models))
