@@ -1,9 +1,10 @@
-"""Asking the compiled program of a model: one scene or many, as long as the model stays as it is.
+"""Asking the compiled program of a model: one scene or many, as long as the model says the same.
 
 The kernel is loaded, and compiled where no file holds it, once so much was asked that it pays (`Kernel`). A program
-is lowered (`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model changed that
-it pays, too: lowering costs as much as arrays take for a few scenes. Until then, and where there is no program for what
-was learned, arrays answer (`relgym.model.querying`); all give the same bits.
+is lowered (`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model said
+something else that it pays, too: lowering costs as much as arrays take for a few scenes. What most transitions change,
+votes, is written into the program that there is. Until then, and where there is no program for what was learned, arrays
+answer (`relgym.model.querying`); all give the same bits.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ if TYPE_CHECKING:
 __all__ = ["KERNEL", "Kernel", "Programs"]
 
 PATIENCE = 8
-"""Scenes that arrays answer after each change of the model before a program is lowered: that takes about as long."""
+"""Scenes that arrays answer after each change of what a model says before a program is lowered: that takes about as
+long."""
 
 ASKING, SCENE = 5e-4, 6e-6
 """What arrays take to answer, in seconds: each time, and for each scene."""
