@@ -305,13 +305,15 @@ class Runner:
             outcomes[rows[changed]] = _PREDICTED if claimed else _UNSURE
         return True
 
-    def one(self, scene: Scene, percept: Percept) -> ScenePrediction | None:
+    def one(self, scene: Scene, percept: Percept | None = None) -> ScenePrediction | None:
         """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not.
 
         What the program says is what arrays would have said of modes and laws; whose value counts is settled as there
-        (`relgym.model.querying.settled`).
+        (`relgym.model.querying.settled`). A percept of the scene may be given, for what isn't asked of the program.
         """
         now = scene.vector
+        if percept is None:
+            percept = self._parts.perception.percept(self._layout, now[None])
         told = self._told(now[None], 1)
         if told is None:
             return None
