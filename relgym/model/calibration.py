@@ -268,7 +268,7 @@ class Calibration:
 
         A median, since a few crashes make most of the squares, and no outlier is to say what is right.
         """
-        return _quantile({k: n for k, n in self._changes.items() if k != _EXACT}, 0.5)
+        return _quantile(self._changes, 0.5, self._changes.get(_EXACT, 0.0))
 
     @property
     def slips(self) -> float:
@@ -475,9 +475,12 @@ def _counted(bins: dict[int, float], place: int) -> dict[int, float]:
     return {k: 0.5 * v for k, v in bins.items() if v > 2.0**-10}
 
 
-def _quantile(bins: Mapping[int, float], share: float) -> float:
-    """What a share of the sizes, and of one more, are no larger than; 0 where there are none."""
-    wanted, seen = share * (sum(bins.values()) + 1.0), 0.0
+def _quantile(bins: Mapping[int, float], share: float, exact: float = 0.0) -> float:
+    """What a share of the sizes, and of one more, are no larger than; 0 where there are none.
+
+    Of the sizes that are no larger than rounding so many are left aside: all, if any.
+    """
+    wanted, seen = share * (sum(bins.values()) - exact + 1.0), -exact
     for place in sorted(bins):
         before, seen = seen, seen + bins[place]
         if seen >= wanted:

@@ -96,12 +96,11 @@ class Laws:
         if not self.learner.sources:
             return
         self._seen += 1
-        if told is not None and self._seen % WEIGH_EVERY and self._confirmed(percept, following, stays, told):
-            self._last = None
-            return
-        motion = self._last[2] if self._last is not None and self._last[0] is percept else None
-        contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
-        changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
+        changed = False
+        if told is None or not self._confirmed(percept, following, stays, told):
+            motion = self._last[2] if self._last is not None and self._last[0] is percept else None
+            contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
+            changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
         self._last = None  # what the laws say may have changed
         if changed or self._seen % WEIGH_EVERY == 0:
             self.governed = frozenset(name for name in self.learner.types if self._shorter(name, models))
@@ -140,8 +139,15 @@ class Laws:
             kind = layout.types[layout.bodies[body]].name
             if said.get(body, 0) != len(self.learner.book.components(kind)):
                 return False
-        vector = percept.vectors[0]
-        return self.learner.confirm(cast, vector, following, touched, off, lambda: self._contacts(percept))
+        perception = percept.perception
+        return self.learner.confirm(
+            cast,
+            percept.vectors[0],
+            following,
+            touched,
+            off,
+            lambda vectors: self._contacts(perception.percept(layout, vectors)),
+        )
 
     def _shorter(self, type_name: str, models: Mapping[Target, PropertyModel]) -> bool:
         """Whether a type's motion takes fewer bits by laws than by modes of every component."""

@@ -129,11 +129,15 @@ class Tape:
         Shape ``(m,)``.
     roles
         Most roles of a mode that are cast, 1 at least.
+    votes
+        Of every answer that is voted for, in order: where the votes of each contest begin in the code, and where its
+        modes stand in the order in which they win ties.
     """
 
     code: NDArray[np.int64]
     numbers: NDArray[np.float64]
     roles: int
+    votes: tuple[tuple[tuple[int, ...], int], ...] = ()
 
     def space(self) -> NDArray[np.void]:
         """A work space with the tape in it, shape ``(1,)``."""
@@ -191,6 +195,7 @@ class _Writer:
         self.roles = 1
         self.variables = 1
         self.reads: set[int] = set()
+        self.votes: list[tuple[tuple[int, ...], int]] = []
 
     def put(self, *values: int) -> int:
         """Append whole numbers; where they begin."""
@@ -235,7 +240,9 @@ class _Writer:
         )
         head[ANGLES], head[AT_ANGLES] = len(p.angles), self.put(*p.angles)
         self._note_nexts()
-        return Tape(np.array(self.code, dtype=np.int64), np.array(self.numbers), self.roles)
+        return Tape(
+            np.array(self.code, dtype=np.int64), np.array(self.numbers), self.roles, tuple(self.votes)
+        )
 
     def _note_nexts(self) -> None:
         """Which next values a step reads or writes."""
@@ -372,12 +379,13 @@ class _Writer:
     def _vote(self, vote: ir.Vote | None) -> int:
         if vote is None:
             return 0
-        contests = []
+        contests, places = [], []
         for c in vote.contests:
             stages = [self._stage(stage) for stage in c.stages]
-            votes = self.put(*(v for pair in c.votes for v in pair))
+            places.append(votes := self.put(*(v for pair in c.votes for v in pair)))
             contests.append(self.put(c.first, c.second, c.context, votes, len(stages), *stages))
         by_tie = self.put(*vote.by_tie)
+        self.votes.append((tuple(places), by_tie))
         experience = 0
         if (known := vote.experience) is not None:
             seen = np.array(known.seen, dtype=np.uint64).view(np.int64).tolist()

@@ -20,12 +20,12 @@ from relgym.laws.frames import FRAMES, POINT, axis_names
 from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE, AxisLaw, FreeLaw, PairLaw, Piece, Share
 from relgym.model.calibration import EXPERTS, OWN, Audit, Key
-from relgym.model.hindsight import Hindsight
 from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
 from relgym.model.prediction import BatchPrediction
 from relgym.model.querying import predict_many
 from relgym.model.running import Runner
+from relgym.model.target.hindsight import Hindsight
 from relgym.model.world_model import WorldModel
 from relgym.program import kernel
 from relgym.scene.objects import POSE, Kinematics, ObjectType, SceneLayout, Target

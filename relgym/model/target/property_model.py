@@ -132,7 +132,7 @@ class PropertyModel:
         seen = self.clusterer.seen
         if not self.clusterer.clusters:
             return seen >= HOPELESS
-        return seen >= DOUBTFUL and bool((self.clusterer.labels[-DOUBTFUL:] == NOISE).mean() > 0.5)
+        return seen >= DOUBTFUL and _noisy(self.clusterer.labels[-DOUBTFUL:]) > 0.5
 
     @property
     def needs(self) -> frozenset[tuple[str, str]]:
@@ -165,7 +165,7 @@ class PropertyModel:
         """
         self._compare(situation, example, table.x[row], y)
         report = self.clusterer.learn_one(table, row, y, budget)
-        self._unsettled = float((self.clusterer.labels[-RECENT:] == NOISE).mean()) > LEFT
+        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
@@ -177,13 +177,13 @@ class PropertyModel:
             self._follow(table)
         number = len(self.clusterer.y) - 1
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
-        seen = replace(example, row=number, own=own)
+        seen = example.with_own(own, number)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(
             self.functions.values_one(situation.signature, x[0].tolist(), self.classifier.modes)
         )
         assigned = UNKNOWN if report.mode == NOISE or self.bounds(report.mode) else report.mode
-        played = self.functions.played(table, np.array([number]), report.mode)[0].tolist()
+        played = self.functions.played_one(table, number, report.mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played)
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
@@ -199,7 +199,7 @@ class PropertyModel:
             return
         values = self.functions.values_one(situation.signature, row, self.classifier.modes)
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])
-        first = self.classifier.rank(replace(example, own=own), values).modes[0]
+        first = self.classifier.rank(example.with_own(own), values).modes[0]
         said = values[self.classifier.modes.index(first)]
         if np.isfinite(said):
             self.fallback.guesses.compare(said - y, binding.value(row) - y)
@@ -464,7 +464,7 @@ class PropertyModel:
         if not self.conditions.pairs:
             return first
         ahead = self.conditions.values(situation.signature, x)[0]
-        return replace(first, own=np.concatenate([first.own, ahead]))
+        return first.with_own(np.concatenate([first.own, ahead]))
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
@@ -687,3 +687,8 @@ class PropertyModel:
         self.stops = Stops.from_json(data.get("stops", {}))
         self.functions.bound.clear()
         self.fallback.bound.clear()
+
+
+def _noisy(labels: NDArray[np.int32]) -> float:
+    """Share of some examples, one at least, that no mode explains."""
+    return np.count_nonzero(labels == NOISE) / len(labels)
