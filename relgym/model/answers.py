@@ -16,7 +16,7 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.mode import NOISE
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.model.calibration import LATEST, OWN, Assessment, Calibration, Key
+from relgym.model.calibration import Assessment, Calibration, Key
 from relgym.model.casting import Casting
 from relgym.model.conditions import Conditions
 from relgym.model.functions import Verdict
@@ -86,7 +86,7 @@ class Answers(StandIns):
         self.limits = Limits()
         self.stops = Stops()
         self.hindsight = Hindsight()
-        self.calibration = Calibration(config.claim_probability)
+        self.calibration = Calibration(config.claim_probability, config.claim_slips)
         self.latest = NOISE
         self._unsettled = True
         self.leaned_on = False
@@ -118,20 +118,15 @@ class Answers(StandIns):
         """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
         return self._record.assess_many(key, values)
 
-    def claims(self, told: Assessment) -> bool:
+    def claims(self, key: Key, told: Assessment) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
-        if told.speaker not in (OWN, LATEST):
-            return False
-        least, slips = self.config.claim_probability, self.config.claim_slips
-        if self._record.slips > slips:
-            least = max(least, 1.0 - slips)
-        return told.probability >= least or not self._record.trials
+        return self._record.claims(key, told)
 
     @property
     def doubtful(self) -> bool:
         """Whether no kind of its modes' predictions came true often enough to be claimed."""
-        kinds = [told for _, told in self._record.kinds(_PREDICTED)]
-        return bool(kinds) and not any(map(self.claims, kinds))
+        kinds = [(key, told) for key, _, told in self._record.kinds(_PREDICTED)]
+        return bool(kinds) and not any(self.claims(key, told) for key, told in kinds)
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]

@@ -60,9 +60,6 @@ LEAVE: Final = 1.1
 PRIOR: Final = 1.0
 """Trials that the prior of a share counts for, as Jeffreys' does."""
 
-YOUNG: Final = 256.0
-"""The share of slips is taken of at least so many predictions: one or two early ones say little."""
-
 COVERED: Final = 0.95
 """Share of what comes that intervals are to hold."""
 
@@ -74,6 +71,10 @@ OCTAVE: Final = 4
 
 _EXACT: Final = -(1 << 14)
 """The bin of errors no larger than rounding."""
+
+
+_OF_WINNER, _OF_FAMILY = -1, -2
+"""Bins of leads that stand for all of a winner's, and for those of all modes or all laws."""
 
 
 class Key(NamedTuple):
@@ -164,15 +165,26 @@ class _Record:
         self.hits += hit
         # Hits come in runs where little happens: what was doubted is believed after more of them.
         ended = before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= FEW)
-        if ended:
-            self.trials, self.hits = float(abs(self.run)), float(max(self.run, 0))
+        if ended:  # a run of hits begins with the miss that it follows: what failed once isn't right always
+            self.trials, self.hits = float(abs(self.run) + hit), float(max(self.run, 0))
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
         return ended
 
-    def share(self, prior: float) -> float:
-        """Posterior mean of the share of hits."""
-        return (self.hits + prior * PRIOR) / (self.trials + PRIOR)
+    def share(self, prior: float, bits: float = 0.0) -> float:
+        """Posterior mean of the share of hits.
+
+        One part of the prior has it that hits come in some share: a beta distribution of `PRIOR` trials around the
+        given mean. The other one, larger by so many bits, that what speaks is a law and always right: that holds until
+        the first miss.
+        """
+        some = (self.hits + prior * PRIOR) / (self.trials + PRIOR)
+        if self.hits < self.trials or not (self.trials or bits):
+            return some
+        n = self.trials  # all hits: how likely is that in a share of which nothing is known (Jeffreys' prior)?
+        by_chance = math.exp(math.lgamma(n + 0.5) - math.lgamma(n + 1.0) - bits * math.log(2.0))
+        by_chance /= math.sqrt(math.pi)
+        return 1.0 - (1.0 - some) * by_chance / (1.0 + by_chance)
 
 
 @dataclass(slots=True)
@@ -184,10 +196,17 @@ class _Cell:
     squares: list[
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials
+    heard: float = 0.0  # predictions, those of long ago counting less
 
     @classmethod
     def new(cls, speaker: int) -> _Cell:
         return cls(speaker, {}, [[0.0, 0.0, 0.0] for _ in EXPERTS])
+
+    def note(self, speaker: int, errors: Sequence[float], within: float) -> None:
+        """Take in whether the winner and the speaker were right, no more."""
+        for expert in {OWN, speaker}:
+            if errors[expert] == errors[expert]:
+                self.records.setdefault(expert, _Record()).count(errors[expert], within)
 
     def count(self, errors: Sequence[float], within: float) -> None:
         """Take in what each expert was off by; the best one speaks, if it leads by enough."""
@@ -207,6 +226,14 @@ class _Cell:
         if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
+
+    def sure(self, probability: float, bits: float) -> float:
+        """How probably what would be claimed is right, after this record alone; 0 if neither a mode nor a law speaks."""
+        able = [k for k, sums in enumerate(self.squares) if sums[0]]
+        speaker = self.preferred(able, probability) if able else OWN
+        known = self.records.get(speaker)
+        share = 0.5 if known is None else known.share(0.5, bits)
+        return share if speaker in (OWN, LATEST) else 0.0
 
     def left(self, expert: int) -> float:
         """Squares left of what saying that nothing changes leaves; infinite if the expert was never heard."""
@@ -242,6 +269,8 @@ class Calibration:
     probability
         How probable it must be that what the winner says is right, for it to be claimed
         (`ModelConfig.claim_probability`).
+    slips
+        Share of predictions that may be expected to be claimed and off (`ModelConfig.claim_slips`).
 
     Attributes
     ----------
@@ -249,16 +278,18 @@ class Calibration:
         Predictions that somebody looked back at.
     """
 
-    def __init__(self, probability: float = 0.9) -> None:
-        self.probability = probability
+    def __init__(self, probability: float = 0.9, slips: float = 0.0075) -> None:
+        self.probability, self.allowed = probability, slips
         self.trials = 0
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
+        self._least: dict[int, float] = {}  # probability that claims need, by who makes them
+        self._vouched = 0.0  # bits by which laws, when they came in force, described what came better than modes
         self._assessed: dict[Key, tuple[tuple[int, ...], Assessment]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_assessed": {}}
+        return self.__dict__ | {"_assessed": {}, "_least": {}}
 
     @property
     def change(self) -> float:
@@ -270,8 +301,8 @@ class Calibration:
 
     @property
     def slips(self) -> float:
-        """Share of the latest predictions that were claimed and off; of few, as if more had been right."""
-        return self._slips[1] / max(self._slips[0], YOUNG)
+        """Share of the latest predictions that were claimed and off."""
+        return self._slips[1] / max(self._slips[0], 1.0)
 
     # ------------------------------------------------------------------ what is made of a prediction
     def assess(self, key: Key, values: Sequence[float]) -> Assessment:
@@ -292,21 +323,63 @@ class Calibration:
             yield rows, self.assess(key, np.where(row, 0.0, np.nan).tolist())
 
     def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
-        default = next(k for k in _BY_DEFAULT if k in able)
-        whole, cell = self._cells.get(_whole(key)), self._cells.get(key)
-        if whole is None:
-            return Assessment(default, math.nan if not self.trials else 0.5, math.nan, math.nan)
-        trusted = cell if cell is not None and cell.squares[PERSISTENCE][0] >= FEW else whole
-        speaker = trusted.preferred(able, self.probability)
-        share = 0.5
-        for each in (whole, cell):
+        cells = [self._cells.get(each) for each in (_family(key), _winner(key), key)]
+        # Who speaks is told by this winner's record alone: what others won says nothing of a new law.
+        known = [c for c in cells[1:] if c is not None and c.squares[PERSISTENCE][0]]
+        if not known:
+            speaker = next(k for k in _BY_DEFAULT if k in able)
+        else:
+            trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
+            speaker = trusted.preferred(able, self.probability)
+        bits = self._bits(_who(key)) if speaker == OWN else 0.0
+        share = math.nan if not self.trials else _Record().share(0.5, bits)
+        for each in cells:
             if each is not None and speaker in each.records:
-                share = each.records[speaker].share(share)
+                share = each.records[speaker].share(share, bits)
+        if not known:
+            return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
         few = record is None or sum(record.errors.values()) < ENOUGH
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
         trials, own, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(own / trials) if trials else math.nan)
+
+    def claims(self, key: Key, told: Assessment) -> bool:
+        """Whether a prediction in a cell is claimed: a mode or a law speaks, and it is right probably enough.
+
+        The surest kinds are claimed first, as many as may together be expected to be off in no more than the share
+        allowed of what is predicted, and once more: a single miss tells no share. What doesn't speak any more isn't
+        counted: neither modes where laws predict, nor the reverse.
+        """
+        if told.speaker not in (OWN, LATEST):
+            return False
+        if not self.trials:
+            return True
+        who, cell = _who(key), self._cells.get(key)
+        if who not in self._least:
+            self._least[who] = self._needed(who)
+        share = told.probability if cell is None else cell.sure(self.probability, self._bits(who))
+        return min(told.probability, share) >= self.probability and share >= self._least[who]
+
+    def _needed(self, who: int) -> float:
+        """The least probability that is claimed."""
+        kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
+        left = 1.0 + self.allowed * sum(c.heard for c in kinds)
+        bits = self._bits(who)
+        for share, heard in sorted(((c.sure(self.probability, bits), c.heard) for c in kinds), reverse=True):
+            left -= (1.0 - share) * heard
+            if left < 0.0:
+                return math.nextafter(share, 2.0)
+        return 0.0
+
+    def _bits(self, who: int) -> float:
+        return self._vouched if who < 0 else 0.0
+
+    def vouch(self, bits: float) -> None:
+        """Laws come in force, which describe what came in so many bits less than modes: so much likelier they are."""
+        self._vouched = bits
+        self._assessed.clear()
+        self._least.clear()
 
     # ------------------------------------------------------------------ how it came out
     def look_back(
@@ -345,42 +418,53 @@ class Calibration:
         self._slips[1] += claimed and errors[audit.speaker] > within
         if self._slips[0] > MEMORY:
             self._slips = [0.5 * each for each in self._slips]
-        for key in dict.fromkeys((_whole(audit.key), audit.key)):
+            for cell in self._cells.values():
+                cell.heard *= 0.5
+        for key in (_family(audit.key), _winner(audit.key), audit.key):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker)
-            self._cells[key].count(errors, within)
+            if key.lead == _OF_FAMILY:
+                self._cells[key].note(audit.speaker, errors, within)
+            else:
+                self._cells[key].count(errors, within)
+        self._cells[audit.key].heard += 1.0
         self._assessed.clear()
+        self._least.clear()
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
-        self._cells = {k: c for k, c in self._cells.items() if k.winner <= 0 or k.winner in modes}
+        self._cells = {
+            k: c for k, c in self._cells.items() if k.winner <= 0 or k.lead == _OF_FAMILY or k.winner in modes
+        }
         self._assessed.clear()
+        self._least.clear()
 
     def doubts(self, outcome: int, probability: float) -> bool:
         """Whether what won the vote was right less often than that, or the mode that held last speaks instead."""
-        whole = self._cells.get(Key(outcome, -1, -1))
-        return whole is not None and (whole.speaker != OWN or self.share(outcome) < probability)
+        if not self.share(outcome) >= probability:
+            return _family(Key(outcome, 1, 0)) in self._cells
+        return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 
     def forget(self) -> None:
         """What follows is another model's word: only what mostly changes stays."""
-        self._cells, self._assessed, self.trials = {}, {}, 0
+        self._cells, self._assessed, self._least, self.trials, self._vouched = {}, {}, {}, 0, 0.0
 
     def share(self, outcome: int) -> float:
-        """Share of an outcome's predictions that were hits lately; NaN where there were none."""
-        whole = self._cells.get(_whole(Key(outcome, 0, 0)))
+        """Share of what modes predicted with an outcome that were hits lately; NaN where there were none."""
+        whole = self._cells.get(_family(Key(outcome, 1, 0)))
         own = None if whole is None else whole.records.get(OWN)
         return math.nan if own is None or not own.trials else own.hits / own.trials
 
-    def kinds(self, outcome: int) -> Iterator[tuple[float, Assessment]]:
-        """Trials of each kind of predictions of an outcome, and what is made of such a prediction."""
+    def kinds(self, outcome: int) -> Iterator[tuple[Key, float, Assessment]]:
+        """Each kind of predictions of an outcome, its trials, and what is made of such a prediction."""
         for key, cell in sorted(self._cells.items()):
-            if key.outcome == outcome and key != _whole(key):
-                yield cell.squares[PERSISTENCE][0], self._assess(key, tuple(range(len(EXPERTS))))
+            if key.outcome == outcome and key.lead >= 0:
+                yield key, cell.heard, self._assess(key, tuple(range(len(EXPERTS))))
 
     def united(self, other: Calibration) -> Calibration:
         """What two models know together: cell by cell, the record of who looked back more often."""
         more, less = (self, other) if self.trials >= other.trials else (other, self)
-        found = Calibration.from_json(more.to_json(), self.probability)
+        found = Calibration.from_json(more.to_json(), self.probability, self.allowed)
         for key, cell in Calibration.from_json(less.to_json(), self.probability)._cells.items():
             found._cells.setdefault(key, cell)
         found.trials = self.trials + other.trials
@@ -392,11 +476,13 @@ class Calibration:
         return {
             "trials": self.trials,
             "slips": list(self._slips),
+            "vouched": self._vouched,
             "changes": [[place, count] for place, count in sorted(self._changes.items())],
             "cells": [
                 {
                     "key": list(key),
                     "speaker": cell.speaker,
+                    "heard": cell.heard,
                     "records": [
                         [who, r.trials, r.hits, r.run, [[k, n] for k, n in sorted(r.errors.items())]]
                         for who, r in sorted(cell.records.items())
@@ -408,11 +494,12 @@ class Calibration:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any], probability: float) -> Calibration:
+    def from_json(cls, data: Mapping[str, Any], probability: float, slips: float = 0.0075) -> Calibration:
         """Read what `to_json` wrote."""
-        found = cls(probability)
+        found = cls(probability, slips)
         found.trials = int(data["trials"])
         found._slips = [float(each) for each in data["slips"]]
+        found._vouched = float(data["vouched"])
         found._changes = {int(place): float(count) for place, count in data["changes"]}
         for each in data["cells"]:
             records = {
@@ -420,13 +507,25 @@ class Calibration:
                 for who, n, hits, run, bins in each["records"]
             }
             squares = [[float(s) for s in sums] for sums in each["squares"]]
-            found._cells[Key(*map(int, each["key"]))] = _Cell(int(each["speaker"]), records, squares)
+            found._cells[Key(*map(int, each["key"]))] = _Cell(
+                int(each["speaker"]), records, squares, float(each["heard"])
+            )
         return found
 
 
-def _whole(key: Key) -> Key:
-    """The cell of all predictions of one outcome."""
-    return Key(key.outcome, -1, -1)
+def _who(key: Key) -> int:
+    """Who makes a prediction: laws (-1), modes (1), or neither (0)."""
+    return (key.winner > 0) - (key.winner < 0)
+
+
+def _family(key: Key) -> Key:
+    """The cell of all predictions of one outcome that laws, or modes, make."""
+    return Key(key.outcome, _who(key), _OF_FAMILY)
+
+
+def _winner(key: Key) -> Key:
+    """The cell of all predictions of one outcome and winner."""
+    return Key(key.outcome, key.winner, _OF_WINNER)
 
 
 def _place(error: float) -> int:

@@ -429,6 +429,7 @@ class CellRecord(Record):
 
     key: tuple[int, int, int]
     speaker: Expert
+    heard: Weight
     records: list[tuple[Expert, Weight, Weight, int, Bins]]
     squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6, max_length=6)]
 
@@ -438,6 +439,7 @@ class CalibrationRecord(Record):
 
     trials: Count
     slips: tuple[Weight, Weight]
+    vouched: Weight
     changes: Bins
     cells: list[CellRecord]
 

@@ -82,7 +82,7 @@ def _settled(
     return replace(
         one,
         value=values[told.speaker],
-        outcome=_outcome(one, claimed=model.claims(told), known=bool(model.calibration.trials)),
+        outcome=_outcome(one, claimed=model.claims(key, told), known=bool(model.calibration.trials)),
         spread=spread,
         probability=told.probability,
         interval=told.interval,
@@ -217,7 +217,7 @@ def _settled_many(
             if told.speaker == LATEST and key.winner:
                 verdict.modes[some] = model.latest
             before = verdict.outcomes[some]
-            if not model.claims(told):
+            if not model.claims(key, told):
                 verdict.outcomes[some[before == _PREDICTED]] = _UNSURE
             elif model.calibration.trials and key.winner:
                 verdict.outcomes[some[before == _UNEXPLAINED]] = _PREDICTED

@@ -246,7 +246,7 @@ class Runner:
             if said.speaker != OWN and own[row]:
                 return False
             probabilities[rows, k], intervals[rows, k] = said.probability, said.interval
-            claimed, before = model.claims(said), outcomes[rows]
+            claimed, before = model.claims(key, said), outcomes[rows]
             if claimed and not (trusted and winner):
                 continue
             changed = before == (_UNEXPLAINED if claimed else _PREDICTED)
@@ -346,7 +346,7 @@ class _Teller:
         said = self.model.assess(key, values)
         if own and said.speaker != OWN:
             return None
-        claimed = self.model.claims(said)
+        claimed = self.model.claims(key, said)
         if outcome == _PREDICTED and not claimed:
             outcome = _UNSURE
         elif outcome == _UNEXPLAINED and mode and claimed and self.model.calibration.trials:
