@@ -171,14 +171,17 @@ class _Record:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
         return ended
 
-    def share(self, prior: float, bits: float = 0.0) -> float:
-        """Posterior mean of the share of hits.
+    def mean(self, prior: float) -> float:
+        """Posterior mean of the share of hits, after a beta distribution of `PRIOR` trials around the given mean."""
+        return (self.hits + prior * PRIOR) / (self.trials + PRIOR)
 
-        One part of the prior has it that hits come in some share: a beta distribution of `PRIOR` trials around the
-        given mean. The other one, larger by so many bits, that what speaks is a law and always right: that holds until
-        the first miss.
+    def share(self, prior: float, bits: float = 0.0) -> float:
+        """How probably the next one is a hit.
+
+        One part of the prior has it that hits come in some share (`mean`). The other one, larger by so many bits, that
+        what speaks is a law and always right: that holds until the first miss.
         """
-        some = (self.hits + prior * PRIOR) / (self.trials + PRIOR)
+        some = self.mean(prior)
         if self.hits < self.trials or not (self.trials or bits):
             return some
         n = self.trials  # all hits: how likely is that in a share of which nothing is known (Jeffreys' prior)?
@@ -332,17 +335,16 @@ class Calibration:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, self.probability)
         bits = self._bits(_who(key)) if speaker == OWN else 0.0
-        share = math.nan if not self.trials else _Record().share(0.5, bits)
-        for each in cells:
-            if each is not None and speaker in each.records:
-                share = each.records[speaker].share(share, bits)
+        own = [_Record() if c is None else c.records.get(speaker, _Record()) for c in cells]
+        latest = own[2] if own[2].trials else own[1]
+        share = latest.share(own[0].mean(0.5), bits) if self.trials else math.nan
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
         few = record is None or sum(record.errors.values()) < ENOUGH
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
-        trials, own, _ = trusted.squares[speaker]
-        return Assessment(speaker, share, half, math.sqrt(own / trials) if trials else math.nan)
+        trials, squares, _ = trusted.squares[speaker]
+        return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
 
     def claims(self, key: Key, told: Assessment) -> bool:
         """Whether a prediction in a cell is claimed: a mode or a law speaks, and it is right probably enough.
@@ -364,7 +366,7 @@ class Calibration:
     def _needed(self, who: int) -> float:
         """The least probability that is claimed."""
         kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
-        left = 1.0 + self.allowed * sum(c.heard for c in kinds)
+        left = 1.0 + 0.5 * PRIOR + self.allowed * sum(c.heard for c in kinds)
         bits = self._bits(who)
         for share, heard in sorted(((c.sure(self.probability, bits), c.heard) for c in kinds), reverse=True):
             left -= (1.0 - share) * heard
