@@ -136,7 +136,7 @@ class Answers(StandIns):
         Nobody does where the vote's winners are mostly right. NaN where its roles are open.
         """
         known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
-        asked = self.rough or self._record.doubts(_PREDICTED, self.config.claim_probability)
+        asked = self.rough or self._record.doubts(_PREDICTED)
         if not known or not asked or len(self.classifier.modes) < 2:
             return None
         x = percept.rows(index, following, ordered=False)

@@ -2,22 +2,25 @@
 
 Several experts have a value for what comes next: the mode or law that won, the guess, regressions on everything, and
 that nothing changes. A learner that predicts before each step reports how each of them came out
-(`WorldModel.look_back`), and that is counted in *cells*: by outcome, winner, and how far it led its runner-up. Of a
-cell
+(`WorldModel.look_back`), and that is counted in *cells*: by outcome, winner, and how far it led its runner-up; in those
+of its winner where there are few trials. Of a cell
 
 - the expert who coded what came in fewest bits gives the value; another one takes over when it leads by
   `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984). A law that can be claimed keeps the word
   where it is hardly worse;
-- the *probability* of being right is the posterior mean of the share of hits, its prior that of all cells of the
-  outcome. A hit is off by no more than `ModelConfig.claim_error` of what mostly changes;
+- the *probability* of being right is the posterior mean of the share of hits, its prior that of all that modes, or
+  laws, said with this outcome; and until the first miss what speaks may be a law that is always right. A hit is off by
+  no more than `ModelConfig.claim_error` of what mostly changes;
 - the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
 
 A run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a law that changed is
 doubted at once, and a mode whose conditions were found is believed at once.
 
-A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`;
-where more than `ModelConfig.claim_slips` of a target's predictions were claimed and off lately, it must be that sure.
-Of a model that was never told how its predictions came out nothing is known, and nothing is doubted.
+A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
+Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
+`ModelConfig.claim_slips` of the target's predictions (selective prediction: Geifman & El-Yaniv 2017). That is reckoned
+from the records of those who speak now: what slipped before a law was known isn't held against the law. Of a model that
+was never told how its predictions came out nothing is known, and nothing is doubted.
 """
 
 from __future__ import annotations
@@ -441,9 +444,9 @@ class Calibration:
         self._assessed.clear()
         self._least.clear()
 
-    def doubts(self, outcome: int, probability: float) -> bool:
-        """Whether what won the vote was right less often than that, or the mode that held last speaks instead."""
-        if not self.share(outcome) >= probability:
+    def doubts(self, outcome: int) -> bool:
+        """Whether what won the vote was off more often than claims may be, or the mode that held last speaks instead."""
+        if not self.share(outcome) >= 1.0 - self.allowed:
             return _family(Key(outcome, 1, 0)) in self._cells
         return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 

@@ -395,7 +395,7 @@ def _plain(model: PropertyModel, *, governed: bool) -> bool:
     if governed:
         return True
     former = model.latest in model.clusterer.clusters and not model.bounds(model.latest)
-    doubted = model._record.doubts(_PREDICTED, model.config.claim_probability)
+    doubted = model._record.doubts(_PREDICTED)
     return not model.rough and not (former and doubted and len(model.classifier.modes) > 1)
 
 
