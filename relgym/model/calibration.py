@@ -149,29 +149,40 @@ class _Record:
     hits: float = 0.0
     run: int = 0  # of hits (> 0) or misses (< 0), up to now
     errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
+    runs: list[float] = field(default_factory=lambda: [0.0] * 4)  # over: trials in those of misses, of hits; how many
 
     def count(self, error: float, within: float) -> bool:
         """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
         self.errors = _counted(self.errors, _place(error))
         hit = error <= within
         if hit != (self.run > 0):
+            if self.run:
+                was = self.run > 0
+                self.runs[was] += abs(self.run)
+                self.runs[2 + was] += 1.0
             self.run = 0
         self.run += 1 if hit else -1
         # The run under way isn't part of the record that it is held against.
-        before = max(self.trials - (abs(self.run) - 1), 0.0)
+        length = abs(self.run)
+        before = max(self.trials - (length - 1), 0.0)
         share = (max(self.hits - max(self.run - 1, 0), 0.0) + 0.5) / (before + 1.0)
+        one = share if hit else max(1.0 - share, 1e-300)
+        # Where hits, or misses, come in bursts, a long one is no news.
+        trials, ends = self.runs[hit], self.runs[2 + hit]
+        again = max(one, (trials - ends + one) / (trials + 1.0))
         # It may have begun at any of the trials, which takes the logarithm of their number to say.
-        bits = -abs(self.run) * math.log2(share if hit else max(1.0 - share, 1e-300)) - math.log2(
-            before + 1.0
-        )
+        bits = -math.log2(one) - (length - 1) * math.log2(again) - math.log2(before + 1.0)
         self.trials += 1.0
         self.hits += hit
         # Hits come in runs where little happens: what was doubted is believed after more of them.
         ended = before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= FEW)
         if ended:  # a run of hits begins with the miss that it follows: what failed once isn't right always
             self.trials, self.hits = float(abs(self.run) + hit), float(max(self.run, 0))
+            self.runs = [0.0] * 4
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+        if self.runs[0] + self.runs[1] > MEMORY:
+            self.runs = [0.5 * each for each in self.runs]
         return ended
 
     def mean(self, prior: float) -> float:
@@ -489,7 +500,7 @@ class Calibration:
                     "speaker": cell.speaker,
                     "heard": cell.heard,
                     "records": [
-                        [who, r.trials, r.hits, r.run, [[k, n] for k, n in sorted(r.errors.items())]]
+                        [who, r.trials, r.hits, r.run, [[k, n] for k, n in sorted(r.errors.items())], list(r.runs)]
                         for who, r in sorted(cell.records.items())
                     ],
                     "squares": [list(sums) for sums in cell.squares],
@@ -508,8 +519,10 @@ class Calibration:
         found._changes = {int(place): float(count) for place, count in data["changes"]}
         for each in data["cells"]:
             records = {
-                int(who): _Record(float(n), float(hits), int(run), {int(k): float(c) for k, c in bins})
-                for who, n, hits, run, bins in each["records"]
+                int(who): _Record(
+                    float(n), float(hits), int(run), {int(k): float(c) for k, c in bins}, [float(c) for c in runs]
+                )
+                for who, n, hits, run, bins, runs in each["records"]
             }
             squares = [[float(s) for s in sums] for sums in each["squares"]]
             found._cells[Key(*map(int, each["key"]))] = _Cell(

@@ -423,14 +423,15 @@ Bins: TypeAlias = list[tuple[int, Weight]]
 class CellRecord(Record):
     """How one kind of predictions came out: its key, who speaks, and of every expert what it left.
 
-    A record is an expert, trials, hits, the run under way and bins of errors; squares are trials, the expert's own and
+    A record is an expert, trials, hits, the run under way, bins of errors, and of runs that are over the trials in those
+    of misses and of hits, and how many there were; squares are trials, the expert's own and
     those of saying that nothing changes.
     """
 
     key: tuple[int, int, int]
     speaker: Expert
     heard: Weight
-    records: list[tuple[Expert, Weight, Weight, int, Bins]]
+    records: list[tuple[Expert, Weight, Weight, int, Bins, tuple[Weight, Weight, Weight, Weight]]]
     squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6, max_length=6)]
 
 
