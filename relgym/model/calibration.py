@@ -149,7 +149,9 @@ class _Record:
     hits: float = 0.0
     run: int = 0  # of hits (> 0) or misses (< 0), up to now
     errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
-    runs: list[float] = field(default_factory=lambda: [0.0] * 4)  # over: trials in those of misses, of hits; how many
+    runs: list[float] = field(
+        default_factory=lambda: [0.0] * 4
+    )  # over: trials in those of misses, of hits; how many
 
     def count(self, error: float, within: float) -> bool:
         """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
@@ -198,7 +200,9 @@ class _Record:
         some = self.mean(prior)
         if self.hits < self.trials or not (self.trials or bits):
             return some
-        n = self.trials  # all hits: how likely is that in a share of which nothing is known (Jeffreys' prior)?
+        n = (
+            self.trials
+        )  # all hits: how likely is that in a share of which nothing is known (Jeffreys' prior)?
         by_chance = math.exp(math.lgamma(n + 0.5) - math.lgamma(n + 1.0) - bits * math.log(2.0))
         by_chance /= math.sqrt(math.pi)
         return 1.0 - (1.0 - some) * by_chance / (1.0 + by_chance)
@@ -268,10 +272,11 @@ class _Cell:
     def preferred(self, able: Collection[int], probability: float) -> int:
         """Who of those who have a value speaks.
 
-        The winner where that can be claimed and leaves hardly more than what anybody would try; else who codes best.
+        The winner where that can be claimed, is right as often as who codes best, and leaves hardly more than what
+        anybody would try; else who codes best.
         """
-        own = self.records.get(OWN)
-        if OWN in able and own is not None and own.share(0.5) >= probability:
+        own, other = self.records.get(OWN), self.records.get(self.speaker, _Record())
+        if OWN in able and own is not None and own.share(0.5) >= max(probability, other.share(0.5)):
             least = min(self.left(expert) for expert in _KNOWN if expert in able)
             if self.left(OWN) <= LEAVE * LEAVE * least:
                 return OWN
@@ -301,8 +306,10 @@ class Calibration:
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
-        self._least: dict[int, float] = {}  # probability that claims need, by who makes them
-        self._vouched = 0.0  # bits by which laws, when they came in force, described what came better than modes
+        self._least: dict[int, tuple[float, float]] = {}  # what claims need, by who makes them
+        self._vouched = (
+            0.0  # bits by which laws, when they came in force, described what came better than modes
+        )
         self._assessed: dict[Key, tuple[tuple[int, ...], Assessment]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -374,19 +381,24 @@ class Calibration:
         who, cell = _who(key), self._cells.get(key)
         if who not in self._least:
             self._least[who] = self._needed(who)
-        share = told.probability if cell is None else cell.sure(self.probability, self._bits(who))
-        return min(told.probability, share) >= self.probability and share >= self._least[who]
+        least, left = self._least[who]
+        if cell is None:
+            return told.probability >= self.probability and 1.0 - told.probability <= left
+        share = cell.sure(self.probability, self._bits(who))
+        return min(told.probability, share) >= self.probability and share >= least
 
-    def _needed(self, who: int) -> float:
-        """The least probability that is claimed."""
+    def _needed(self, who: int) -> tuple[float, float]:
+        """The least probability that is claimed, and how many more misses may be expected."""
         kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
         left = 1.0 + 0.5 * PRIOR + self.allowed * sum(c.heard for c in kinds)
         bits = self._bits(who)
         for share, heard in sorted(((c.sure(self.probability, bits), c.heard) for c in kinds), reverse=True):
+            if share < self.probability:
+                break
             left -= (1.0 - share) * heard
             if left < 0.0:
-                return math.nextafter(share, 2.0)
-        return 0.0
+                return math.nextafter(share, 2.0), 0.0
+        return 0.0, left
 
     def _bits(self, who: int) -> float:
         return self._vouched if who < 0 else 0.0
@@ -500,7 +512,14 @@ class Calibration:
                     "speaker": cell.speaker,
                     "heard": cell.heard,
                     "records": [
-                        [who, r.trials, r.hits, r.run, [[k, n] for k, n in sorted(r.errors.items())], list(r.runs)]
+                        [
+                            who,
+                            r.trials,
+                            r.hits,
+                            r.run,
+                            [[k, n] for k, n in sorted(r.errors.items())],
+                            list(r.runs),
+                        ]
                         for who, r in sorted(cell.records.items())
                     ],
                     "squares": [list(sums) for sums in cell.squares],
@@ -520,7 +539,11 @@ class Calibration:
         for each in data["cells"]:
             records = {
                 int(who): _Record(
-                    float(n), float(hits), int(run), {int(k): float(c) for k, c in bins}, [float(c) for c in runs]
+                    float(n),
+                    float(hits),
+                    int(run),
+                    {int(k): float(c) for k, c in bins},
+                    [float(c) for c in runs],
                 )
                 for who, n, hits, run, bins, runs in each["records"]
             }
