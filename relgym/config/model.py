@@ -72,8 +72,8 @@ class ModelConfig:
         what is seldom and unsure, too. It counts only where predictions are looked back at, as wrappers and
         `WorldModel.fit` do.
     claim_slips
-        Share of a property's predictions that may be expected to be claimed and off. The surest kinds of predictions are
-        claimed first, as many as that allows. Default 0.0075, range (0, 1]: less than a per cent, with a margin for
+        Share of a property's predictions that may be expected to be claimed and off. The surest kinds of predictions
+        are claimed first, as many as that allows. Default 0.0075, range (0, 1]: less than a per cent, with a margin for
         what is learned of the kinds meanwhile. Raising it claims more, and more of that is off.
     regression_columns
         Regressions on all that a target may depend on are made on at most so many columns, squares and products

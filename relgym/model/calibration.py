@@ -249,7 +249,7 @@ class _Cell:
             self.speaker = best
 
     def sure(self, probability: float, bits: float) -> float:
-        """How probably what would be claimed is right, after this record alone; 0 if neither a mode nor a law speaks."""
+        """How probably what would be claimed is right, after this record alone; 0 if no mode and no law speaks."""
         able = [k for k, sums in enumerate(self.squares) if sums[0]]
         speaker = self.preferred(able, probability) if able else OWN
         known = self.records.get(speaker)
@@ -306,7 +306,7 @@ class Calibration:
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
-        self._least: dict[int, tuple[float, float]] = {}  # what claims need, by who makes them
+        self._least: dict[int, float] = {}  # probability that claims need, by who makes them
         self._vouched = (
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
@@ -381,14 +381,11 @@ class Calibration:
         who, cell = _who(key), self._cells.get(key)
         if who not in self._least:
             self._least[who] = self._needed(who)
-        least, left = self._least[who]
-        if cell is None:
-            return told.probability >= self.probability and 1.0 - told.probability <= left
-        share = cell.sure(self.probability, self._bits(who))
-        return min(told.probability, share) >= self.probability and share >= least
+        share = told.probability if cell is None else cell.sure(self.probability, self._bits(who))
+        return min(told.probability, share) >= self.probability and share >= self._least[who]
 
-    def _needed(self, who: int) -> tuple[float, float]:
-        """The least probability that is claimed, and how many more misses may be expected."""
+    def _needed(self, who: int) -> float:
+        """The least probability that is claimed."""
         kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
         left = 1.0 + 0.5 * PRIOR + self.allowed * sum(c.heard for c in kinds)
         bits = self._bits(who)
@@ -397,8 +394,8 @@ class Calibration:
                 break
             left -= (1.0 - share) * heard
             if left < 0.0:
-                return math.nextafter(share, 2.0), 0.0
-        return 0.0, left
+                return math.nextafter(share, 2.0)
+        return 0.0
 
     def _bits(self, who: int) -> float:
         return self._vouched if who < 0 else 0.0
@@ -468,7 +465,7 @@ class Calibration:
         self._least.clear()
 
     def doubts(self, outcome: int) -> bool:
-        """Whether what won the vote was off more often than claims may be, or the mode that held last speaks instead."""
+        """Whether what won votes was off more often than claims may be, or the mode that held last spoke instead."""
         if not self.share(outcome) >= 1.0 - self.allowed:
             return _family(Key(outcome, 1, 0)) in self._cells
         return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)

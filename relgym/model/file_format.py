@@ -423,9 +423,9 @@ Bins: TypeAlias = list[tuple[int, Weight]]
 class CellRecord(Record):
     """How one kind of predictions came out: its key, who speaks, and of every expert what it left.
 
-    A record is an expert, trials, hits, the run under way, bins of errors, and of runs that are over the trials in those
-    of misses and of hits, and how many there were; squares are trials, the expert's own and
-    those of saying that nothing changes.
+    A record is an expert, trials, hits, the run under way, bins of errors, and of runs that are over the trials in
+    those of misses and of hits, and how many there were; squares are trials, the expert's own and those of saying that
+    nothing changes.
     """
 
     key: tuple[int, int, int]
