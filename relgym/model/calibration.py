@@ -169,7 +169,7 @@ class _Record:
         before = max(self.trials - (length - 1), 0.0)
         share = (max(self.hits - max(self.run - 1, 0), 0.0) + 0.5) / (before + 1.0)
         one = share if hit else max(1.0 - share, 1e-300)
-        # Where hits, or misses, come in bursts, a long one is no news.
+        # Where hits, or misses, mostly come in long runs, another one is no news.
         trials, ends = self.runs[hit], self.runs[2 + hit]
         again = max(one, (trials - ends + one) / (trials + 1.0))
         # It may have begun at any of the trials, which takes the logarithm of their number to say.
@@ -248,10 +248,10 @@ class _Cell:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
 
-    def sure(self, probability: float, bits: float) -> float:
+    def sure(self, claims: tuple[float, float], bits: float) -> float:
         """How probably what would be claimed is right, after this record alone; 0 if no mode and no law speaks."""
         able = [k for k, sums in enumerate(self.squares) if sums[0]]
-        speaker = self.preferred(able, probability) if able else OWN
+        speaker = self.preferred(able, claims) if able else OWN
         known = self.records.get(speaker)
         share = 0.5 if known is None else known.share(0.5, bits)
         return share if speaker in (OWN, LATEST) else 0.0
@@ -269,14 +269,16 @@ class _Cell:
         ratio = self.left(other) / self.left(expert)
         return 0.5 * trials * math.log2(min(max(ratio, 1e-300), 1e300))
 
-    def preferred(self, able: Collection[int], probability: float) -> int:
+    def preferred(self, able: Collection[int], claims: tuple[float, float]) -> int:
         """Who of those who have a value speaks.
 
-        The winner where that can be claimed, is right as often as who codes best, and leaves hardly more than what
-        anybody would try; else who codes best.
+        The winner where that can be claimed, is right as often as who codes best (or as it takes for all to be
+        claimed), and leaves hardly more than what anybody would try; else who codes best.
         """
         own, other = self.records.get(OWN), self.records.get(self.speaker, _Record())
-        if OWN in able and own is not None and own.share(0.5) >= max(probability, other.share(0.5)):
+        probability, slips = claims
+        least = max(probability, min(other.share(0.5), 1.0 - slips))
+        if OWN in able and own is not None and own.share(0.5) >= least:
             least = min(self.left(expert) for expert in _KNOWN if expert in able)
             if self.left(OWN) <= LEAVE * LEAVE * least:
                 return OWN
@@ -354,7 +356,7 @@ class Calibration:
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
-            speaker = trusted.preferred(able, self.probability)
+            speaker = trusted.preferred(able, (self.probability, self.allowed))
         bits = self._bits(_who(key)) if speaker == OWN else 0.0
         own = [_Record() if c is None else c.records.get(speaker, _Record()) for c in cells]
         latest = own[2] if own[2].trials else own[1]
@@ -381,15 +383,15 @@ class Calibration:
         who, cell = _who(key), self._cells.get(key)
         if who not in self._least:
             self._least[who] = self._needed(who)
-        share = told.probability if cell is None else cell.sure(self.probability, self._bits(who))
+        share = told.probability if cell is None else cell.sure((self.probability, self.allowed), self._bits(who))
         return min(told.probability, share) >= self.probability and share >= self._least[who]
 
     def _needed(self, who: int) -> float:
         """The least probability that is claimed."""
         kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
         left = 1.0 + 0.5 * PRIOR + self.allowed * sum(c.heard for c in kinds)
-        bits = self._bits(who)
-        for share, heard in sorted(((c.sure(self.probability, bits), c.heard) for c in kinds), reverse=True):
+        claims, bits = (self.probability, self.allowed), self._bits(who)
+        for share, heard in sorted(((c.sure(claims, bits), c.heard) for c in kinds), reverse=True):
             if share < self.probability:
                 break
             left -= (1.0 - share) * heard
