@@ -93,7 +93,9 @@ def settled(
         spread = spread if best is None else best.mode.sigma
     elif told.speaker != OWN:
         spread = math.nan if told.speaker == PERSISTENCE else told.spread
-    outcome = _outcome(one, told.speaker, claimed=model.claims(told), known=bool(model.calibration.trials))
+    outcome = _outcome(
+        one, told.speaker, claimed=model.claims(key, told), known=bool(model.calibration.trials)
+    )
     return Prediction(
         percept.layout.names[index],
         target.property,
@@ -251,9 +253,9 @@ def _settled_many(
             before = verdict.outcomes[some]
             if told.speaker >= len(EXPERTS):  # its word has nothing to do with modes
                 verdict.modes[some], verdict.margins[some] = 0, 0.0
-                before = np.where(model.claims(told), np.int8(_PREDICTED), before)
+                before = np.where(model.claims(key, told), np.int8(_PREDICTED), before)
                 verdict.outcomes[some] = before
-            if not model.claims(told):
+            if not model.claims(key, told):
                 verdict.outcomes[some[before == _PREDICTED]] = _UNSURE
             elif model.calibration.trials and key.winner:
                 verdict.outcomes[some[before == _UNEXPLAINED]] = _PREDICTED

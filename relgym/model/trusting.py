@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from relgym.model.calibration import Key
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.regression import Regression
@@ -59,16 +58,11 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
 
 def _beliefs(model: PropertyModel, able: int) -> list[ir.Belief]:
     """What is made of all kinds of predictions, whoever of those who may have a value has one."""
-    kinds = [Key(outcome, 0, -1) for outcome in range(KINDS)] + [k for k in model.cells if k.lead >= 0]
     some = [bits for bits in range(able + 1) if bits & ~able == 0]
-    found = []
-    for key in kinds:
-        for bits in some:
-            said = model.assessed(key, bits)
-            found.append(
-                ir.Belief(*key, bits, said.speaker, said.probability, said.interval, model.claims(said))
-            )
-    return found
+    return [
+        ir.Belief(*key, bits, told.speaker, told.probability, told.interval, claimed)
+        for key, bits, told, claimed in model.record.table(KINDS, some)
+    ]
 
 
 def _latest(model: PropertyModel, a: ir.Answer) -> tuple[int, ir.Sum] | None:

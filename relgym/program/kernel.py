@@ -1715,11 +1715,14 @@ def settled(s, a, k, value, outcome, mode, margin):
     if s.code[trust + 6]:
         latest = total(s, s.code[trust + 6])
         able |= 16 if math.isfinite(latest) else 0
-    number = ((winner * 16 + lead_of(margin) + 1) * 8 + kind) * 32 + able
+    number = ((winner * 16 + lead_of(margin) + 2) * 8 + kind) * 32 + able
     if s.believed[k, 0] != number:
         place = find(s, s.code[trust + 1], s.code[trust], number)
-        if place < 0:  # all of the outcome
-            place = find(s, s.code[trust + 1], s.code[trust], kind * 32 + able)
+        if place < 0:  # all of the winner
+            place = find(s, s.code[trust + 1], s.code[trust], ((winner * 16 + 1) * 8 + kind) * 32 + able)
+        if place < 0:  # all that modes, or laws, or neither say
+            who = np.int64(winner > 0) - np.int64(winner < 0)
+            place = find(s, s.code[trust + 1], s.code[trust], (who * 128 + kind) * 32 + able)
         s.believed[k, 0], s.believed[k, 1] = number, place
     place = s.believed[k, 1]
     said, sure = s.code[trust + 2] + 2 * place, s.code[trust + 3] + 2 * place

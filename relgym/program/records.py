@@ -492,8 +492,8 @@ class Belief:
     Attributes
     ----------
     outcome, winner, lead
-        The kind: its outcome, who gave the value (a mode, laws below 0; 0: nobody) and the bin of its lead; a lead of
-        -1 stands for all of the outcome that aren't told apart.
+        The kind: its outcome, who gave the value (a mode, laws below 0; 0: nobody) and the bin of its lead. A lead of
+        -1 stands for all others of the winner, -2 for those of all other modes (winner 1), laws (-1) or nobody (0).
     able
         Who of `EXPERTS` has a value, as bits, persistence left aside, which always has.
     speaker

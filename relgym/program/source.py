@@ -529,10 +529,10 @@ class _Source:
         if all(a.trust is None for a in self.program.answers):
             return
         add(
-            "# ---- how right predictions were: by outcome, mode (laws below 0), bin of the margin (-1: all others),"
+            "# ---- how right predictions were: by outcome, mode (laws below 0), bin of the margin (-1: all others,"
         )
         add(
-            "# and whose values there are (bits of EXPERTS): who speaks, how probably, within what, if it is claimed"
+            "# -2: of all other modes), and whose values there are (bits of EXPERTS): who speaks, and how sure that is"
         )
         add(f"EXPERTS = {ir.EXPERTS!r}")
         for a in self.program.answers:
@@ -771,7 +771,8 @@ def settled(number, value, outcome, mode, margin, guess, x):
     if margin > 0.0:
         lead = 7 if margin == math.inf else min(max(math.frexp(margin)[1] + 2, 1), 6)
     kind = PREDICTED if mode else outcome
-    known = beliefs.get((kind, winner, lead, able)) or beliefs[kind, 0, -1, able]
+    known = beliefs.get((kind, winner, lead, able)) or beliefs.get((kind, winner, -1, able))
+    known = known or beliefs[kind, (winner > 0) - (winner < 0), -2, able]
     speaker, probability, interval, claimed = known
     if not claimed:
         outcome = UNSURE if outcome == PREDICTED else outcome

@@ -495,7 +495,7 @@ class _Writer:
 
 def _kind(belief: ir.Belief) -> int:
     """The number of a kind of predictions, as the kernel works it out."""
-    return ((belief.winner * 16 + belief.lead + 1) * 8 + belief.outcome) * 32 + belief.able
+    return ((belief.winner * 16 + belief.lead + 2) * 8 + belief.outcome) * 32 + belief.able
 
 
 def _variables(literal: ir.Literal) -> set[int]:

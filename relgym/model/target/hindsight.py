@@ -180,5 +180,8 @@ def restore_calibration(parts: Parts, data: Mapping[str, Any]) -> None:
     for target in parts.targets:
         if str(target) in data:
             parts.models[target].calibration = Calibration.from_json(
-                data[str(target)], parts.config.claim_probability, len(parts.config.hypotheses)
+                data[str(target)],
+                parts.config.claim_probability,
+                parts.config.claim_slips,
+                len(parts.config.hypotheses),
             )

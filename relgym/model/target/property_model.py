@@ -20,7 +20,7 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
 from relgym.config.constants import HOPELESS
-from relgym.model.calibration import EXPERTS, LATEST, OWN, Assessment, Calibration, Key
+from relgym.model.calibration import EXPERTS, OWN, Assessment, Calibration, Key
 from relgym.model.grouping import distinct, members
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
@@ -114,7 +114,7 @@ class PropertyModel:
         self.stops = Stops()
         self.hindsight = Hindsight()
         self.candidates = Candidates(config.hypotheses)
-        self.calibration = Calibration(config.claim_probability, len(config.hypotheses))
+        self.calibration = Calibration(config.claim_probability, config.claim_slips, len(config.hypotheses))
         self.latest = NOISE
         self.leaned_on = False
         self._unsettled = True
@@ -383,35 +383,21 @@ class PropertyModel:
         """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
         return self.record.assess_many(key, values)
 
-    @property
-    def cells(self) -> tuple[Key, ...]:
-        """Kinds of predictions that somebody looked back at, in order."""
-        return self.record.cells
-
-    def assessed(self, key: Key, able: int) -> Assessment:
-        """`assess` where those experts have a value that bits tell; persistence always has."""
-        return self.record.assessed(key, able)
-
-    def claims(self, told: Assessment) -> bool:
+    def claims(self, key: Key, told: Assessment) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
-        if told.speaker not in (OWN, LATEST) and told.speaker < len(EXPERTS):
-            return False
-        least, slips = self.config.claim_probability, self.config.claim_slips
-        if self.record.slips > slips:
-            least = max(least, 1.0 - slips)
-        return told.probability >= least or not self.record.trials
+        return self.record.claims(key, told)
 
     @property
     def doubtful(self) -> bool:
         """Whether no kind of its modes' predictions came true often enough to be claimed."""
-        kinds = [told for _, told in self.record.kinds(_PREDICTED)]
-        return bool(kinds) and not any(map(self.claims, kinds))
+        kinds = [(key, told) for key, _, told in self.record.kinds(_PREDICTED)]
+        return bool(kinds) and not any(self.claims(key, told) for key, told in kinds)
 
     @property
     def asks_latest(self) -> bool:
         """Whether the mode that held last is asked: not where the vote's winners are mostly right."""
         known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
-        asked = self.rough or self.record.doubts(_PREDICTED, self.config.claim_probability)
+        asked = self.rough or self.record.doubts(_PREDICTED)
         return known and asked and len(self.classifier.modes) >= 2
 
     def latest_values(
