@@ -677,4 +677,4 @@ class PropertyModel:
 
 def _noisy(labels: NDArray[np.int32]) -> float:
     """Share of some examples, one at least, that no mode explains."""
-    return np.count_nonzero(labels == NOISE) / len(labels)
+    return float(np.count_nonzero(labels == NOISE)) / len(labels)
