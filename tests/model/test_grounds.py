@@ -86,6 +86,7 @@ def test_grounds_are_the_same_until_something_is_said_otherwise() -> None:
     known = Grounds.of(model._parts)
     assert known.same(Grounds.of(model._parts))
     target = model.targets[0]
-    model._parts.models[target].scope = type(model._parts.models[target].scope)()
+    fallback = model._parts.models[target].fallback
+    fallback.scope = type(fallback.scope)()
     assert not known.same(Grounds.of(model._parts))
     assert np.isfinite(env.scene.vector).all()
