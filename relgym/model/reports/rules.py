@@ -24,7 +24,7 @@ rests, and doesn't bounce with no velocity.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -190,7 +190,7 @@ def _property(part: PropertyModel) -> PropertyRules:
     roles: tuple[RuleRole, ...] = ()
     if part.classifier.modes:
         functions, roles = functions_of(part)
-        branches = (*_beyond(part), *_branches(part, functions))
+        branches = _within(part, _branches(part, functions))
     steps = part.clusterer.noise_examples + sum(mode.examples for mode in part.modes)
     return PropertyRules(
         target.type,
@@ -505,29 +505,43 @@ def _at_rest(part: PropertyModel, view: View) -> Iterator[_Atom]:
 
 
 # ------------------------------------------------------------------ what modes don't say
-def _beyond(part: PropertyModel) -> tuple[Branch, ...]:
-    """Branches of the places where no mode speaks."""
+def _within(part: PropertyModel, branches: tuple[Branch, ...]) -> tuple[Branch, ...]:
+    """Branches of where modes speak, and that nothing is predicted elsewhere, whichever is sooner said."""
     tree = part.fallback.scope.tree
     if tree is None:
-        return ()
-    leaves = [leaf for leaf in tree.leaves if not tree.says_yes(leaf)]
-    return tuple(
-        Branch((_path(tree, leaf, part.flags),), None, reason="unexplained there") for leaf in leaves
-    )
+        return branches
+    yes, no = (tuple(_parts(tree, 0, {}, part.flags, said=said)) for said in (True, False))
+    if not no:
+        return branches
+    if yes and len(branches) == 1 and not branches[0].cases and sum(map(len, yes)) <= sum(map(len, no)):
+        return replace(branches[0], cases=yes), Branch((), None, reason="unexplained elsewhere")
+    return Branch(no, None, reason="unexplained there"), *branches
 
 
-def _path(tree: DecisionTree, leaf: int, flags: frozenset[str]) -> Condition:
-    """Tests on the way to a leaf."""
-    parents = {}
-    for node, column in enumerate(tree.column):
-        if column >= 0:
-            parents[tree.below[node]], parents[tree.above[node]] = (node, "<="), (node, ">")
-    tests: list[Test] = []
-    while leaf in parents:
-        leaf, op = parents[leaf]
-        literal = Literal(tree.columns[tree.column[leaf]], (), False, op, tree.threshold[leaf])
-        tests += as_tests(Clause((_flagged(literal, flags),)), "all")
-    return tuple(reversed(tests))
+def _parts(
+    tree: DecisionTree,
+    node: int,
+    above: Mapping[tuple[int, str], float],
+    flags: frozenset[str],
+    *,
+    said: bool,
+) -> Iterator[Condition]:
+    """The largest parts of a tree that only say yes, or only no: of the tests on the way there the tightest ones."""
+    if all(tree.says_yes(leaf) is said for leaf in _leaves(tree, node)):
+        literals = (Literal(tree.columns[c], (), False, op, value) for (c, op), value in above.items())
+        yield tuple(test for one in literals for test in as_tests(Clause((_flagged(one, flags),)), "all"))
+    elif tree.column[node] >= 0:
+        column, value = tree.column[node], tree.threshold[node]
+        for op, below in (("<=", tree.below[node]), (">", tree.above[node])):
+            yield from _parts(tree, below, {**above, (column, op): value}, flags, said=said)
+
+
+def _leaves(tree: DecisionTree, node: int) -> Iterator[int]:
+    if tree.column[node] < 0:
+        yield node
+    else:
+        yield from _leaves(tree, tree.below[node])
+        yield from _leaves(tree, tree.above[node])
 
 
 def _bounds(part: PropertyModel) -> Iterator[Bound]:
