@@ -24,7 +24,7 @@ from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
-__all__ = ["extended"]
+__all__ = ["extended", "is_flag"]
 
 CONSTANT: Final = 1e-9
 """A column that varies by less, relative to what it does in the unexplained examples, is constant."""
@@ -71,10 +71,11 @@ def extended(
     bits = verifying_bits(known.y, known.scale)
     if not len(pool) or bits < FLAGGED:
         return None
-    value = float(known.y[pool[-1]])
-    half = least_examples(known.y, known.scale, known.config) / 2
-    if int((known.y[pool] == value).sum()) >= max(2, half) and bool(_flags(known.y)):
-        return LinearFit((), (), value, 0.0)
+    if is_flag(known.y):
+        value = float(known.y[pool[-1]])
+        half = least_examples(known.y, known.scale, known.config) / 2
+        if int((known.y[pool] == value).sum()) >= max(2, half):
+            return LinearFit((), (), value, 0.0)
     if not known.clusters:
         return None
     pool, exact = pool[-SEARCH:], bits >= EXACT and not flags
@@ -140,6 +141,11 @@ def _extended(
         if at in fit.columns and np.abs(y[rows] - fit.predict(x[rows])).max() <= tolerance:
             return reordered(fit, order)
     return None
+
+
+def is_flag(y: NDArray[np.float64]) -> bool:
+    """Whether a target never was anything but 0 and 1."""
+    return bool(y[-1] in (0.0, 1.0)) and bool(_flags(y))
 
 
 def _flags(values: NDArray[np.float64]) -> NDArray[np.bool_]:

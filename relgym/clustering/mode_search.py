@@ -18,7 +18,7 @@ from relgym.clustering.discovery import (
 )
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.extension import extended
+from relgym.clustering.extension import extended, is_flag
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
@@ -115,13 +115,17 @@ class ModeSearch:
 
     def discover(self, table: ExampleTable, example: int, budget: Budget) -> None:
         """An example is news: search for modes among its like, unless that is in vain, or one is under way."""
-        signature = int(table.signature_ids[self.population.rows[example]])
+        population = self.population
+        signature = int(table.signature_ids[population.rows[example]])
         search = self._searches.setdefault(signature, Search())
         search.waiting += 1
         slots = table.signatures[signature]
         patience = self._patience(search, bool(slots.features), bool(slots.features or slots.chained))
         if search.waiting <= patience or self._hunt is not None or not budget.left:
-            self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)  # costs little
+            if extended(
+                population.known(table), signature, self._newest(table, signature), fresh=1, flags=True
+            ):
+                self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)
             return
         self._hunt = Hunt(signature, search.waiting)
         self.pursue(table, budget)
@@ -222,10 +226,20 @@ class ModeSearch:
             return search.failures * search.failures
         return search.failures if doubtful else search.failures // 6
 
-    def _pool(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
-        """Noise examples of one signature that aren't some mode's tail, oldest first."""
+    def _newest(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
+        """The end of `_pool`, all that `extended` looks at: found without a look at everything that is remembered."""
+        if is_flag(self.population.y):  # how many took a value counts
+            return self._pool(table, signature)
+        found, end, block = np.empty(0, dtype=np.intp), len(self.population.y), 2 * SEARCH
+        while end > 0 and len(found) < SEARCH:
+            found = np.concatenate([self._pool(table, signature, slice(max(end - block, 0), end)), found])
+            end, block = end - block, 2 * block
+        return found[-SEARCH:]
+
+    def _pool(self, table: ExampleTable, signature: int, among: slice = slice(None)) -> NDArray[np.intp]:
+        """Noise examples of one signature that aren't some mode's tail, oldest first; default: among all."""
         population = self.population
-        pool: NDArray[np.intp] = np.flatnonzero(population.labels == NOISE)
+        pool: NDArray[np.intp] = np.flatnonzero(population.labels[among] == NOISE) + (among.start or 0)
         pool = pool[table.signature_ids[population.rows[pool]] == signature]
         if len(pool) and population.clusters:
             pool = pool[population.least_errors(table, pool) > population.scale.tail]
