@@ -16,6 +16,7 @@ from relgym.envs.arguments import checked_count, checked_least
 from relgym.envs.learned_model_rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
+from relgym.planning.doubts import DoubtedTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
 from relgym.planning.review import learned_again, right
@@ -201,7 +202,10 @@ class PlanningAgent:
         if self._simulator is not None:
             simulator: Simulator = self._simulator(self.trainer)
         else:
-            task = cast(TaskFunctions, self.trainer.reward_model)
+            told = self.trainer.reward_model
+            if isinstance(told, LearnedRewardModel):
+                told = DoubtedTask(told, seed=self._options["seed"])
+            task = cast(TaskFunctions, told)
             simulator = ModelSimulator(
                 self.model, self._like, view=self._recorder.view, task=task, repeat=self.repeat
             )
