@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import Any, Final, cast
 
 import gymnasium as gym
@@ -37,12 +38,15 @@ from relgym.wrappers.views import ViewLike
 
 __all__ = ["PlanningAgent"]
 
-_GROWTH: Final = 1.15
+_GROWTH: Final = 1.25
 """Between two reviews the agent's experience grows by this factor: all of them together cost as much as to learn from
 everything fifteen times, but they only take place while the model is wrong."""
 
-_ORDERS: Final = 2
-"""Random orders that a review tries: of few steps one may miss what another finds."""
+_ORDERS: Final = 3
+"""Random orders that a review tries at most: of few steps one may miss what another finds."""
+
+_FIRST_REVIEW: Final = 60
+"""Real steps before the first review."""
 
 _REMEMBERED: Final = 5_000
 """Latest real steps that a review looks at."""
@@ -124,7 +128,7 @@ class PlanningAgent:
         view: ViewLike = None,
         search: Search | None = None,
         repeat: int = 1,
-        random_steps: int = 150,
+        random_steps: int = 50,
         exploration: float = 0.5,
         discount: float = DISCOUNT,
         safe: bool = False,
@@ -153,13 +157,14 @@ class PlanningAgent:
         self.steps = 0
         self._like, self._simulator = env, simulator
         self._search = TreeSearch() if search is None else search
+        self._seed, self._doubted = seed, cast(DoubtedTask | None, None)
         self._options = {"commit": commit, "tolerance": tolerance, "seed": seed}
         self._rng = np.random.default_rng([seed, 5])
         self._history: deque[Experience] = deque(maxlen=_REMEMBERED)
         self._wrong: deque[bool] = deque(maxlen=_LATEST)
         self._task_wrong: deque[bool] = deque(maxlen=_LATEST)
         self._at_random = True
-        self._next_review = max(self.random_steps, 50)
+        self._next_review = _FIRST_REVIEW
         self._size = Spread()
         self._limit: int | None = None
         self._hold = 1
@@ -202,10 +207,7 @@ class PlanningAgent:
         if self._simulator is not None:
             simulator: Simulator = self._simulator(self.trainer)
         else:
-            told = self.trainer.reward_model
-            if isinstance(told, LearnedRewardModel):
-                told = DoubtedTask(told, seed=self._options["seed"])
-            task = cast(TaskFunctions, told)
+            task = cast(TaskFunctions, self._task())
             simulator = ModelSimulator(
                 self.model, self._like, view=self._recorder.view, task=task, repeat=self.repeat
             )
@@ -214,6 +216,15 @@ class PlanningAgent:
             simulator = Familiar(simulator, self.coverage)
         objective, options = self._objective(explores=explores), {"safe": safe, "limit": self._limit}
         return Planner(simulator, self._search, objective, **options, **self._options)  # type: ignore[arg-type]
+
+    def _task(self) -> Any:
+        """What steps are worth in plans: as far as what was seen bears out what was learned of it."""
+        own = self.trainer.reward_model
+        if not isinstance(own, LearnedRewardModel):
+            return own
+        if self._doubted is None or self._doubted.model is not own:
+            self._doubted = DoubtedTask(own, seed=self._seed)
+        return self._doubted
 
     def _objective(self, *, explores: bool) -> Objective:
         objective = Objective(discount=self.discount)
@@ -305,8 +316,8 @@ class PlanningAgent:
 
     def _take_up(self, real: Experience) -> None:
         """Learn from a real step."""
-        surplus, missed = self._surplus(self.trainer.reward_model, real)
-        self._task_wrong.append(missed)
+        surplus, missed = self._surplus(self.trainer.reward_model, [real])
+        self._task_wrong.append(bool(missed[0]))
         self.trainer.take_up(real)
         self.steps += 1
         self._size.add(real.reward)
@@ -325,7 +336,7 @@ class PlanningAgent:
                 after.vector,
                 before=real.start.vector,
                 surprised=self._surprised(),
-                surplus=surplus,
+                surplus=float(surplus[0]),
                 paid=real.reward,
             )
         if self.steps >= self._next_review:
@@ -343,8 +354,8 @@ class PlanningAgent:
     def _review(self) -> None:
         """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often.
 
-        Both are tested on steps that they had not learned from: the model at work when they came, the new one on the
-        latest of them before it learns those, too.
+        What they are compared by is what they make of all that was seen. A new model has learned from that, but laws
+        hold exactly or not at all: of few steps those that fit more of them hold more often elsewhere, too.
         """
         self._next_review = int(self.steps * _GROWTH) + 1
         if isinstance(self.model, WorldModel) and not self.model.frozen and any(self._wrong):
@@ -354,53 +365,64 @@ class PlanningAgent:
 
     def _review_model(self) -> None:
         seen = [real.transition for real in self._history]
-        count = min(len(self._wrong), len(seen) // 5)
-        least = sum(list(self._wrong)[-count:])
-        best = None
+        best, least = None, _faults(~right(self.model, seen))
         for _ in range(_ORDERS):
-            fresh = learned_again(self.model, seen[:-count], rng=self._rng)
-            wrong = ~right(fresh, seen[-count:])
-            if fresh.targets and wrong.sum() <= least:
-                best, least = (fresh, wrong), int(wrong.sum())
-            if not least:
+            if not sum(least):
                 break
+            fresh = learned_again(self.model, seen, rng=self._rng)
+            wrong = ~right(fresh, seen)
+            if fresh.targets and _faults(wrong) < least:
+                best, least = (fresh, wrong), _faults(wrong)
         if best is not None:
             fresh, wrong = best
-            for transition in seen[-count:]:
-                fresh.learn_one(transition)
             self.trainer.adopt(fresh)
-            self._wrong = deque(wrong.tolist(), maxlen=_LATEST)
+            self._wrong = deque(wrong[-_LATEST:].tolist(), maxlen=_LATEST)
 
     def _review_task(self, own: LearnedRewardModel) -> None:
         """The same for reward and end."""
         seen = list(self._history)
-        count = min(len(self._task_wrong), len(seen) // 5)
-        least = sum(list(self._task_wrong)[-count:])
-        best = None
+        best, least = None, _faults(self._missed(own))
         for _ in range(_ORDERS):
+            if not sum(least):
+                break
             fresh = own.untaught()
-            for k in self._rng.permutation(len(seen) - count).tolist():
+            for k in self._rng.permutation(len(seen)).tolist():
                 fresh.learn_step(seen[k].transition, seen[k].reward, terminated=seen[k].terminated)
             fresh.model.finish()
-            wrong = [self._surplus(fresh, real)[1] for real in seen[-count:]]
-            if sum(wrong) < least:
-                best, least = (fresh, wrong), sum(wrong)
+            wrong = self._missed(fresh)
+            if _faults(wrong) < least:
+                best, least = (fresh, wrong), _faults(wrong)
         if best is not None:
-            fresh, wrong = best
-            for real in seen[-count:]:
-                fresh.learn_step(real.transition, real.reward, terminated=real.terminated)
-            self.trainer.reward_model = fresh
-            self._task_wrong = deque(wrong, maxlen=_LATEST)
+            self.trainer.reward_model, wrong = best
+            self._task_wrong = deque(wrong[-_LATEST:].tolist(), maxlen=_LATEST)
 
-    def _surplus(self, task: RewardModel, real: Experience) -> tuple[float, bool]:
-        """What a step paid beyond what a reward model says, 0 where it says nothing; whether it was wrong."""
-        after = _fitted(real.transition.after, real.start)
+    def _missed(self, task: RewardModel) -> NDArray[np.bool_]:
+        """Which of the steps that are remembered a reward model is wrong about."""
+        seen = list(self._history)
+        found = np.zeros(len(seen), dtype=np.bool_)
+        order = sorted(range(len(seen)), key=lambda k: seen[k].start.layout.names)
+        for _, group in groupby(order, key=lambda k: seen[k].start.layout.names):
+            rows = list(group)
+            found[rows] = self._surplus(task, [seen[k] for k in rows])[1]
+        return found
+
+    def _surplus(self, task: RewardModel, seen: Sequence[Experience]) -> tuple[Float1D, NDArray[np.bool_]]:
+        """What steps of one layout paid beyond what a reward model says, 0 where it says nothing; which were wrong."""
         told = task.evaluate(
-            real.start.layout, real.start.vector[None], np.asarray(real.action)[None], after[None]
+            seen[0].start.layout,
+            np.stack([real.start.vector for real in seen]),
+            np.stack([np.asarray(real.action) for real in seen]),
+            np.stack([_fitted(real.transition.after, real.start) for real in seen]),
         )
-        surplus = real.reward - float(told.rewards[0])
-        wrong = not abs(surplus) <= 1e-6 or bool(told.terminated[0]) != real.terminated
-        return (surplus if np.isfinite(surplus) else 0.0), wrong
+        surplus = np.array([real.reward for real in seen]) - told.rewards
+        ended = np.array([real.terminated for real in seen])
+        wrong = ~(np.abs(surplus) <= 1e-6) | (told.terminated != ended)
+        return np.where(np.isfinite(surplus), surplus, 0.0), wrong
+
+
+def _faults(wrong: NDArray[np.bool_]) -> tuple[int, int]:
+    """How much is wrong: of the latest steps first, since worlds change."""
+    return int(wrong[-_LATEST:].sum()), int(wrong.sum())
 
 
 def _fitted(after: Scene, like: Scene) -> Float1D:

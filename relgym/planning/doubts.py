@@ -95,9 +95,11 @@ class DoubtedTask(RewardFunctions):
             return
         self._state = state
         rewards, ended, pairs = own.judge(lessons)
-        surplus = np.where(np.isfinite(rewards), paid - rewards, 0.0)
         right = (np.abs(paid - rewards) <= _RIGHT) & (ended == over)
         claims = own.claims(lessons, over)
+        # Where nothing is known: beyond the most that any mode would have said.
+        told = np.where(np.isfinite(rewards), rewards, np.max([*claims.values()], axis=0, initial=-np.inf))
+        surplus = np.where(np.isfinite(told), paid - told, 0.0)
         features = own.unsaid(lessons)
         self._groups = {}
         for reward, end in sorted(set(map(tuple, pairs[right].tolist()))):

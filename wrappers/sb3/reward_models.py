@@ -277,6 +277,7 @@ class LearnedRewardModel(RewardFunctions):
         """Keep the latest; of those before, each is as likely to be kept as any other (Vitter 1985)."""
         if ended:
             self._ends.append(lesson)
+            self._reviewed = (0, ())  # which modes are right of ends is what changes most with one more
             return
         self._latest.append(lesson)
         if len(self._latest) <= _REMEMBERED:
