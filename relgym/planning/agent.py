@@ -38,14 +38,14 @@ from relgym.wrappers.views import ViewLike
 
 __all__ = ["PlanningAgent"]
 
-_GROWTH: Final = 1.25
+_GROWTH: Final = 1.1
 """Between two reviews the agent's experience grows by this factor: all of them together cost as much as to learn from
-everything fifteen times, but they only take place while the model is wrong."""
+everything some ten times, for each order, but they only take place while the model is wrong."""
 
 _ORDERS: Final = 3
 """Random orders that a review tries at most: of few steps one may miss what another finds."""
 
-_FIRST_REVIEW: Final = 60
+_FIRST_REVIEW: Final = 100
 """Real steps before the first review."""
 
 _REMEMBERED: Final = 5_000
@@ -128,7 +128,7 @@ class PlanningAgent:
         view: ViewLike = None,
         search: Search | None = None,
         repeat: int = 1,
-        random_steps: int = 50,
+        random_steps: int = 100,
         exploration: float = 0.5,
         discount: float = DISCOUNT,
         safe: bool = False,
@@ -364,34 +364,39 @@ class PlanningAgent:
             self._review_task(self.trainer.reward_model)
 
     def _review_model(self) -> None:
-        seen = [real.transition for real in self._history]
-        best, least = None, _faults(~right(self.model, seen))
+        # What the model at work has learned from: one that took over in a changed world knows nothing of the old one.
+        seen = [real.transition for real in self._history][-self.model.seen :]
+        best, least = None, int((~right(self.model, seen)).sum())
         for _ in range(_ORDERS):
-            if not sum(least):
+            if not least:
                 break
             fresh = learned_again(self.model, seen, rng=self._rng)
-            wrong = ~right(fresh, seen)
-            if fresh.targets and _faults(wrong) < least:
-                best, least = (fresh, wrong), _faults(wrong)
+            wrong = int((~right(fresh, seen)).sum())
+            if fresh.targets and wrong < least:
+                best, least = fresh, wrong
         if best is not None:
-            fresh, wrong = best
-            self.trainer.adopt(fresh)
-            self._wrong = deque(wrong[-_LATEST:].tolist(), maxlen=_LATEST)
+            self.trainer.adopt(best)
+            # It knows what it has learned from, and more than one does that hasn't learned the latest of it: what it
+            # makes of the next steps lies in between.
+            count = min(_LATEST, len(seen) // 2) // 2
+            tested = learned_again(self.model, seen[:-count], rng=self._rng)
+            parts = right(best, seen[-2 * count : -count]), right(tested, seen[-count:])
+            self._wrong = deque((~np.concatenate(parts)).tolist(), maxlen=_LATEST)
 
     def _review_task(self, own: LearnedRewardModel) -> None:
         """The same for reward and end."""
         seen = list(self._history)
-        best, least = None, _faults(self._missed(own))
+        best, least = None, int(self._missed(own).sum())
         for _ in range(_ORDERS):
-            if not sum(least):
+            if not least:
                 break
             fresh = own.untaught()
             for k in self._rng.permutation(len(seen)).tolist():
                 fresh.learn_step(seen[k].transition, seen[k].reward, terminated=seen[k].terminated)
             fresh.model.finish()
             wrong = self._missed(fresh)
-            if _faults(wrong) < least:
-                best, least = (fresh, wrong), _faults(wrong)
+            if wrong.sum() < least:
+                best, least = (fresh, wrong), int(wrong.sum())
         if best is not None:
             self.trainer.reward_model, wrong = best
             self._task_wrong = deque(wrong[-_LATEST:].tolist(), maxlen=_LATEST)
@@ -418,11 +423,6 @@ class PlanningAgent:
         ended = np.array([real.terminated for real in seen])
         wrong = ~(np.abs(surplus) <= 1e-6) | (told.terminated != ended)
         return np.where(np.isfinite(surplus), surplus, 0.0), wrong
-
-
-def _faults(wrong: NDArray[np.bool_]) -> tuple[int, int]:
-    """How much is wrong: of the latest steps first, since worlds change."""
-    return int(wrong[-_LATEST:].sum()), int(wrong.sum())
 
 
 def _fitted(after: Scene, like: Scene) -> Float1D:
