@@ -70,6 +70,7 @@ COURSES: Final = {
             "relgym/BallGoal-v0",
             repeat=5,
             limit=100,
+            agent={"commit": 10},
             search=TreeSearch(horizon=60, batch=512, expansions=8_192),
         ),
     )

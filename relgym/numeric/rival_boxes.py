@@ -15,7 +15,7 @@ _HALF: Final = 0.5
 
 
 class RivalBoxes:
-    """A sample of the version space of boxes: conjunctions of intervals that hold of all of some examples and of no others.
+    """A sample of the version space of boxes: intervals of a few columns that hold of some examples and of no others.
 
     A threshold that is learned lies somewhere between the nearest examples on either side, and which properties it is
     of may be open as well. One rule would hide that; the share of many that fit tells how sure it is (Mitchell 1982;

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from relgym.envs.tasks import RewardFunctions, TaskOutcome
 from relgym.numeric.rival_boxes import RivalBoxes
-from relgym.scene.objects import TASK, Float1D, Float2D, SceneLayout
+from relgym.scene.objects import TASK, Float2D, SceneLayout
 from relgym.wrappers.sb3.reward_models import LearnedRewardModel
 
 __all__ = ["DoubtedTask"]
@@ -25,15 +24,15 @@ _REVIEW: Final = 10
 class DoubtedTask(RewardFunctions):
     """A learned reward model that says how much a step is worth in expectation over all short rules that fit.
 
-    A plan goes where a reward model promises most, so it goes where that is wrong: just beyond the threshold of a bonus,
-    which lies somewhere between what was seen to pay and what wasn't, or far outside of all that a rule was ever right
-    of. And of a bonus that was paid once or twice the model says nothing yet, since a mode takes more examples.
+    A plan goes where a reward model promises most, so it goes where that is wrong: just beyond the threshold of a
+    bonus, which lies somewhere between what was seen to pay and what wasn't, or far outside of all that a rule was ever
+    right of. And of a bonus that was paid once or twice the model says nothing yet: a mode takes more examples.
 
-    Here each pair of modes of reward and end is compared with the rules (`RivalBoxes`) that hold of all remembered steps
-    of which the pair was right and of none of which its claim is wrong. Where only a share of them holds the step is
-    worth that share of what the model says; the rest counts as if the worst of all known modes held. And what was paid
-    beyond the model's word is expected again by the share of the rules that tell these steps from all others, which is
-    why an agent returns to where it was rewarded, and stays near to it.
+    Here each pair of modes of reward and end is compared with the rules (`RivalBoxes`) that hold of all remembered
+    steps of which the pair was right and of none of which its claim is wrong. Where only a share of them holds the step
+    is worth that share of what the model says; the rest counts as if the worst of all known modes held. And what was
+    paid beyond the model's word is expected again by the share of the rules that tell these steps from all others,
+    which is why an agent returns to where it was rewarded, and stays near to it.
 
     Parameters
     ----------

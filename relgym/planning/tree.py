@@ -320,7 +320,13 @@ class _Tree:
             where = np.floor((self.states[nodes] - self.start) / size).astype(np.int16)
             keys = [row.tobytes() for row in where]
             olds = [grid.members.get(key, -1) for key in keys]
-            best = dict(zip(keys, np.where(np.array(olds) < 0, -np.inf, self.scores(np.array(olds))).tolist(), strict=True))
+            best = dict(
+                zip(
+                    keys,
+                    np.where(np.array(olds) < 0, -np.inf, self.scores(np.array(olds))).tolist(),
+                    strict=True,
+                )
+            )
             for node, key, score in zip(nodes.tolist(), keys, scores.tolist(), strict=True):
                 if score > best[key] or key not in grid.members:
                     grid.members[key], best[key] = node, score

@@ -15,6 +15,10 @@ RUNS = {
     "live_in_a_dream.py": (["--episodes", "8", "--trials", "1"], "trial 0: the trucks were never more than"),
     "grandparents.py": ([], "grandparent(A, B) ← parent(A, C) ∧ parent(C, B)"),
     "plan_mountain_car.py": (["--steps", "300", "--episodes", "0"], "0 of 0 reach the flag"),
+    "plan_ball.py": (
+        ["--decisions", "22", "--expansions", "64", "--episodes", "1"],
+        "of 1 balls stay at the goal after 22 real decisions",
+    ),
     "plan_truck.py": (
         ["--steps", "62", "--random_steps", "60", "--episodes", "1"],
         "of 1 episodes end on the goal after 62 real steps",

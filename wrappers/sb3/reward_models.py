@@ -350,7 +350,7 @@ class LearnedRewardModel(RewardFunctions):
         return found
 
     def lessons(self) -> Float2D:
-        """The real steps that it remembers, as `joined` makes them, with their rewards and ends; shape ``(n, width)``."""
+        """The real steps that it remembers, as `joined` makes them, with their rewards and ends; ``(n, width)``."""
         known = [*self._ends, *self._latest, *self._earlier]
         return np.stack(known) if known else np.zeros((0, self.model.schema.layout().width))
 
