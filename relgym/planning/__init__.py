@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from relgym.planning.actions import ActionCoder
     from relgym.planning.agent import PlanningAgent
+    from relgym.planning.doubts import DoubtedTask
     from relgym.planning.exploration import Coverage, Explore, Familiar
     from relgym.planning.planner import Planner
     from relgym.planning.rollouts import Objective, Plan
@@ -25,6 +26,7 @@ _HOMES = {
     "ActionCoder": "relgym.planning.actions",
     "Coverage": "relgym.planning.exploration",
     "CrossEntropy": "relgym.planning.sequences",
+    "DoubtedTask": "relgym.planning.doubts",
     "EnvSimulator": "relgym.planning.simulators",
     "Explore": "relgym.planning.exploration",
     "Familiar": "relgym.planning.exploration",
@@ -46,6 +48,7 @@ __all__ = [
     "ActionCoder",
     "Coverage",
     "CrossEntropy",
+    "DoubtedTask",
     "EnvSimulator",
     "Explore",
     "Familiar",

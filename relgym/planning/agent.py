@@ -275,6 +275,10 @@ class PlanningAgent:
                 break
         return self
 
+    def mistaken(self, steps: Sequence[Experience]) -> NDArray[np.bool_]:
+        """Of which real steps it is wrong about reward or end, or knows nothing; shape ``(n,)``."""
+        return self._missed(self.trainer.reward_model, steps)
+
     def predict(
         self,
         observation: Any,
@@ -386,7 +390,7 @@ class PlanningAgent:
     def _review_task(self, own: LearnedRewardModel) -> None:
         """The same for reward and end."""
         seen = list(self._history)
-        best, least = None, int(self._missed(own).sum())
+        best, least = None, int(self._missed(own, seen).sum())
         for _ in range(_ORDERS):
             if not least:
                 break
@@ -394,16 +398,15 @@ class PlanningAgent:
             for k in self._rng.permutation(len(seen)).tolist():
                 fresh.learn_step(seen[k].transition, seen[k].reward, terminated=seen[k].terminated)
             fresh.model.finish()
-            wrong = self._missed(fresh)
+            wrong = self._missed(fresh, seen)
             if wrong.sum() < least:
                 best, least = (fresh, wrong), int(wrong.sum())
         if best is not None:
             self.trainer.reward_model, wrong = best
             self._task_wrong = deque(wrong[-_LATEST:].tolist(), maxlen=_LATEST)
 
-    def _missed(self, task: RewardModel) -> NDArray[np.bool_]:
-        """Which of the steps that are remembered a reward model is wrong about."""
-        seen = list(self._history)
+    def _missed(self, task: RewardModel, seen: Sequence[Experience]) -> NDArray[np.bool_]:
+        """Of which steps a reward model is wrong about reward or end."""
         found = np.zeros(len(seen), dtype=np.bool_)
         order = sorted(range(len(seen)), key=lambda k: seen[k].start.layout.names)
         for _, group in groupby(order, key=lambda k: seen[k].start.layout.names):
