@@ -68,12 +68,12 @@ class TreeSearch:
     """
 
     horizon: int = 50
-    expansions: int = 4_096
+    expansions: int = 8_192
     batch: int = 128
     hold: int = 8
     cells: int = 32
     greedy: float = 0.3
-    patience: int = 2_048
+    patience: int = 4_096
     refine: Search | None = None
 
     def __post_init__(self) -> None:
