@@ -9,11 +9,11 @@ if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` lo
     from relgym.envs.ball_goal import BallGoalEnv
     from relgym.envs.base import EnvState, SceneEnv
     from relgym.envs.box_push import BoxPushEnv
+    from relgym.envs.dreams.env import LearnedModelEnv
+    from relgym.envs.dreams.rewards import in_batches
+    from relgym.envs.dreams.starts import drawn_from
+    from relgym.envs.dreams.vector import LearnedModelVectorEnv
     from relgym.envs.flat import FlatSpec, Flattener
-    from relgym.envs.learned_model import LearnedModelEnv
-    from relgym.envs.learned_model_rewards import in_batches
-    from relgym.envs.learned_model_starts import drawn_from
-    from relgym.envs.learned_model_vector import LearnedModelVectorEnv
     from relgym.envs.rendering import render_scene
     from relgym.envs.tasks import Task
     from relgym.envs.truck_push import TruckPushEnv
@@ -33,13 +33,13 @@ _HOMES = {
     "EnvState": "relgym.envs.base",
     "FlatSpec": "relgym.envs.flat",
     "Flattener": "relgym.envs.flat",
-    "LearnedModelEnv": "relgym.envs.learned_model",
-    "LearnedModelVectorEnv": "relgym.envs.learned_model_vector",
+    "LearnedModelEnv": "relgym.envs.dreams.env",
+    "LearnedModelVectorEnv": "relgym.envs.dreams.vector",
     "SceneEnv": "relgym.envs.base",
     "Task": "relgym.envs.tasks",
     "TruckPushEnv": "relgym.envs.truck_push",
-    "drawn_from": "relgym.envs.learned_model_starts",
-    "in_batches": "relgym.envs.learned_model_rewards",
+    "drawn_from": "relgym.envs.dreams.starts",
+    "in_batches": "relgym.envs.dreams.rewards",
     "render_scene": "relgym.envs.rendering",
 }
 """Where each public name lives; loaded on first use, so that `import relgym` needs no pymunk."""

@@ -1,6 +1,6 @@
 """The declared format of what a model file says of its env: spaces, first scenes, and the view of its observations.
 
-It stands under `extra` in the file's body (`relgym.model.file_format`). ``python -m relgym.envs.file_format`` prints
+It stands under `extra` in the file's body (`relgym.model.files.format`). ``python -m relgym.envs.file_format`` prints
 the JSON Schema of whole files, as it stands in `docs/reference/model-file.schema.json`.
 """
 
@@ -13,8 +13,8 @@ import msgspec
 from msgspec import Meta, Struct
 
 from relgym.files.records import Amount, Finite, Name, Pair, Record
-from relgym.model.file_format import Body, SchemaRecord, ShapeRecord
-from relgym.model.storage import FORMAT, VERSION
+from relgym.model.files.format import Body, SchemaRecord, ShapeRecord
+from relgym.model.files.storage import FORMAT, VERSION
 
 __all__ = ["EnvBody", "SpaceRecord", "ViewRecord", "json_schema"]
 

@@ -2,6 +2,22 @@
 
 Reward and termination of an env live here and not in the env, so that imagined steps get them from the very same
 functions as real ones: one scene at a time, or thousands at once.
+
+- *Tasks are the default, the thesis' worlds an argument.* ``gym.make("relgym/TruckPush-v0")`` is the control task.
+  ``task=None`` is the world of §3.1, which the experiments ask for by name; so is ``resample="step"`` alone, since
+  nobody can plan for frictions yet to be drawn (both together with ``task="push"`` are an error).
+- *A goal is a bodiless object*, seen from the actor: `goal.ahead` of the truck's nose, `goal.dx` and `goal.dy` from
+  the ball. It takes part in no relation, so that it can't spoil what is learned of contacts; its conditions are
+  thresholds on single properties, which the learner can find; and what it will be next is learned like anything else
+  (``ahead' = ahead - truck.vx'``).
+- *The observation is Markov.* What a task counts is a property too: `goal.held`, for how long the ball has stayed.
+- *Rewards are piecewise linear*, hence learnable.
+- *Decisions are slower than steps* where steps must be short to keep the laws linear: `ActionRepeat` goes round world
+  and dream alike, with the learner inside.
+- *Dreams last longer than episodes.* What a model can't dream of are other beginnings; so agents that dream may see
+  the world in `TruncatedEpisodes`, most episodes cut short.
+- *Flat views* for policy networks come from the schema and the env's `FlatSpec` alone: relative to the actor, scaled
+  (what has to be met exactly at two scales), padded and masked. `Flattener` does it for arrays of scenes.
 """
 
 from __future__ import annotations

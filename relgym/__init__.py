@@ -23,8 +23,8 @@ gymnasium.register("relgym/BallGoal-v0", "relgym.envs.ball_goal:BallGoalEnv", ma
 gymnasium.register("relgym/BoxPush-v0", "relgym.envs.box_push:BoxPushEnv", max_episode_steps=1_000)
 gymnasium.register(
     "relgym/LearnedModel-v0",
-    "relgym.envs.learned_model:LearnedModelEnv",
-    vector_entry_point="relgym.envs.learned_model_vector:LearnedModelVectorEnv",
+    "relgym.envs.dreams.env:LearnedModelEnv",
+    vector_entry_point="relgym.envs.dreams.vector:LearnedModelVectorEnv",
 )
 gymnasium.register("relgym/TruckPush-v0", "relgym.envs.truck_push:TruckPushEnv", max_episode_steps=40)
 

@@ -23,7 +23,7 @@ from rich.progress import (
 from relgym.console.errors import Commands
 from relgym.console.options import config_of_options, pairs
 from relgym.errors import ConfigError
-from relgym.model.text import plain
+from relgym.model.reports.text import plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -187,7 +187,7 @@ def rules(
 ) -> None:
     """Print a model as rules: if, elif, else."""
     from relgym.console.models import loaded, opened
-    from relgym.model.report import checked_rules, report
+    from relgym.model.reports.report import checked_rules, report
     from relgym.wrappers.follower import scenes_of
 
     if not check:

@@ -10,13 +10,14 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TypeGuard
 
 import pytest
 from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 
-FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html", "scheduling"})
+FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html", "hypotheses", "scheduling"})
 ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ENGINES | {"clustering", "classification", "laws"}
 CORE = LEARNERS | {"reporting", "program", "model"}
@@ -27,6 +28,7 @@ MAY_IMPORT = {
     "config": frozenset({"errors", "arguments"}),
     "files": frozenset({"errors"}),
     "html": frozenset(),
+    "hypotheses": frozenset({"errors"}),
     "scheduling": frozenset(),
     "scene": FOUNDATION,
     "numeric": FOUNDATION,
@@ -91,6 +93,18 @@ def test_packages_import_only_what_lies_below(package: str) -> None:
     ]
     below = ", ".join(sorted(MAY_IMPORT[package])) or "nothing"
     assert not wrong, f"relgym.{package} may import of relgym only: {below}\n" + "\n".join(wrong)
+
+
+def test_no_imports_in_a_circle() -> None:
+    names = {module.name for module in modules()}
+    needs = {m.name: sorted({_module_of(i, names) for i in m.needed} - {m.name, ""}) for m in modules()}
+    circle = _circle(needs)
+    assert not circle, "modules import one another, inside functions or not: " + " -> ".join(circle)
+
+
+def test_circles_are_found() -> None:
+    assert _circle({"a": ["b", "c"], "b": ["c"], "c": []}) == []
+    assert _circle({"a": ["b"], "b": ["c", "d"], "c": [], "d": ["b"]}) == ["b", "d", "b"]
 
 
 def test_no_relative_imports() -> None:
@@ -225,6 +239,24 @@ def _upward(package: str, found: Import) -> bool:
     if target not in MAY_IMPORT:  # `import relgym`, or a name of the façade
         return package not in FACADE_USERS
     return target != package and target not in MAY_IMPORT[package]
+
+
+def _module_of(found: Import, names: set[str]) -> str:
+    """The module of relgym that an import reads: that of a name in it, too; empty for other libraries."""
+    if found.target in names:
+        return found.target
+    parent = found.target.rpartition(".")[0]
+    return parent if parent in names else ""
+
+
+def _circle(needs: dict[str, list[str]]) -> list[str]:
+    """A way from a module back to itself, along what each needs; empty where there is none."""
+    sorter = TopologicalSorter(needs)
+    try:
+        sorter.prepare()
+    except CycleError as error:
+        return list(reversed(error.args[1]))  # each is needed by the next one there
+    return []
 
 
 def _third_party(found: Import) -> bool:

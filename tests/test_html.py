@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from relgym.html import html_table, html_text
-from relgym.model.report import report
+from relgym.model.reports.report import report
 from relgym.wrappers import ModelLearner, StepReport
 
 VOID = {"br", "hr", "img"}

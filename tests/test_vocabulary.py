@@ -72,7 +72,7 @@ ALLOWED_IN = {
         "tests/experiments/test_law_worlds.py",
         "tests/fuzz/make_corpus.py",
         "tests/laws/",
-        "tests/wrappers/sb3/test_stock.py",
+        "tests/wrappers/dyna/test_stock.py",
         "tests/scene/geometry/",
     ),
 }

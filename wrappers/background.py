@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.features import functions_of, register_function
+from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError, RelgymError
+from relgym.hypotheses import register_hypothesis, registered
 from relgym.model.prequential import Outcomes, Prequential, compared
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
@@ -84,7 +86,7 @@ class Background:
         self, model: WorldModel, prequential: Prequential | None, *, queue: int, precision: float = 0.0
     ) -> None:
         length = checked_count("background", queue, 1, 10**7)
-        functions = _sendable(model.config.features)
+        functions = _sendable(model.config)
         if multiprocessing.current_process().daemon:
             raise ConfigError(
                 f"background={queue}: this is a daemonic worker process, which may have no children; learn in the "
@@ -294,27 +296,31 @@ def _learn(
                     answers.send(trouble)
 
 
-def _sendable(features: Iterable[str]) -> bytes:
-    """The users' functions among some features, for another process."""
-    functions = functions_of(features)
+def _sendable(config: ModelConfig) -> bytes:
+    """The users' functions and hypothesis classes that a model needs, for another process."""
+    functions, kinds = functions_of(config.features), [registered(name) for name in config.hypotheses]
     try:
-        return pickle.dumps(functions)
+        return pickle.dumps((functions, kinds))
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise ConfigError(
-            f"features: the functions {sorted(functions)} can't be sent to the learning process ({error}); register "
-            "such as are defined by def at the top level of a module, or learn in the foreground (background=None)"
+            f"features, hypotheses: {[*sorted(functions), *config.hypotheses]} can't be sent to the learning process "
+            f"({error}); register such as are defined by def or class at the top level of a module, or learn in the "
+            "foreground (background=None)"
         ) from None
 
 
-def _registered(functions: bytes) -> Exception | None:
+def _registered(sent: bytes) -> Exception | None:
     """Register what another process sent; why that failed, if it did."""
     try:
-        for name, function in pickle.loads(functions).items():
+        functions, kinds = pickle.loads(sent)
+        for name, function in functions.items():
             register_function(name, function)
+        for kind in kinds:
+            register_hypothesis(kind)
     except Exception as error:
         return ConfigError(
-            f"features: a function can't be found in the learning process ({error}); define it at the top level of a "
-            "module, outside of `if __name__ == '__main__':`, or learn in the foreground (background=None)"
+            f"features, hypotheses: one of them can't be found in the learning process ({error}); define it at the top "
+            "level of a module, outside of `if __name__ == '__main__':`, or learn in the foreground (background=None)"
         )
     return None
 

@@ -1,7 +1,7 @@
 """The learning half of every wrapper: predict, compare, learn; here or in a process of its own.
 
 The model is told how its predictions came out while it learns: so it learns where modes explain the examples but their
-conditions don't tell which of them holds (`relgym.model.hindsight`).
+conditions don't tell which of them holds (`relgym.model.target.hindsight`).
 """
 
 from __future__ import annotations

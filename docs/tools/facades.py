@@ -10,6 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FACADES = {
     "relgym.config": "relgym/config/__init__.py",
     "relgym.data": "relgym/data/__init__.py",
+    "relgym.hypotheses": "relgym/hypotheses.py",
     "relgym.envs": "envs/__init__.py",
     "relgym.envs.views": "envs/views/__init__.py",
     "relgym.errors": "relgym/errors.py",

@@ -1,4 +1,11 @@
-"""Views: how an env's observations and actions become scenes, and scenes observations."""
+"""Views: how an env's observations and actions become scenes, and scenes observations.
+
+A *view* is how an env's observations, actions, rewards and ends become scenes, and scenes observations: `SceneView`
+(an env with a schema), `NumbersView` (any flat space), `TableView` (rows are objects), `FunctionView` (any function),
+`AgentsView` (agents are objects, what they do is a property of theirs), and `TaskView` around one of them (reward and
+termination as properties of `task`, 0 before a step and the step's after it). They lie in `envs/`, below wrappers and
+dreams, because both need them: a model file holds the view's JSON, so that a dream shows what the env would.
+"""
 
 from __future__ import annotations
 

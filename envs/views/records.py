@@ -9,7 +9,7 @@ from typing import Any
 
 from relgym.arguments import refusing_fields
 from relgym.errors import ConfigError
-from relgym.model.storage import shape_from_json, shape_to_json
+from relgym.model.files.storage import shape_from_json, shape_to_json
 from relgym.scene.objects import ObjectType
 from relgym.scene.shapes import Shape
 

@@ -14,7 +14,7 @@ from relgym.envs.actions import acting, check_action_space
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.base import as_shown, precision_of
 from relgym.errors import ConfigError, ObservationError
-from relgym.model.storage import schema_from_json, schema_to_json
+from relgym.model.files.storage import schema_from_json, schema_to_json
 from relgym.scene.objects import ACTION, Scene
 from relgym.scene.schema import SceneSchema
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Column", "Columns"]
+from relgym.config.constants import FIRST_ROOM
 
-_FIRST_CAPACITY: Final = 64
+__all__ = ["Column", "Columns"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Columns:
         self.columns = dict(columns)
         self.sizes = dict(sizes)
         self.size = 0
-        self._arrays = {name: self._empty(name, _FIRST_CAPACITY) for name in self.columns}
+        self._arrays = {name: self._empty(name, FIRST_ROOM) for name in self.columns}
 
     def __len__(self) -> int:
         return self.size
@@ -89,7 +89,7 @@ class Columns:
     def load(self, data: Mapping[str, Any]) -> None:
         """Restore what `to_dict` gave; the columns must be the same."""
         self.size, self.sizes = int(data["size"]), dict(data["sizes"])
-        capacity = max(_FIRST_CAPACITY, self.size)
+        capacity = max(FIRST_ROOM, self.size)
         for name in self.columns:
             self._arrays[name] = self._empty(name, capacity)
             self[name][...] = _decode(data["arrays"][name], self[name])

@@ -4,6 +4,13 @@ Most time steps share a relational state, so a few examples per (mode, relationa
 them, as long as those near a threshold stay. Kept are: examples that contradicted a classifier, and a
 deterministic reservoir of the others, weighted so that the weights of a state's examples add up to the number
 seen.
+
+Classifiers learn from few examples of a mode in each relational state, those first that contradicted them. Without
+bodies there is one state, and 3,000 of a mode are kept. Of ``z' = 0.9 z + [x > y]`` (x and y drawn anew) 72 % of
+fresh steps were predicted right after 5,000 with ten, 97 % with 300, 99 % with 3,000, which took a third more time
+than ten. And where rare events can't be predicted, as on which step a lander's leg touches a ground whose height
+nobody sees, few examples leave corners in which by chance only the rare ones lie: among 300, of two streams' 77
+touches predicted 17 came true.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ def learn_pair(
         if _settles(found, context):
             break
     # as between polarities, errors count first; the narrowest context wins ties
-    best = min(definitions.items(), key=lambda each: (round(each[1].errors, 7), round(each[1].bits, 7)))
+    best = min(definitions.items(), key=lambda each: each[1].rank)
     work = sum(each.work for each in definitions.values())
     classifier = yield from _with_trees(BinaryClassifier(i, j, scope, *best, work=work), taught, config)
     classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.mode import NOISE
+from relgym.config.constants import FIRST_ROOM
 
 __all__ = ["AssignmentLog"]
 
@@ -29,9 +30,9 @@ class AssignmentLog:
     """
 
     def __init__(self) -> None:
-        self._y = np.zeros(256)
-        self._label = np.zeros(256, dtype=np.int32)
-        self._row = np.zeros(256, dtype=np.int64)
+        self._y = np.zeros(FIRST_ROOM)
+        self._label = np.zeros(FIRST_ROOM, dtype=np.int32)
+        self._row = np.zeros(FIRST_ROOM, dtype=np.int64)
         self._size = 0
         self.seen = 0
         self.forgotten: Counter[int] = Counter()
@@ -57,7 +58,7 @@ class AssignmentLog:
     def append(self, row: int, y: float) -> int:
         """Add an example, which is noise until it is assigned, and return its number."""
         if self._size == len(self._y):
-            room = (0, max(256, self._size))
+            room = (0, max(FIRST_ROOM, self._size))
             self._y = np.pad(self._y, room)
             self._label = np.pad(self._label, room)
             self._row = np.pad(self._row, room)

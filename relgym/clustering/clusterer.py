@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.assignments import AssignmentLog
-from relgym.clustering.discovery import least_examples
+from relgym.clustering.discovery import Scale, least_examples
 from relgym.clustering.em import Cluster, refit
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.last_resort import Resort, timely
 from relgym.clustering.mode import NOISE, Mode, Role
+from relgym.clustering.mode_search import ModeSearch
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
-from relgym.clustering.population import ClusterReport
-from relgym.clustering.prospecting import Prospector, Search
+from relgym.clustering.population import ClusterReport, Population
 from relgym.clustering.suspects import review_due
 from relgym.config import ClusteringConfig
 from relgym.scene.objects import Target
@@ -37,7 +37,7 @@ LEAST_MEMBERS = 4
 """Examples that a mode of another model must explain here to be taken over."""
 
 
-class ModeClusterer(Prospector):
+class ModeClusterer:
     """Segments a target's examples into modes, one example at a time.
 
     Parameters
@@ -51,6 +51,10 @@ class ModeClusterer(Prospector):
 
     Attributes
     ----------
+    population
+        The examples and the modes they are assigned to.
+    search
+        The search for further modes among them.
     floor
         Rounding noise, the least that is possible, in units of the target.
     due
@@ -64,7 +68,8 @@ class ModeClusterer(Prospector):
     """
 
     def __init__(self, target: Target, config: ClusteringConfig, *, seed: int) -> None:
-        super().__init__(target, config, seed=seed)
+        self.population = Population(target, config)
+        self.search = ModeSearch(self.population, seed=seed)
         self.floor = 1e-12
         self.due = False
         self._resort: Resort | None = None  # the search for an approximation, under way
@@ -72,6 +77,72 @@ class ModeClusterer(Prospector):
         self._largest = 0.0  # number among the columns and the target's values
         self._reach = 0.0  # value of the target
         self._spread = 0.0  # noise found in the data, rounding apart
+
+    # ------------------------------------------------------------------ what it knows
+    @property
+    def target(self) -> Target:
+        """The target whose examples it sees."""
+        return self.population.target
+
+    @property
+    def config(self) -> ClusteringConfig:
+        """Free parameters."""
+        return self.population.config
+
+    @property
+    def scale(self) -> Scale:
+        """Noise as assumed at present, and the tolerances that follow from it."""
+        return self.population.scale
+
+    @property
+    def approximate(self) -> bool:
+        """Whether the noise assumed is what an approximation leaves, no exact law being known."""
+        return self.population.approximate
+
+    @property
+    def clusters(self) -> dict[int, Cluster]:
+        """The modes at work, by id."""
+        return self.population.clusters
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """All modes but noise, by id."""
+        return self.population.modes
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Target values of all examples, shape ``(n,)``."""
+        return self.population.y
+
+    @property
+    def labels(self) -> NDArray[np.int32]:
+        """Mode id of every example, shape ``(n,)``."""
+        return self.population.labels
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """Row of every example in the example table, shape ``(n,)``."""
+        return self.population.rows
+
+    @property
+    def noise_examples(self) -> int:
+        """Number of examples no mode explains."""
+        return self.population.noise_examples
+
+    @property
+    def seen(self) -> int:
+        """Number of examples that ever came, forgotten ones included."""
+        return self.population.seen
+
+    def fits(
+        self, table: ExampleTable, examples: NDArray[np.intp]
+    ) -> tuple[tuple[int, ...], NDArray[np.bool_]]:
+        """Which modes explain the given examples: ids and a boolean array ``(len(examples), modes)``."""
+        return self.population.fits(table, examples)
+
+    def keep(self, rows: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Forget the examples of dropped rows of the example table; see `AssignmentLog.keep`."""
+        return self.population.log.keep(rows)
 
     # ------------------------------------------------------------------ one example (Figure 3.2)
     def learn_one(
@@ -91,13 +162,13 @@ class ModeClusterer(Prospector):
         budget = Budget() if budget is None else budget
         before = set(self.clusters)
         example = self._append(table, row, y, budget)
-        errors = self._errors_of(table, example)
-        if (mode := self._choose(table, example, errors)) != NOISE:
+        errors = self.population.errors_of(table, example)
+        if (mode := self.population.choose(table, example, errors)) != NOISE:
             self.labels[example] = mode
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
-            self._discover(table, example, budget)
-        reassigned = review_due(self._log.seen) and self._review(table)
+            self.search.discover(table, example, budget)
+        reassigned = review_due(self.seen) and self._review(table)
         self.due |= self._hopeless(table)
         self.approximate_now(table, budget)
         after = set(self.clusters)
@@ -113,17 +184,17 @@ class ModeClusterer(Prospector):
     @property
     def searching(self) -> bool:
         """Whether a search for modes is under way."""
-        return self._hunt is not None
+        return self.search.under_way
 
     def go_on(self, table: ExampleTable, budget: Budget) -> bool:
         """Go on with the search for modes, as far as the budget goes; whether they are others than before."""
         before = set(self.clusters)
-        self._pursue(table, budget)
+        self.search.pursue(table, budget)
         return before != set(self.clusters)
 
     def _append(self, table: ExampleTable, row: int, y: float, budget: Budget) -> int:
-        example = self._log.append(row, y)
-        self._estimating |= self._log.seen in ESTIMATE_AT
+        example = self.population.log.append(row, y)
+        self._estimating |= self.seen in ESTIMATE_AT
         core = table.signatures[table.signature_ids[row]].core
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
         if largest > self._largest or abs(y) > self._reach or self._estimating:
@@ -153,17 +224,19 @@ class ModeClusterer(Prospector):
         idle = idle[cluster.idle(table, self.rows[idle], self.scale.tolerance)]
         if len(idle) < least_examples(self.y, self.scale, self.config):
             return
-        bare = Mode(self._next_id, self.target, (Role(self.target.type, ()),), 0.0, sigma=self.scale.sigma)
+        bare = Mode(
+            self.population.next_id, self.target, (Role(self.target.type, ()),), 0.0, sigma=self.scale.sigma
+        )
         if any(bare.same_function(c.mode) for c in self.clusters.values()):
             return
         self.clusters[bare.id] = Cluster(bare, fitted=len(idle))
-        self._next_id += 1
+        self.population.next_id += 1
         self.labels[idle] = bare.id
 
     # ------------------------------------------------------------------ noise scale
     def _rescale(self, table: ExampleTable, budget: Budget) -> None:
         if self.config.noise_std != "auto":
-            self.scale = replace(self.scale, sigma=float(self.config.noise_std))
+            self.population.scale = replace(self.scale, sigma=float(self.config.noise_std))
             return
         recent = self.rows[-256:]
         own = table.x[recent][:, : table.signatures[table.signature_ids[recent[-1]]].core]
@@ -171,11 +244,11 @@ class ModeClusterer(Prospector):
         self.floor = floor
         estimating = self._estimating and budget.left > 0  # of many targets not all in the same step
         self._estimating &= not estimating
-        if estimating and 2 * self.noise_examples > self._log.seen:
+        if estimating and 2 * self.noise_examples > self.seen:
             budget.spend(ESTIMATE)
             estimate = self._estimate(table, floor)
             if estimate is not None and self._refutes(estimate):
-                self._spread, self.approximate = estimate if estimate > floor else 0.0, False
+                self._spread, self.population.approximate = estimate if estimate > floor else 0.0, False
                 self._start_over()
         self._assume(max(floor, self._spread))
 
@@ -183,21 +256,21 @@ class ModeClusterer(Prospector):
         """Whether an estimate of the noise refutes the one that is assumed: it is larger, or most was overrated."""
         if estimate < LESS * self.scale.sigma and not self.approximate:
             return True
-        explained = 1.0 - self.noise_examples / self._log.seen
+        explained = 1.0 - self.noise_examples / self.seen
         return refuted(self.scale.sigma, estimate, explained=explained, y=self.y)
 
     def _assume(self, sigma: float) -> None:
         """Another noise: the tolerances follow."""
-        self.scale = replace(self.scale, sigma=sigma, misfit=self.approximate)
+        self.population.scale = replace(self.scale, sigma=sigma, misfit=self.approximate)
 
     def _review(self, table: ExampleTable) -> bool:
         """The same with the noise that the modes known so far leave, which tells more than a first estimate did."""
-        if self._chancy and self.config.noise_std == "auto":
-            left = self._residual_spread(table)
+        if self.population.chancy and self.config.noise_std == "auto":
+            left = self.population.residual_spread(table)
             if left > self.floor:
                 self._spread = left
                 self._assume(left)
-        return super()._review(table)
+        return self.search.review(table)
 
     def _estimate(self, table: ExampleTable, floor: float) -> float | None:
         """Noise among examples of the signature that holds most of the unexplained ones; none: they can't tell."""
@@ -214,19 +287,13 @@ class ModeClusterer(Prospector):
 
     def _start_over(self) -> None:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""
-        self._hunt = None
-        self.clusters.clear()
-        self._searches.clear()
-        self._chancy = False  # the next review tells, of the scale then assumed
-        total = self._log.forgotten.total()
-        self._log.forgotten.clear()
-        self._log.forgotten[NOISE] = total
-        self.labels[:] = NOISE
+        self.search.start_over()
+        self.population.start_over()
 
     def retarget(self, target: Target) -> None:
         """Be given other next values: the examples stay, modes are searched again."""
-        self.target = target
-        self._spread, self.approximate, self.due, self._resort = 0.0, False, False, None
+        self.population.target = target
+        self._spread, self.population.approximate, self.due, self._resort = 0.0, False, False, None
         self._assume(self.floor)
         self._start_over()
 
@@ -234,10 +301,10 @@ class ModeClusterer(Prospector):
     def _hopeless(self, table: ExampleTable) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""
         allowed = self.config.approximate and self.config.noise_std == "auto"
-        if not allowed or not timely(self, table, again=self.approximate):
+        if not allowed or not timely(self.population, table, again=self.approximate):
             return False
         # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
-        return 2 * self.noise_examples > self._log.seen or self._spread > 0.0
+        return 2 * self.noise_examples > self.seen or self._spread > 0.0
 
     def approximate_now(self, table: ExampleTable, budget: Budget) -> bool:
         """Look for an approximation, the law of last resort, if one is due; whether it is found and taken.
@@ -247,17 +314,17 @@ class ModeClusterer(Prospector):
         if not self.due:
             return False
         if self._resort is None:
-            self._resort = Resort.of(self, table, floor=self.floor)
+            self._resort = Resort.of(self.population, table, floor=self.floor)
         if not budget.work(self._resort.task):
             return False
-        found = self._resort.found(self, table, floor=self.floor, again=self.approximate)
+        found = self._resort.found(self.population, table, floor=self.floor, again=self.approximate)
         self._resort, self.due = None, False
         if found is None:
             return False
-        self._spread, self.approximate = found.sigma, True
+        self._spread, self.population.approximate = found.sigma, True
         self._assume(max(self.floor, found.sigma))
         self._start_over()
-        self._adopt(table, found.signature, found.fit)
+        self.search.adopt(table, found.signature, found.fit)
         return True
 
     def absorb(
@@ -274,14 +341,14 @@ class ModeClusterer(Prospector):
         functions
             Whether its modes may be taken over: not if they were given other next values.
         """
-        first = len(self._log)
+        first = len(self.population.log)
         for row, y in zip(rows.tolist(), other.y.tolist(), strict=True):
-            self._log.append(row, y)
+            self.population.log.append(row, y)
         self._largest, self._reach = max(self._largest, other._largest), max(self._reach, other._reach)
         self._spread, self.floor = max(self._spread, other._spread), max(self.floor, other.floor)
-        self.approximate |= other.approximate
+        self.population.approximate |= other.approximate
         self._assume(max(self.scale.sigma, other.scale.sigma))
-        self._rehome(table, np.arange(first, len(self._log)))
+        self.population.rehome(table, np.arange(first, len(self.population.log)))
         matched = {NOISE: NOISE}
         for i, cluster in sorted(other.clusters.items()):
             alike = [k for k, c in sorted(self.clusters.items()) if c.mode.same_function(cluster.mode, 1e-6)]
@@ -289,52 +356,53 @@ class ModeClusterer(Prospector):
                 matched[i] = alike[0]
             elif (
                 functions
-                and len(self._explained(table, Cluster(cluster.mode), self._noise())) >= LEAST_MEMBERS
+                and len(self.population.explained(table, Cluster(cluster.mode), self.population.noise()))
+                >= LEAST_MEMBERS
             ):
                 own = Cluster(replace(cluster.mode, id=0, target=self.target))
-                matched[i] = self._admit(table, self._known(table), own)
-        for i, count in other._log.forgotten.items():
-            self._log.forgotten[matched.get(i, NOISE)] += count
-        self._log.seen += other._log.seen - len(other._log)
+                matched[i] = self.search.admit(table, self.population.known(table), own)
+        for i, count in other.population.log.forgotten.items():
+            self.population.log.forgotten[matched.get(i, NOISE)] += count
+        self.population.log.seen += other.population.log.seen - len(other.population.log)
 
     # ------------------------------------------------------------------ saving
     def to_json(self) -> dict[str, Any]:
         """Everything but the examples."""
         return {
             "sigma": self.scale.sigma,
-            "next_id": self._next_id,
+            "next_id": self.population.next_id,
             "largest": self._largest,
             "reach": self._reach,
             "spread": self._spread,
             "rounding": self.floor,
             "approximate": self.approximate,
             **({"due": True} if self.due else {}),
-            **({"chancy": True} if self._chancy else {}),
+            **({"chancy": True} if self.population.chancy else {}),
             **({"estimating": True} if self._estimating else {}),
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
-            "searches": [[i, s.waiting, s.failures] for i, s in sorted(self._searches.items())],
-            "random": self._rng.bit_generator.state,
+            **self.search.to_json(),
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """The examples: target values, modes and rows."""
-        return self._log.to_arrays()
+        return self.population.log.to_arrays()
 
     def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         """Take over what `to_json` and `to_arrays` wrote; without arrays there are no examples."""
-        self._next_id = int(data["next_id"])
+        self.population.next_id = int(data["next_id"])
         self._largest, self._reach = float(data["largest"]), float(data["reach"])
-        self.approximate, self.due = bool(data["approximate"]), bool(data.get("due", False))
-        self._chancy = bool(data.get("chancy", False))
+        self.population.approximate, self.due = bool(data["approximate"]), bool(data.get("due", False))
+        self.population.chancy = bool(data.get("chancy", False))
         self._estimating = bool(data.get("estimating", False))
         self._assume(float(data["sigma"]))
         self._spread, self.floor = float(data["spread"]), float(data["rounding"])
-        self._known_noise = int(data["noise"])
+        self.population.known_noise = int(data["noise"])
         modes = {int(m["id"]): Mode.from_json(self.target, m) for m in data["modes"]}
-        self.clusters = {int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]}
-        self._searches = {int(i): Search(int(w), int(f)) for i, w, f in data["searches"]}
-        self._rng.bit_generator.state = data["random"]
+        self.population.clusters = {
+            int(i): Cluster(modes[int(i)], int(f), int(u)) for i, f, u in data["fitted"]
+        }
+        self.search.restore(data)
         if arrays:
-            self._log = AssignmentLog.from_arrays(arrays)
+            self.population.log = AssignmentLog.from_arrays(arrays)

@@ -1,4 +1,19 @@
-"""Finding a new mode among the noise (§3.2.2), and evaluating whether data identify a function."""
+"""Finding a new mode among the noise (§3.2.2), and evaluating whether data identify a function.
+
+*Tangents are no laws.* A function with nearly as many near misses as examples, or whose residuals are alike between
+neighbours, is refused (`relgym.clustering.discovery.is_law`). So a curve stays unexplained instead of falling apart
+into false laws. It may be a law that lacks a term: of ``x' = x + 0.2 vx + 0.06 vx_change`` a few rows don't show the
+last one, which is within what the extrapolation of any few rows is allowed. So regression on its near misses, nearer
+and nearer ones, looks for more terms, and what comes out is tested as any function is.
+
+*Similar states.* A third of RANSAC's samples is drawn from one relational state (§3.2.3). Among many objects hardly
+two rows are in the same one; then rows of the most similar states follow, by the number of facts in which they
+differ. With a bystander beside three pushed boxes all laws of the truck are found in 250 steps, which took some seeds
+a thousand.
+
+*Counts.* Targets of a few whole multiples of one step (pixels, cells) are searched for functions of the present value
+alone first, constants among them; others need 40 examples, since a few small numbers add up to another by chance.
+"""
 
 from __future__ import annotations
 

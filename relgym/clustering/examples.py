@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
+from relgym.config.constants import FIRST_ROOM
 
 __all__ = ["ExampleTable"]
 
@@ -28,11 +29,11 @@ class ExampleTable:
         self.signatures: list[SlotSignature] = []
         self._ids: dict[SlotSignature, int] = {}
         self._strata: dict[bytes, int] = {}
-        self._x = np.zeros((256, 0))
-        self._signature = np.zeros(256, dtype=np.int32)
-        self._stratum = np.zeros(256, dtype=np.int32)
-        self._bodies = np.zeros((256, 0), dtype=np.int16)
-        self._serial = np.zeros(256, dtype=np.int64)
+        self._x = np.zeros((FIRST_ROOM, 0))
+        self._signature = np.zeros(FIRST_ROOM, dtype=np.int32)
+        self._stratum = np.zeros(FIRST_ROOM, dtype=np.int32)
+        self._bodies = np.zeros((FIRST_ROOM, 0), dtype=np.int16)
+        self._serial = np.zeros(FIRST_ROOM, dtype=np.int64)
         self._size = 0
         self.seen = 0
 
@@ -125,7 +126,7 @@ class ExampleTable:
         """
         number = self.signature_id(signature)
         if self._size == len(self._x):
-            grow = ((0, max(256, len(self._x))), (0, 0))
+            grow = ((0, max(FIRST_ROOM, len(self._x))), (0, 0))
             self._x = np.pad(self._x, grow)
             self._signature = np.pad(self._signature, grow[0])
             self._stratum = np.pad(self._stratum, grow[0])

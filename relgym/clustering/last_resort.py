@@ -1,4 +1,16 @@
-"""An approximation for a target of which exact laws explain too little, and whether it is worth having."""
+"""An approximation for a target of which exact laws explain too little, and whether it is worth having.
+
+After 256, 1,024, ... examples, oftener among features unless noise is what is left, where exact laws explain less
+than half, the best sparse function is taken that leaves at most 10 % of the change (1 % without features), or with
+features up to half of it where what it leaves is noise: residuals of neighbours are not alike. The wider the library,
+the more terms it may have. What it leaves becomes the target's noise, and the report says so. A later approximation
+replaces it if it is better on nearly all recent rows, or as good and shorter, and it replaces k modes that explain
+most if it leaves no more than k times what they do: so much would k slices of noise leave. Rows without a law, a
+lander's touches, make most of the squares, and terms for them hold nowhere else. So a term that serves few rows must
+explain most of them, or it and they are left aside; a second search sees changes no larger than most to begin with;
+and columns that are no features are searched alone, too. Of what is as good within 10 % the shortest is taken: ``th'
+= th + 0.05 w'``, where there were five sines before, or seven terms of the legs.
+"""
 
 from __future__ import annotations
 

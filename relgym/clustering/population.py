@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import Scale, least_examples
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.examples import ExampleTable
+from relgym.clustering.merging import Known
 from relgym.clustering.mode import NOISE, Mode
 from relgym.config import ClusteringConfig
 from relgym.scene.objects import Target
@@ -69,6 +71,16 @@ class Population:
         The modes at work, by id.
     scale
         Noise as assumed at present, and the tolerances that follow from it.
+    approximate
+        Whether the noise assumed is what an approximation leaves, no exact law being known.
+    chancy
+        Whether noise is so large that modes explain others' examples by chance.
+    log
+        The examples, and their modes by id.
+    next_id
+        Id of the next new mode.
+    known_noise
+        Examples that no mode explained, of a model that was loaded without its examples.
     """
 
     def __init__(self, target: Target, config: ClusteringConfig) -> None:
@@ -76,32 +88,33 @@ class Population:
         self.config = config
         self.clusters: dict[int, Cluster] = {}
         self.scale = Scale(1e-12, config.inlier_stds, config.tail_stds)
-        self._log = AssignmentLog()
-        self._next_id = 1
-        self._known_noise = 0  # of a model that was loaded without its examples
-        self._chancy = False  # whether noise is so large that modes explain others' examples by chance
+        self.log = AssignmentLog()
+        self.next_id = 1
+        self.known_noise = 0
+        self.approximate = False
+        self.chancy = False
 
     @property
     def y(self) -> NDArray[np.float64]:
         """Target values of all examples, shape ``(n,)``."""
-        return self._log.y
+        return self.log.y
 
     @property
     def labels(self) -> NDArray[np.int32]:
         """Mode id of every example, shape ``(n,)``."""
-        return self._log.labels
+        return self.log.labels
 
     @property
     def rows(self) -> NDArray[np.int64]:
         """Row of every example in the example table, shape ``(n,)``."""
-        return self._log.rows
+        return self.log.rows
 
     @property
     def modes(self) -> tuple[Mode, ...]:
         """All modes but noise, by id."""
-        if not len(self._log):
+        if not len(self.log):
             return tuple(c.mode for _, c in sorted(self.clusters.items()))
-        labels, dropped = self.labels, self._log.forgotten
+        labels, dropped = self.labels, self.log.forgotten
         return tuple(
             c.mode.with_examples(int(np.count_nonzero(labels == i)) + dropped[i])
             for i, c in sorted(self.clusters.items())
@@ -110,18 +123,28 @@ class Population:
     @property
     def noise_examples(self) -> int:
         """Number of examples no mode explains."""
-        if not len(self._log):
-            return self._known_noise
-        return int((self.labels == NOISE).sum()) + self._log.forgotten[NOISE]
+        if not len(self.log):
+            return self.known_noise
+        return int((self.labels == NOISE).sum()) + self.log.forgotten[NOISE]
 
     @property
     def seen(self) -> int:
         """Number of examples that ever came, forgotten ones included."""
-        return self._log.seen
+        return self.log.seen
 
-    def keep(self, rows: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Forget the examples of dropped rows of the example table; see `AssignmentLog.keep`."""
-        return self._log.keep(rows)
+    @property
+    def needed(self) -> int:
+        """Examples that found a mode: each verifies it by as many bits as tell it from all values seen."""
+        return least_examples(self.y, self.scale, self.config)
+
+    def start_over(self) -> None:
+        """Forget the modes: all examples become noise."""
+        self.clusters.clear()
+        self.chancy = False  # the next review tells, of the scale then assumed
+        total = self.log.forgotten.total()
+        self.log.forgotten.clear()
+        self.log.forgotten[NOISE] = total
+        self.labels[:] = NOISE
 
     def fits(
         self, table: ExampleTable, examples: NDArray[np.intp]
@@ -134,17 +157,18 @@ class Population:
             found[:, k] = error <= self.scale.tolerance
         return ids, found
 
-    def _errors_of(self, table: ExampleTable, example: int) -> dict[int, float]:
+    def errors_of(self, table: ExampleTable, example: int) -> dict[int, float]:
+        """What each mode misses one example by, by id."""
         row, y = int(self.rows[example]), float(self.y[example])
         x = table.x[row].tolist()
         return {i: c.error_one(table, row, x, y, self.scale) for i, c in self.clusters.items()}
 
-    def _choose(self, table: ExampleTable, example: int, errors: dict[int, float]) -> int:
+    def choose(self, table: ExampleTable, example: int, errors: dict[int, float]) -> int:
         """E-step for one example that no mode has: the one of those that explain it; `NOISE` if none does."""
         fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
         if not fitting:
             return NOISE
-        if not self._chancy or len(fitting) == 1:
+        if not self.chancy or len(fitting) == 1:
             return preferred(fitting, errors, self.clusters, self.scale, self.config)
         labels = self.labels[-LATEST:]
         labels = labels[table.strata[self.rows[-LATEST:]] == table.strata[self.rows[example]]]
@@ -177,7 +201,7 @@ class Population:
         cost: NDArray[np.float64] = surprise - np.log(held + size / size.sum()) + parameters
         return cost
 
-    def _reassign_all(self, table: ExampleTable) -> None:
+    def reassign_all(self, table: ExampleTable) -> None:
         """E-step for all examples where noise is large, and M-step for all modes."""
         ids = np.array(sorted(self.clusters), dtype=np.intp)
         if not len(ids):
@@ -196,7 +220,7 @@ class Population:
             members = np.flatnonzero(self.labels == i)
             self.clusters[i] = refit(self.clusters[i], table, self.rows[members], self.y[members], self.scale)
 
-    def _residual_spread(self, table: ExampleTable) -> float:
+    def residual_spread(self, table: ExampleTable) -> float:
         """Root mean square of what modes leave of their examples; 0 if there are none.
 
         Not a median: where noise depends on the state, tolerances must suit the examples where it is large.
@@ -208,47 +232,83 @@ class Population:
             total, count = total + float(np.square(errors).sum()), count + len(members)
         return float(np.sqrt(total / max(count, 1)))
 
-    def _noise(self) -> NDArray[np.intp]:
+    def noise(self) -> NDArray[np.intp]:
+        """Numbers of the examples that no mode explains."""
         return np.flatnonzero(self.labels == NOISE)
 
-    def _explained(
+    def explained(
         self, table: ExampleTable, cluster: Cluster, examples: NDArray[np.intp]
     ) -> NDArray[np.intp]:
+        """Those of the given examples that a mode explains."""
         error, _ = cluster.errors(table, self.rows[examples], self.y[examples], self.scale)
         return examples[error <= self.scale.tolerance]
 
-    def _remove(self, mode: int) -> None:
+    def least_errors(
+        self, table: ExampleTable, examples: NDArray[np.intp], clusters: Iterable[Cluster] | None = None
+    ) -> NDArray[np.float64]:
+        """Error of the mode that explains each example best, infinite where none applies; default: of all modes."""
+        least = np.full(len(examples), np.inf)
+        for cluster in self.clusters.values() if clusters is None else clusters:
+            errors, _ = cluster.errors(table, self.rows[examples], self.y[examples], self.scale)
+            least = np.minimum(least, errors)
+        return least
+
+    def misfit(self, table: ExampleTable, clusters: Iterable[Cluster]) -> float:
+        """Sum of all examples' squared errors by the mode that explains each best, in squares of the tail."""
+        least = self.least_errors(table, np.arange(len(self.log)), clusters)
+        return float(np.square(np.minimum(least / self.scale.tail, 1.0)).sum())
+
+    def known(self, table: ExampleTable) -> Known:
+        """All of it, as those are shown who unify and extend modes."""
+        return Known(
+            table, self.rows, self.y, self.labels, self.clusters, self.target, self.scale, self.config
+        )
+
+    def install(self, table: ExampleTable, cluster: Cluster, absorbed: tuple[int, ...]) -> int:
+        """Put a mode in the place of those it absorbed; its id."""
+        inherited = sum(self.log.forgotten.pop(i, 0) for i in absorbed)
+        for i in absorbed:
+            self.remove(i)
+        new = self.next_id
+        self.next_id += 1
+        self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
+        self.log.forgotten[new] += inherited
+        self.reassign(table, new)
+        return new
+
+    def remove(self, mode: int) -> None:
         """A deleted mode gives its examples back to the noise, from where others take them."""
         del self.clusters[mode]
-        self._log.forgotten[NOISE] += self._log.forgotten.pop(mode, 0)
+        self.log.forgotten[NOISE] += self.log.forgotten.pop(mode, 0)
         self.labels[self.labels == mode] = NOISE
 
-    def _reassign(self, table: ExampleTable, new: int) -> None:
+    def reassign(self, table: ExampleTable, new: int) -> None:
         """E-step for a new mode: it takes what it explains from the noise and from less simple modes."""
-        everyone = self._explained(table, self.clusters[new], np.arange(len(self._log)))
+        everyone = self.explained(table, self.clusters[new], np.arange(len(self.log)))
         for example in everyone:
             held = int(self.labels[example])
             if held == NOISE or _simpler(self.clusters[new].mode, self.clusters[held].mode):
                 self.labels[example] = new
-        self._prune(table)
+        self.prune(table)
         for i in [new] if new in self.clusters else []:
             members = np.flatnonzero(self.labels == i)
             self.clusters[i] = refit(self.clusters[i], table, self.rows[members], self.y[members], self.scale)
 
-    def _prune(self, table: ExampleTable) -> None:
+    def prune(self, table: ExampleTable) -> None:
         """Delete modes that were left with fewer than T / 2 examples; their examples find other homes."""
-        least = least_examples(self.y, self.scale, self.config) / 2
+        least = self.needed / 2
         for i in sorted(self.clusters):
             if (self.labels == i).sum() >= least or len(self.clusters) == 1:
                 continue
             orphans = np.flatnonzero(self.labels == i)
-            self._remove(i)
-            self._rehome(table, orphans)
+            self.remove(i)
+            self.rehome(table, orphans)
 
-    def _rehome(self, table: ExampleTable, examples: NDArray[np.intp]) -> None:
+    def rehome(self, table: ExampleTable, examples: NDArray[np.intp]) -> None:
+        """Assign examples that no mode has to those that explain them."""
         _, fits = self.fits(table, examples)
         for example in examples[fits.any(axis=1)].tolist():
-            self.labels[example] = self._choose(table, example, self._errors_of(table, example))
+            self.labels[example] = self.choose(table, example, self.errors_of(table, example))
 
 
 def _simpler(mode: Mode, other: Mode) -> bool:

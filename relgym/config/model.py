@@ -30,8 +30,8 @@ class ModelConfig:
         ``"arrays"`` (default, batched) or ``"fcl"`` (any shapes, scene by scene); a model always uses the same one.
     abstain
         Whether a situation that differs from all seen ones in what the clauses look at is called *outside experience*
-        instead of being predicted, and one where no mode explained what followed *unexplained* (`relgym.model.scope`).
-        Default true; false: the votes decide there as everywhere.
+        instead of being predicted, and one where no mode explained what followed *unexplained*
+        (`relgym.model.target.scope`). Default true; false: the votes decide there as everywhere.
     work_per_step
         Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
         literals examined). Default 400,000, some 20 ms, range 0 to 10**12. Raising it makes rules fresher and single
@@ -59,6 +59,10 @@ class ModelConfig:
         names of functions registered with `relgym.clustering.features.register_function`. ``"cart:trig"`` offers them
         to one type only. Default none; where linear laws don't explain a property, the report says what would.
         A linear law wins where it is enough; every kind offered makes searches slower.
+    hypotheses
+        Names of classes registered with `relgym.hypotheses.register_hypothesis`, whose laws compete with modes for
+        every property. Default none; each costs the time of its proposals, and speaks only where it codes what comes
+        better than anybody else.
     history
         Examples kept per object type; memory stays flat beyond. Default 200,000, range 100 to 10**9. Of more, a uniform
         choice stays, and everything rare: small modes, recent noise, and what classifiers remember. Raising it costs
@@ -90,6 +94,7 @@ class ModelConfig:
     saved_cells: int = 1_000_000_000
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()
+    hypotheses: tuple[str, ...] = ()
     history: int = 200_000
     claim_error: float = 0.05
     claim_probability: float = 0.9
@@ -114,6 +119,11 @@ class ModelConfig:
         features: object = self.features
         if not isinstance(features, (tuple, list)) or not all(isinstance(entry, str) for entry in features):
             raise ConfigError(f"features must be a tuple of names, such as ('trig',), got {features!r}")
+        named: object = self.hypotheses
+        if not isinstance(named, (tuple, list)) or not all(isinstance(each, str) for each in named):
+            raise ConfigError(f"hypotheses must be a tuple of registered names, got {named!r}")
+        if len(set(named)) < len(named):
+            raise ConfigError(f"hypotheses names a class twice: {named!r}; leave one out")
 
     @classmethod
     def of(cls, given: ModelConfig | Mapping[str, Any] | None) -> ModelConfig:
@@ -139,12 +149,13 @@ class ModelConfig:
                 f"config={given!r}: expected a ModelConfig, or a dict of what differs from the default, such as "
                 "{'features': ('trig',)}"
             )
-        features = given.get("features", ())
+        features, hypotheses = given.get("features", ()), given.get("hypotheses", ())
         try:
             parts = {
                 "clustering": _part(ClusteringConfig, given.get("clustering", {})),
                 "classification": _part(ClassificationConfig, given.get("classification", {})),
                 "features": tuple(features) if isinstance(features, list) else features,
+                "hypotheses": tuple(hypotheses) if isinstance(hypotheses, list) else hypotheses,
             }
             return cls(**{**given, **parts})
         except TypeError as error:
@@ -209,7 +220,7 @@ class ModelConfig:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
-        return asdict(self)
+        return {name: value for name, value in asdict(self).items() if name != "hypotheses" or value}
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> ModelConfig:
@@ -220,6 +231,7 @@ class ModelConfig:
                 "clustering": ClusteringConfig(**data["clustering"]),
                 "classification": ClassificationConfig(**data["classification"]),
                 "features": tuple(data.get("features", ())),
+                "hypotheses": tuple(data.get("hypotheses", ())),
             }
         )
 

@@ -22,7 +22,7 @@ from relgym.envs.views import TaskView
 from relgym.errors import ConfigError, RelgymError
 from relgym.experiments.fresh import fresh_episodes, transitions
 from relgym.experiments.scores import Score, score
-from relgym.model.text import amount
+from relgym.model.reports.text import amount
 from relgym.wrappers import ModelLearner
 
 __all__ = ["Lesson", "Round", "checked_out", "lessons", "switch"]

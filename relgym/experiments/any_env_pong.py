@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from relgym.experiments.any_env_recorded import live, stream
 from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.recording import Recording
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Target
 

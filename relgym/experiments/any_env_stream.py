@@ -16,7 +16,7 @@ from relgym.baselines.changes import ONLINE, predicted_changes, titles
 from relgym.config import ModelConfig
 from relgym.experiments.any_env_data import STUDIES, Lesson, collect, recommended
 from relgym.experiments.criterion import Measure, measured
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 
 __all__ = ["ahead", "prequential"]

@@ -89,7 +89,7 @@ def _off(model: WorldModel, name: str) -> float:
     """By what share the weight of vx is off in what predicts x."""
     part = model.property_model(name, "x")
     best = max(part.modes, key=lambda m: m.examples, default=None)
-    mode = part.guess.mode if part.guess is not None else best
+    mode = part.fallback.guess.mode if part.fallback.guess is not None else best
     weight = 0.0 if mode is None else dict(mode.roles[0].terms).get("vx", 0.0)
     return abs(weight / STEP - 1.0)
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any, Literal
 
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["Criterion", "Measure", "measured", "one_of", "report"]
 

@@ -25,7 +25,7 @@ from relgym.experiments.plots import Curve, Imagined, Trajectory, draw_curves, d
 from relgym.experiments.rollouts import imagined
 from relgym.experiments.truck_check import TruckCheck, check_truck
 from relgym.experiments.verdict import Verdict, verdict
-from relgym.model.report import ModelReport, report
+from relgym.model.reports.report import ModelReport, report
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION
 from relgym.wrappers import ModelLearner, StepReport

@@ -15,9 +15,9 @@ import relgym
 from relgym.envs.flat import FlatSpec
 from relgym.errors import ConfigError
 from relgym.wrappers.action_repeat import ActionRepeat
+from relgym.wrappers.dyna.config import DynaConfig
+from relgym.wrappers.dyna.recorder import TransitionRecorder
 from relgym.wrappers.flat import FlatView
-from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.recorder import TransitionRecorder
 from relgym.wrappers.truncated_episodes import TruncatedEpisodes
 
 if TYPE_CHECKING:

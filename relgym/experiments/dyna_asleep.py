@@ -14,9 +14,9 @@ import relgym
 from relgym.envs.flat import FlatSpec
 from relgym.experiments.dyna import Examination
 from relgym.experiments.dyna_arms import AGENT, COURSES, Course, make_env
+from relgym.wrappers.dyna.config import DynaConfig
+from relgym.wrappers.dyna.trainer import ModelTrainer
 from relgym.wrappers.flat import VectorFlatView
-from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.trainer import ModelTrainer
 
 __all__ = ["among", "asleep", "trained_among", "trained_asleep"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relgym.experiments.dyna_arms import ARMS
 from relgym.experiments.plots import require_matplotlib
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 if TYPE_CHECKING:
     from relgym.experiments.dyna import Run

@@ -20,7 +20,7 @@ from gymnasium.envs.registration import load_env_creator
 import relgym  # noqa: F401 - registers the envs
 from relgym.envs.views import View
 from relgym.errors import RelgymError
-from relgym.model.text import Cell, indented, table
+from relgym.model.reports.text import Cell, indented, table
 from relgym.scene.objects import Scene
 from relgym.scene.schema import SceneSchema
 from relgym.scene.state import relational_state

@@ -26,7 +26,7 @@ from relgym.experiments.law_score import SEEDS, TESTS, Part, Section, score, tau
 from relgym.experiments.law_trials import inexpressible, noise, other_worlds
 from relgym.experiments.rollouts import largest_errors
 from relgym.experiments.rooms import rooms
-from relgym.model.report import report as report_of
+from relgym.model.reports.report import report as report_of
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 from relgym.scene.relations import Extractor

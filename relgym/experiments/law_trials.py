@@ -16,7 +16,7 @@ from relgym.experiments.law_score import TESTS, Section, score, score_laws, taug
 from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.experiments.rooms import Room
 from relgym.laws.book import LawBook
-from relgym.model.report import report as report_of
+from relgym.model.reports.report import report as report_of
 
 __all__ = [
     "INEXPRESSIBLE",

@@ -19,9 +19,9 @@ from relgym.planning import EnvSimulator, Objective, Planner, PlanningAgent, Ste
 from relgym.planning.review import right
 from relgym.scene.objects import Float1D, Float2D, Scene
 from relgym.wrappers.action_repeat import ActionRepeat
-from relgym.wrappers.sb3.acting import acting_all
-from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
-from relgym.wrappers.sb3.trainer import ModelTrainer
+from relgym.wrappers.dyna.acting import acting_all
+from relgym.wrappers.dyna.recorder import Experience, TransitionRecorder
+from relgym.wrappers.dyna.trainer import ModelTrainer
 
 __all__ = [
     "ARMS",

@@ -26,7 +26,7 @@ from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.plan import ARMS, COURSES
 from relgym.experiments.plots import require_matplotlib
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["changed", "draw", "explored", "main", "page", "tasks", "told"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.experiments.episodes import Episode
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
 

@@ -10,9 +10,9 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.model.hindsight import WRONG
 from relgym.model.prediction import OUTCOMES, Outcome
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
+from relgym.model.target.hindsight import WRONG
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 

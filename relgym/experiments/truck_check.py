@@ -10,7 +10,7 @@ from relgym.clustering.mode import Mode
 from relgym.envs.truck_scenes import stacks_of
 from relgym.experiments.analytic import TruckMode, truck_modes
 from relgym.experiments.episodes import Episode
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
 

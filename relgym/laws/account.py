@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import DIGITS
 from relgym.laws.book import LawBook
 from relgym.laws.composition import Engaged, compose
 from relgym.laws.frames import axes_of, axis_names, turned
@@ -78,7 +79,7 @@ class ContactAccount:
 
 
 def accounts(
-    book: LawBook, contacts: Contacts, vectors: NDArray[np.float64], digits: int = 7
+    book: LawBook, contacts: Contacts, vectors: NDArray[np.float64], digits: int = DIGITS
 ) -> tuple[ContactAccount, ...]:
     """Every contact of a single scene on which the laws have a say, in the order of the pairs.
 

@@ -19,6 +19,7 @@ from relgym.laws.joints import Joints
 from relgym.laws.points import Points
 from relgym.laws.records import ONE, FreeLaw, Kind, PairLaw, Share
 from relgym.laws.shares import EXTENT, share_values
+from relgym.laws.text import law_rows
 from relgym.laws.touching import Cast, Contacts, Group
 from relgym.laws.turning import eases, precedented, push, rows_of
 from relgym.scene.geometry.vectors import FloatArray
@@ -98,8 +99,6 @@ class LawBook:
         self._engaged: dict[SceneLayout, list[Engaged]] = {}
 
     def _repr_html_(self) -> str:
-        from relgym.laws.text import law_rows  # which reads books: this class comes first
-
         rows = [
             (row.subject, row.statement, f"{row.examples:,}", f"{row.unexplained:,}")
             for row in law_rows(self, self.free)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import CONTACTS_KEPT
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
 from relgym.laws.frames import Bearings
@@ -22,9 +23,6 @@ from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["EncounterStore"]
-
-KEPT = 3_000
-"""Contacts kept."""
 
 
 class EncounterStore:
@@ -53,7 +51,7 @@ class EncounterStore:
         }  # fmt: skip
         ends = np.cumsum(list(widths.values())).tolist()
         self._at = {name: slice(end - w, end) for (name, w), end in zip(widths.items(), ends, strict=True)}
-        self._store = Store(ends[-1], KEPT, seed=seed)
+        self._store = Store(ends[-1], CONTACTS_KEPT, seed=seed)
 
     def __len__(self) -> int:
         return len(self._store.rows)

@@ -17,6 +17,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import DIGITS, POWERS, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import ONE, Piece
 from relgym.scene.geometry.vectors import FloatArray, dot
@@ -47,13 +48,9 @@ FEWEST = 4
 EXPLAINS = 0.98
 """A statement that explains a smaller share of its contacts is none."""
 
-TOLD = 100.0
-"""A change of more than this many tolerances tells something."""
-
 ROUGHLY = 1e-4
 """Relative error up to which contacts count as obeying a first estimate: then all of them together sharpen it."""
 
-POWERS = (1, 2, 3)
 DRAWS = 64
 
 By = Literal["", "type", "object"]
@@ -130,7 +127,7 @@ class Inertia:
         )  # fmt: skip
         return mass, tuple((g.types, g.piece and g.piece.formula(9), g.whole) for g in self.gyrations)
 
-    def sentences(self, digits: int = 7) -> tuple[str, ...]:
+    def sentences(self, digits: int = DIGITS) -> tuple[str, ...]:
         """What is known, a sentence each; `parse_inertia` reads them back."""
         found = []
         if (m := self.mass) is not None:

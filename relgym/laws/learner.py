@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import ROUNDINGS, STDS
 from relgym.laws.book import LawBook, Motion
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
@@ -32,12 +33,6 @@ from relgym.scene.objects import Target
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LawLearner"]
-
-ROUNDINGS = 32.0
-"""A law on differences of stored positions carries at most about this many roundings."""
-
-STDS = 4.0
-"""Residual of an explained velocity, in standard deviations of the noise."""
 
 ESTIMATE_AT = (64, 256, 1024)
 """Numbers of free examples at which the noise is estimated, if the free law doesn't hold exactly."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import TIE_BITS, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.frames import FRAMES, POINT, Bearings, axes_of, axis_names, turned
 from relgym.laws.kinds import KindsFit, fit_apart, fit_together
@@ -19,13 +20,6 @@ __all__ = ["Encounters", "PairFit", "fit_pair"]
 
 SPLIT = 2
 """In so many of the best frames materials are told apart, should one law not be enough for all."""
-
-TIE = 1e-6
-"""Difference in bits that decides nothing."""
-
-
-TOLD = 100.0
-"""A change of more than this many tolerances tells how bodies divide it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +96,7 @@ def fit_pair(encounters: Encounters, *, rng: np.random.Generator, frames: Sequen
     best: PairFit | None = None
     for draft in sorted(drafts, key=_bits)[:SPLIT]:
         found = draft.split(np.inf if best is None else best.law.bits, rng=rng)
-        if best is None or found.law.bits < best.law.bits - TIE:
+        if best is None or found.law.bits < best.law.bits - TIE_BITS:
             best = found
     assert best is not None, "without a limit every frame gives a law"
     return best

@@ -13,15 +13,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import EXTRAPOLATED
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import Piece
 from relgym.numeric.stepwise import least_squares
 from relgym.scene.geometry.vectors import FloatArray
 
 __all__ = ["AxisExamples", "find_pieces", "fitted"]
-
-LOOSE = 100.0
-"""A function through one or two examples is extrapolated: at first a tolerance so much wider evaluates it."""
 
 ACTING = 10.0
 """A term acts on an example where it contributes more than this many tolerances."""
@@ -115,7 +113,7 @@ def _search(part: AxisExamples, everything: AxisExamples, *, rng: np.random.Gene
     for base, columns in _subsets(part):
         for weights in _promising(sample, base, columns, rng=rng):
             rough = _piece(part, base, columns, weights)
-            loose = part.near(rough, LOOSE)
+            loose = part.near(rough, EXTRAPOLATED)
             least = 0.0 if best is None else best[0] + 1.0
             if EXCEPTION_BITS * int(loose.sum()) <= least:
                 continue  # no fit would save more
@@ -158,7 +156,7 @@ def _promising(
         contribution = weights[:, k, None] * x[:, k]
         hits &= np.abs(contribution) > ACTING * sample.tolerance
         left = left - contribution
-    hits &= np.abs(left) <= LOOSE * sample.tolerance
+    hits &= np.abs(left) <= EXTRAPOLATED * sample.tolerance
     counts = np.count_nonzero(hits, axis=1)
     best = int(counts.argmax())
     return [weights[best]] if counts[best] >= p + 2 else []

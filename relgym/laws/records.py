@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from relgym.clustering.mode import sum_text
+from relgym.config.constants import DIGITS
 from relgym.scene.geometry.vectors import FloatArray
 
 __all__ = ["ONE", "ZERO", "AxisLaw", "FreeLaw", "Kind", "Operator", "PairLaw", "Piece", "Share"]
@@ -40,7 +41,7 @@ class Piece:
             total = total + (weight if name == ONE else weight * features[name])
         return total
 
-    def formula(self, digits: int = 7) -> str:
+    def formula(self, digits: int = DIGITS) -> str:
         """Such as ``u_t - 0.2 J_n``."""
         constant = sum(weight for name, weight in self.terms if name == ONE)
         return sum_text([(weight, name) for name, weight in self.terms if name != ONE], constant, digits)
@@ -98,7 +99,7 @@ class AxisLaw:
         """Velocity after the contact along the axis."""
         return combined(self.operator, [piece.values(features, like) for piece in self.pieces])
 
-    def formula(self, digits: int = 7) -> str:
+    def formula(self, digits: int = DIGITS) -> str:
         """Such as ``max(u_n, -0.9 v_n)``."""
         texts = [piece.formula(digits) for piece in self.pieces]
         return texts[0] if len(texts) == 1 else f"{self.operator}({', '.join(texts)})"
@@ -229,7 +230,7 @@ class Share:
     power: int = 1
     constant: float = 0.5
 
-    def formula(self, digits: int = 7) -> str:
+    def formula(self, digits: int = DIGITS) -> str:
         """Such as ``m_B / (m_A + m_B)``."""
         if not self.property:
             return f"{self.constant:.{digits}g}"

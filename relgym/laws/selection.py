@@ -9,6 +9,7 @@ from itertools import combinations, islice
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import TIE_BITS
 from relgym.laws.description import EXCEPTION_BITS, function_bits
 from relgym.laws.pieces import AxisExamples, find_pieces, fitted
 from relgym.laws.records import ZERO, Operator, Piece, combined
@@ -20,9 +21,6 @@ MOST_ALTERNATIVES = 4
 
 GRIP_BITS = 16.0
 """Bits of the claim that a body is not let go where no impulse acts: more than saying how it moves on."""
-
-TIE = 1e-6
-"""Difference in bits that decides nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +58,10 @@ def fit_axis(examples: AxisExamples, *, rng: np.random.Generator) -> AxisFit:
         explained = np.abs(examples.y - after) <= examples.tolerance
         scored.append((_score(examples, [pieces[k] for k in chosen], explained), operator, chosen))
     least = min(score for score, _, _ in scored)
-    best = [(operator, chosen) for score, operator, chosen in scored if score <= least + TIE]
+    best = [(operator, chosen) for score, operator, chosen in scored if score <= least + TIE_BITS]
     fits = [_refit(examples, operator, tuple(pieces[k] for k in chosen)) for operator, chosen in best]
     first = fits[0]
-    alternatives = [f for f in fits[1:] if f.bits <= first.bits + TIE and not _same(f, first)]
+    alternatives = [f for f in fits[1:] if f.bits <= first.bits + TIE_BITS and not _same(f, first)]
     return AxisFit(
         first.pieces,
         first.operator,

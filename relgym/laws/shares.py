@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import POWERS
 from relgym.laws.records import Share
 from relgym.scene.geometry.vectors import FloatArray, dot
 
@@ -17,8 +18,6 @@ EXTENT = "extent"
 
 FEWEST = 3
 """Contacts in which something passed between the bodies that found a share."""
-
-POWERS = (1, 2, 3)
 
 
 def share_values(share: Share, a: Mapping[str, FloatArray], b: Mapping[str, FloatArray]) -> FloatArray:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import FIRST_ROOM
+
 __all__ = ["Store"]
 
 
@@ -29,8 +31,8 @@ class Store:
     def __init__(self, width: int, limit: int, *, seed: int) -> None:
         self.limit = limit
         self.seen = 0
-        self._rows = np.zeros((64, width))
-        self._cells = np.zeros(64, dtype=np.int64)
+        self._rows = np.zeros((FIRST_ROOM, width))
+        self._cells = np.zeros(FIRST_ROOM, dtype=np.int64)
         self._size = 0
         self._counts: dict[int, int] | None = None  # worked out when it is needed
         self._rng = np.random.default_rng([seed, 2])
@@ -102,4 +104,7 @@ class Store:
         self._cells = np.array(arrays["cells"], dtype=np.int64)
         self._size, self._counts = len(self._rows), None
         if not self._size:
-            self._rows, self._cells = np.zeros((64, self._rows.shape[1])), np.zeros(64, dtype=np.int64)
+            self._rows, self._cells = (
+                np.zeros((FIRST_ROOM, self._rows.shape[1])),
+                np.zeros(FIRST_ROOM, dtype=np.int64),
+            )

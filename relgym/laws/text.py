@@ -6,13 +6,17 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
 from relgym.clustering.mode import sum_text
+from relgym.config.constants import DIGITS
 from relgym.errors import ConfigError
-from relgym.laws.book import LawBook
 from relgym.laws.frames import NORMAL_FRAMES, POINT, axis_names
 from relgym.laws.records import ALIKE, ONE, Kind, PairLaw, Piece
 from relgym.scene.axes import Axes
+
+if TYPE_CHECKING:
+    from relgym.laws.book import LawBook
 
 __all__ = ["DIRECTIONS", "LEGEND", "LawRow", "WorldRow", "law_rows", "world_rows"]
 
@@ -74,7 +78,7 @@ class WorldRow:
     functions: tuple[str, ...]
 
 
-def law_rows(book: LawBook, types: Iterable[str], digits: int = 7) -> tuple[LawRow, ...]:
+def law_rows(book: LawBook, types: Iterable[str], digits: int = DIGITS) -> tuple[LawRow, ...]:
     """The laws that govern some types, a sentence each."""
     rows = [row for name in sorted(types) for row in _free_rows(book, name, digits)]
     if book.pair is None:
@@ -127,7 +131,7 @@ _Form = dict[str, float]
 """A linear function of the free law's columns."""
 
 
-def world_rows(book: LawBook, type_name: str, incline: float, digits: int = 7) -> tuple[WorldRow, ...]:
+def world_rows(book: LawBook, type_name: str, incline: float, digits: int = DIGITS) -> tuple[WorldRow, ...]:
     """Functions along the world's axes that the laws give on a surface of some incline.
 
     Parameters

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import CONTACTS_KEPT
 from relgym.laws.columns import Sources
 from relgym.laws.description import EXCEPTION_BITS
 from relgym.laws.frames import POINT, axis_names, turned
@@ -27,9 +28,6 @@ from relgym.scene.geometry.vectors import FloatArray, dot
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LETTERS", "PushStore", "Yields", "eases", "precedented", "push", "rows_of", "shape_features"]
-
-KEPT = 3_000
-"""Contacts kept."""
 
 LETTERS = axis_names(POINT, 2)
 
@@ -247,7 +245,7 @@ class PushStore:
             widths |= {f"shape_{side}": 4, f"x_{side}": columns}
         ends = np.cumsum(list(widths.values())).tolist()
         self._at = {name: slice(end - w, end) for (name, w), end in zip(widths.items(), ends, strict=True)}
-        self._store = Store(ends[-1], KEPT, seed=seed)
+        self._store = Store(ends[-1], CONTACTS_KEPT, seed=seed)
 
     def __len__(self) -> int:
         return len(self._store.rows)

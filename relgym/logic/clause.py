@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
 
+from relgym.config.constants import TALLY_DIGITS
 from relgym.errors import ConfigError
 
 __all__ = ["ANY", "Clause", "Coverage", "Definition", "Literal"]
@@ -263,6 +264,11 @@ class Definition:
             raise ConfigError(
                 f"Expected clauses of arity {self.arity}, got {[c.arity for c in self.clauses]}."
             )
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What definitions of one class are compared by, the better one first: errors, then bits."""
+        return round(self.errors, TALLY_DIGITS), round(self.bits, TALLY_DIGITS)
 
     @property
     def errors(self) -> float:

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from relgym.config.constants import TALLY_DIGITS
 from relgym.logic.clause import Clause, Coverage, Definition
 from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
@@ -113,7 +114,7 @@ class Cover:
             bits = self._length.literals(growing.literals, self._tables.arity)
             clean = pure and left.negatives <= EPS
             value = left.positives * information - bits if clean else self._length.saving(bits, left, whole)
-            keys[place] = (not clean, -round(value, 7), round(bits, 7), place)
+            keys[place] = (not clean, -round(value, TALLY_DIGITS), round(bits, TALLY_DIGITS), place)
         return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
 
     def _harvest(self, alive: Bool) -> Steps[Harvest]:

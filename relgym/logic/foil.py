@@ -97,7 +97,7 @@ def learn_both(
     # nothing beats a definition without errors but one of fewer bits
     other = yield from task.swapped().solve(given.bits if given.errors <= EPS else math.inf)
     work = given.work + other.work
-    if (round(other.errors, 7), round(other.bits, 7)) < (round(given.errors, 7), round(given.bits, 7)):
+    if other.rank < given.rank:
         return replace(other, negated=True, work=work)
     return replace(given, work=work)
 

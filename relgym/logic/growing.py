@@ -13,6 +13,7 @@ from typing import Any, Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import TALLY_DIGITS
 from relgym.logic import clause as logic
 from relgym.logic.facts import Bool, Float
 from relgym.logic.tables import Tables
@@ -102,7 +103,7 @@ class Score:
 
 
 def _rounded(values: Float) -> Float:
-    return np.round(values, 7)
+    return np.round(values, TALLY_DIGITS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relgym.config.constants import TALLY_DIGITS
 from relgym.logic.batch import extremes, matches
 from relgym.logic.clause import Clause, Coverage, Literal
 from relgym.logic.facts import Bool, Facts, Float, Int
@@ -71,7 +72,7 @@ def prune(clause: Clause, problem: Problem) -> Clause:
 def _value(clause: Clause, problem: Problem) -> tuple[float, float]:
     covered = problem.count(problem.matches(clause))
     # rounded: the same tuples summed in another order are the same weight
-    return round(covered.positives, 7), round(covered.negatives, 7)
+    return round(covered.positives, TALLY_DIGITS), round(covered.negatives, TALLY_DIGITS)
 
 
 def center_thresholds(clause: Clause, problem: Problem) -> Clause:

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import TALLY_DIGITS
 from relgym.logic.candidates import Block, blocks
 from relgym.logic.clause import Coverage
 from relgym.logic.description import DescriptionLength
@@ -146,8 +147,8 @@ class _Candidates:
         self.size = int(self._ends[-1]) if self._blocks else 0
         if self.size:
             self._score = self._join(lambda growing, block: score(block.counts) - self._price(growing, block))
-            self._positives = self._join(lambda _, block: np.round(block.counts.positives, 7))
-            self._negatives = self._join(lambda _, block: np.round(block.counts.negatives, 7))
+            self._positives = self._join(lambda _, block: np.round(block.counts.positives, TALLY_DIGITS))
+            self._negatives = self._join(lambda _, block: np.round(block.counts.negatives, TALLY_DIGITS))
             self._introduced = self._join(lambda _, block: block.introduced())
             self._useful = (self._positives > EPS) & self._join(_changes)
             names = self._join(lambda _, block: block.names)

@@ -30,6 +30,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import EVIDENCE
+
 __all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
 
 EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
@@ -43,9 +45,6 @@ _KNOWN: Final = (LINEAR, LINEAR + 1, PERSISTENCE)
 
 _BY_DEFAULT: Final = (OWN, GUESS, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
-
-EVIDENCE: Final = 10.0
-"""Bits by which evidence must lead: it misleads once in 2^10 times."""
 
 MEMORY: Final = 1024
 """Of more trials than this the older ones count half: a share of 99 % is known to 0.4 % from half as many, and a lead
@@ -186,8 +185,8 @@ class _Cell:
     ]  # for each expert: trials, its squares, those of persistence in the same trials
 
     @classmethod
-    def new(cls, speaker: int) -> _Cell:
-        return cls(speaker, {}, [[0.0, 0.0, 0.0] for _ in EXPERTS])
+    def new(cls, speaker: int, experts: int) -> _Cell:
+        return cls(speaker, {}, [[0.0, 0.0, 0.0] for _ in range(experts)])
 
     def count(self, errors: Sequence[float], within: float) -> None:
         """Take in what each expert was off by; the best one speaks, if it leads by enough."""
@@ -228,7 +227,7 @@ class _Cell:
         """
         own = self.records.get(OWN)
         if OWN in able and own is not None and own.share(0.5) >= probability:
-            least = min(self.left(expert) for expert in _KNOWN if expert in able)
+            least = min(self.left(expert) for expert in able if expert in _KNOWN or expert >= len(EXPERTS))
             if self.left(OWN) <= LEAVE * LEAVE * least:
                 return OWN
         return self.speaker if self.speaker in able else min(able, key=self.left)
@@ -242,6 +241,8 @@ class Calibration:
     probability
         How probable it must be that what the winner says is right, for it to be claimed
         (`ModelConfig.claim_probability`).
+    hypotheses
+        Laws of `ModelConfig.hypotheses`: experts behind those that there always are.
 
     Attributes
     ----------
@@ -249,8 +250,9 @@ class Calibration:
         Predictions that somebody looked back at.
     """
 
-    def __init__(self, probability: float = 0.9) -> None:
+    def __init__(self, probability: float = 0.9, hypotheses: int = 0) -> None:
         self.probability = probability
+        self.experts = len(EXPERTS) + hypotheses
         self.trials = 0
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
@@ -347,7 +349,7 @@ class Calibration:
             self._slips = [0.5 * each for each in self._slips]
         for key in dict.fromkeys((_whole(audit.key), audit.key)):
             if key not in self._cells:
-                self._cells[key] = _Cell.new(audit.speaker)
+                self._cells[key] = _Cell.new(audit.speaker, self.experts)
             self._cells[key].count(errors, within)
         self._assessed.clear()
 
@@ -355,6 +357,27 @@ class Calibration:
         """Forget the records of modes that are gone; those of laws stay."""
         self._cells = {k: c for k, c in self._cells.items() if k.winner <= 0 or k.winner in modes}
         self._assessed.clear()
+
+    def renewed(self, expert: int) -> None:
+        """An expert has another law: it begins as if it had been as good as who speaks in the latest few trials.
+
+        Of the first trials alone chance would tell. With `EVIDENCE` of them to begin with, an exact law speaks after as
+        many again.
+        """
+        for cell in self._cells.values():
+            known = cell.squares[cell.speaker]
+            share = min(1.0, EVIDENCE / known[0]) if known[0] else 0.0
+            cell.squares[expert] = [share * each for each in known]
+        self._assessed.clear()
+
+    def speakers(self) -> dict[int, float]:
+        """Trials of the cells in which each expert gives the value, by place of the expert."""
+        found: dict[int, float] = {}
+        for key, cell in sorted(self._cells.items()):
+            if key != _whole(key):
+                speaker = self._assess(key, tuple(range(self.experts))).speaker
+                found[speaker] = found.get(speaker, 0.0) + cell.squares[PERSISTENCE][0]
+        return found
 
     def doubts(self, outcome: int, probability: float) -> bool:
         """Whether what won the vote was right less often than that, or the mode that held last speaks instead."""
@@ -375,13 +398,14 @@ class Calibration:
         """Trials of each kind of predictions of an outcome, and what is made of such a prediction."""
         for key, cell in sorted(self._cells.items()):
             if key.outcome == outcome and key != _whole(key):
-                yield cell.squares[PERSISTENCE][0], self._assess(key, tuple(range(len(EXPERTS))))
+                yield cell.squares[PERSISTENCE][0], self._assess(key, tuple(range(self.experts)))
 
     def united(self, other: Calibration) -> Calibration:
         """What two models know together: cell by cell, the record of who looked back more often."""
         more, less = (self, other) if self.trials >= other.trials else (other, self)
-        found = Calibration.from_json(more.to_json(), self.probability)
-        for key, cell in Calibration.from_json(less.to_json(), self.probability)._cells.items():
+        hypotheses = self.experts - len(EXPERTS)
+        found = Calibration.from_json(more.to_json(), self.probability, hypotheses)
+        for key, cell in Calibration.from_json(less.to_json(), self.probability, hypotheses)._cells.items():
             found._cells.setdefault(key, cell)
         found.trials = self.trials + other.trials
         return found
@@ -408,9 +432,9 @@ class Calibration:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any], probability: float) -> Calibration:
+    def from_json(cls, data: Mapping[str, Any], probability: float, hypotheses: int = 0) -> Calibration:
         """Read what `to_json` wrote."""
-        found = cls(probability)
+        found = cls(probability, hypotheses)
         found.trials = int(data["trials"])
         found._slips = [float(each) for each in data["slips"]]
         found._changes = {int(place): float(count) for place, count in data["changes"]}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.model.property_model import PropertyModel
+from relgym.model.target.property_model import PropertyModel
 
 __all__ = ["SLACK", "forget"]
 

@@ -15,8 +15,8 @@ from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import ScenePrediction
-from relgym.model.property_model import bodies_of
 from relgym.model.scenes import next_values, stays, unwrapped
+from relgym.model.target.property_model import bodies_of
 from relgym.scene.objects import TASK, Target, Transition
 from relgym.scheduling.agenda import Budget
 
@@ -106,7 +106,7 @@ def _go_on(parts: Parts, budget: Budget) -> None:
     for target in parts.targets:
         table = parts.tables[target.type]
         parts.models[target].approximate(table, budget)
-        if parts.models[target].guesses.underway:
+        if parts.models[target].fallback.guesses.underway or parts.models[target].candidates.under_way:
             parts.models[target].reconsider(table, budget)
     searches = budget.part(SEARCHES)
     for waiting in parts.agenda.waiting:

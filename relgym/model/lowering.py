@@ -28,9 +28,9 @@ from relgym.laws.touching import Cast
 from relgym.logic.clause import Clause, Literal
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Perception, Situation
-from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import angle_columns
-from relgym.model.stops import Stop as LearnedStop
+from relgym.model.target.property_model import PropertyModel
+from relgym.model.target.stops import Stop as LearnedStop
 from relgym.numeric.tree import DecisionTree
 from relgym.program import records as ir
 from relgym.scene.axes import Axes
@@ -261,14 +261,23 @@ class _Lowering:
         signature = situation.signature
         gather = self.perception.gather(layout, signature, tuple(situation.plain.tolist()))
         one = _Columns(self, signature, gather.tolist())
-        guess, beyond = (_bound_sum(model._guessing(signature, beyond=b), one.column) for b in (False, True))
+        guess, beyond = (
+            _bound_sum(model.fallback.guessing(signature, beyond=b), one.column) for b in (False, True)
+        )
         scope = None
         bounded = guess is not None or beyond is not None or model.clusterer.approximate
-        if model.scope.tree is not None and (places := model.scope.places(signature)) is not None:
-            scope = self._scope_tree(model.scope.tree, [one.column(k) for k in places])
+        if (
+            model.fallback.scope.tree is not None
+            and (places := model.fallback.scope.places(signature)) is not None
+        ):
+            scope = self._scope_tree(model.fallback.scope.tree, [one.column(k) for k in places])
         column = layout.column(index, target.property)
         present = self.zero if target.type == TASK else column
-        reach = ir.Reach(present, float(model.scope.least), float(model.scope.most)) if bounded else None
+        reach = (
+            ir.Reach(present, float(model.fallback.scope.least), float(model.fallback.scope.most))
+            if bounded
+            else None
+        )
         governed = parts.governs(target)
         laws = parts.laws
         component = laws._components[target.type, target.property] if governed and laws is not None else -1
@@ -302,8 +311,8 @@ class _Lowering:
     ) -> dict[str, object]:
         """What an answer by modes says besides."""
         ids = model.classifier.modes
-        if model._lost or not ids:
-            return {"state": "lost" if model._lost else "none"}
+        if model.lost or not ids:
+            return {"state": "lost" if model.lost else "none"}
         signature = situation.signature
         found = tuple(self._mode(model, number, situation, one, body) for number in ids)
         registers = {mode.id: mode.register for mode in found}

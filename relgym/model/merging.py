@@ -20,8 +20,8 @@ from relgym.errors import ConfigError
 from relgym.model.chaining import in_order
 from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
-from relgym.model.property_model import PropertyModel
 from relgym.model.scenes import mismatch
+from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import Target
 
 __all__ = ["merge"]

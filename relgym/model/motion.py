@@ -17,7 +17,7 @@ from relgym.laws.learner import LawLearner
 from relgym.laws.touching import Contacts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
-from relgym.model.property_model import PropertyModel, Verdict
+from relgym.model.target.property_model import PropertyModel, Verdict
 from relgym.scene.objects import ACTION, Target
 from relgym.scene.schema import SceneSchema
 

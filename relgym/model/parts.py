@@ -16,10 +16,10 @@ from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
 from relgym.model.chaining import Inquiry, Look, in_order
 from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Percept, Perception
-from relgym.model.property_model import PropertyModel
 from relgym.model.regression import Regression
 from relgym.model.scenes import mismatch, stays
 from relgym.model.screening import Screen
+from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 from relgym.scene.sizes import check_sizes

@@ -21,13 +21,13 @@ class Outcome(enum.Enum):
     """How a prediction came about; the value is the sentence for people.
 
     Only `PREDICTED` is the prediction of a mode or a law. With every other outcome the value is a fallback, not a
-    claim: what is unexplained is guessed (`relgym.model.guess`) as soon as a guess is better than that nothing changes,
-    and so it is where an approximation isn't good (`relgym.model.scope`); or, where modes cover the examples but
-    nothing tells which of them holds when, it is what the vote's winner says; outside experience it is what the mode
-    says that would win the vote; what depends on such a fallback value follows from it; else the property keeps its
-    value. So it is for a model that nobody told how its predictions came out. Of one that was told, the value is that
-    of whoever codes such predictions best, and a mode's or a law's prediction that isn't right often enough for a claim
-    is `UNSURE` (`relgym.model.calibration`).
+    claim: what is unexplained is guessed (`relgym.model.target.guess`) as soon as a guess is better than that
+    nothing changes, and so it is where an approximation isn't good (`relgym.model.target.scope`); or, where modes
+    cover the examples but nothing tells which of them holds when, it is what the vote's winner says; outside
+    experience it is what the mode says that would win the vote; what depends on such a fallback value follows from
+    it; else the property keeps its value. So it is for a model that nobody told how its predictions came out. Of
+    one that was told, the value is that of whoever codes such predictions best, and a mode's or a law's prediction
+    that isn't right often enough for a claim is `UNSURE` (`relgym.model.calibration`).
     """
 
     PREDICTED = "predicted by a mode"
@@ -59,7 +59,7 @@ class Prediction:
         Whether a mode predicted it, or why none did.
     mode
         Id of the mode; 0 if none. With `Outcome.UNEXPLAINED` the one that won the vote: its value is no claim, since
-        the winner was too often the wrong one (`relgym.model.hindsight`).
+        the winner was too often the wrong one (`relgym.model.target.hindsight`).
     roles
         Names of the objects bound to the mode's roles, the target first.
     margin

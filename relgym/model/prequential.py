@@ -15,10 +15,10 @@ from relgym.arguments import refusing
 from relgym.config.checks import checked_count
 from relgym.errors import ConfigError, ObservationError
 from relgym.html import html_table
-from relgym.model.hindsight import WRONG
 from relgym.model.learning import LearnReport
 from relgym.model.prediction import ScenePrediction
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
+from relgym.model.target.hindsight import WRONG
 from relgym.scene.objects import Scene, Transition
 
 __all__ = ["WRONG", "Key", "Outcomes", "Prequential", "StepReport", "compared"]

@@ -13,9 +13,9 @@ from relgym.model.calibration import EXPERTS, GUESS, LATEST, LINEAR, OWN, PERSIS
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.property_model import Verdict
 from relgym.model.regression import KINDS
 from relgym.model.scenes import wrap
+from relgym.model.target.property_model import Verdict
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
@@ -73,16 +73,18 @@ def _settled(
     told = model.assess(key, values)
     if told.speaker == LATEST and one.mode:
         one = replace(one, mode=model.latest, roles=one.roles[:1])
+    elif told.speaker >= len(EXPERTS):  # its word has nothing to do with modes
+        one = replace(one, mode=0, roles=(), margin=0.0)
     spread = one.spread
     if told.speaker == GUESS:
-        best = model.guess_at(percept, index, following)
+        best = model.fallback.guess_at(percept, index, following)
         spread = spread if best is None else best.mode.sigma
     elif told.speaker != OWN:
         spread = np.nan if told.speaker == PERSISTENCE else told.spread
     return replace(
         one,
         value=values[told.speaker],
-        outcome=_outcome(one, claimed=model.claims(told), known=bool(model.calibration.trials)),
+        outcome=_outcome(one, told.speaker, claimed=model.claims(told), known=bool(model.calibration.trials)),
         spread=spread,
         probability=told.probability,
         interval=told.interval,
@@ -100,13 +102,13 @@ def _experts_one(
 ) -> tuple[float, ...]:
     """`_experts` of a single scene."""
     model = parts.models[target]
-    found = [math.nan] * len(EXPERTS)
+    found = [math.nan] * model.calibration.experts
     present = float(following[percept.layout.column(index, target.property)])
     found[PERSISTENCE] = present
     if math.isfinite(own):
         found[OWN] = own
-    if model.guesses_something:
-        guessed = model.guessed(percept, index, following[None])
+    if model.fallback.guesses_something:
+        guessed = model.fallback.guessed(percept, index, following[None])
         found[GUESS] = math.nan if guessed is None else float(guessed[0])
     if parts.governs(target):
         return tuple(found)
@@ -115,12 +117,14 @@ def _experts_one(
     changes = parts.regressed(percept, index, target.property) if model.rough else None
     if changes is not None:
         found[LINEAR : LINEAR + KINDS] = [present + float(change) for change in changes[0]]
+    if model.candidates:
+        found[len(EXPERTS) :] = _hypothesised(parts, target, percept, index)[0].tolist()
     return tuple(value if math.isfinite(value) else math.nan for value in found)
 
 
-def _outcome(one: Prediction, *, claimed: bool, known: bool) -> Outcome:
-    """What is known of a mode's predictions has the last word on whether one is claimed."""
-    if one.ok:
+def _outcome(one: Prediction, speaker: int, *, claimed: bool, known: bool) -> Outcome:
+    """What is known of a mode's predictions, or of a hypothesis', has the last word on whether one is claimed."""
+    if one.ok or (speaker >= len(EXPERTS) and claimed):
         return Outcome.PREDICTED if claimed else Outcome.UNSURE
     trusted = one.mode and one.outcome is Outcome.UNEXPLAINED and claimed and known
     return Outcome.PREDICTED if trusted else one.outcome
@@ -136,10 +140,10 @@ def _experts(
 ) -> NDArray[np.float64]:
     """What each of `EXPERTS` says of one object of n scenes, shape ``(n, experts)``; NaN: nothing."""
     model = parts.models[target]
-    found = np.full((len(own), len(EXPERTS)), np.nan)
+    found = np.full((len(own), model.calibration.experts), np.nan)
     present = following[:, percept.layout.column(index, target.property)]
     found[:, OWN], found[:, PERSISTENCE] = np.where(np.isfinite(own), own, np.nan), present
-    guessed = model.guessed(percept, index, following) if model.guesses_something else None
+    guessed = model.fallback.guessed(percept, index, following) if model.fallback.guesses_something else None
     if guessed is not None:
         found[:, GUESS] = np.where(np.isfinite(guessed), guessed, np.nan)
     latest = None if parts.governs(target) else model.latest_values(percept, index, following)
@@ -150,7 +154,15 @@ def _experts(
         if changes is not None:
             told = present[:, None] + changes
             found[:, LINEAR : LINEAR + KINDS] = np.where(np.isfinite(told), told, np.nan)
+    if model.candidates and not parts.governs(target):
+        found[:, len(EXPERTS) :] = _hypothesised(parts, target, percept, index)
     return found
+
+
+def _hypothesised(parts: Parts, target: Target, percept: Percept, index: int) -> NDArray[np.float64]:
+    """What hypotheses say of one object of n scenes, shape ``(n, hypotheses)``: they read what there is alone."""
+    x = percept.rows(index, percept.vectors, ordered=False)
+    return parts.models[target].candidates.values(percept.situation(index).signature, x)
 
 
 def predict_many(
@@ -217,6 +229,10 @@ def _settled_many(
             if told.speaker == LATEST and key.winner:
                 verdict.modes[some] = model.latest
             before = verdict.outcomes[some]
+            if told.speaker >= len(EXPERTS):  # its word has nothing to do with modes
+                verdict.modes[some], verdict.margins[some] = 0, 0.0
+                before = np.where(model.claims(told), np.int8(_PREDICTED), before)
+                verdict.outcomes[some] = before
             if not model.claims(told):
                 verdict.outcomes[some[before == _PREDICTED]] = _UNSURE
             elif model.calibration.trials and key.winner:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
+from relgym.config.constants import BEYOND
 from relgym.numeric.online_ridge import OnlineRidge
 from relgym.scene.objects import TASK
 
@@ -24,9 +25,6 @@ KINDS = 2
 
 FIRST = 64
 """So many rows tell where a column lies and how far it varies; from then on it is regressed on."""
-
-BEYOND = 0.5
-"""Changes may go beyond those that were seen by so much of their range, as in `relgym.model.scope`."""
 
 
 class Regression:

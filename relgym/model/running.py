@@ -24,9 +24,9 @@ from relgym.model.motion import TOUCHING
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.property_model import PropertyModel
-from relgym.model.spread import Spreads, action_columns
-from relgym.model.spread_split import place_of
+from relgym.model.target.property_model import PropertyModel
+from relgym.model.target.spread import Spreads, action_columns
+from relgym.model.target.spread_split import place_of
 from relgym.program.records import Answer, BeyondError, Program
 from relgym.program.tape import encoded
 from relgym.scene.objects import Scene, SceneLayout
@@ -390,12 +390,12 @@ def _alike(
 
 def _plain(model: PropertyModel, *, governed: bool) -> bool:
     """Whether none but a target's modes or laws, and that nothing changes, have values for it."""
-    if model.guess is not None or model.guess_beyond is not None:
+    if model.fallback.guesses_something or model.candidates:
         return False
     if governed:
         return True
     former = model.latest in model.clusterer.clusters and not model.bounds(model.latest)
-    doubted = model._record.doubts(_PREDICTED, model.config.claim_probability)
+    doubted = model.record.doubts(_PREDICTED, model.config.claim_probability)
     return not model.rough and not (former and doubted and len(model.classifier.modes) > 1)
 
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.model.hindsight import WRONG
 from relgym.model.prediction import OUTCOMES, Outcome, ScenePrediction
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
+from relgym.model.target.hindsight import WRONG
 from relgym.scene.objects import ACTION, Float1D, Float2D, Scene, SceneLayout, Transition
 
 if TYPE_CHECKING:

@@ -19,16 +19,9 @@ from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryEr
 from relgym.files.reading import FileLimits
 from relgym.html import html_text
 from relgym.laws.book import LawBook
-from relgym.model.advice import Advice, advices
-from relgym.model.archive import parts_from_json, parts_to_arrays, parts_to_json
+from relgym.model.files.archive import parts_from_json, parts_to_arrays, parts_to_json
+from relgym.model.files.storage import read_model, write_model
 from relgym.model.fitting import Progress, as_transitions, progressive, transitions_of
-from relgym.model.hindsight import (
-    calibration_to_json,
-    hindsight_to_json,
-    look_back,
-    restore_calibration,
-    restore_hindsight,
-)
 from relgym.model.journal import Journal
 from relgym.model.learning import LearnReport, finish, learn
 from relgym.model.locality import (
@@ -45,13 +38,20 @@ from relgym.model.merging import merge
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import BatchPrediction, Outcome, ScenePrediction
-from relgym.model.property_model import PropertyModel
 from relgym.model.querying import predict, predict_many
-from relgym.model.rules import doubted, of_laws, rule_list
+from relgym.model.reports.advice import Advice, advices
+from relgym.model.reports.rules import doubted, of_laws, rule_list
 from relgym.model.running import Programs
 from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
-from relgym.model.storage import read_model, write_model
+from relgym.model.target.hindsight import (
+    calibration_to_json,
+    hindsight_to_json,
+    look_back,
+    restore_calibration,
+    restore_hindsight,
+)
+from relgym.model.target.property_model import PropertyModel
 from relgym.program.records import BeyondError
 from relgym.program.source import python_source
 from relgym.reporting.naming import named_text
@@ -437,7 +437,8 @@ class WorldModel:
         """Take note of how a prediction came out, before the step is learned from.
 
         A target whose predictions were too often wrong lately counts as `unexplained`, until they are right again
-        (`relgym.model.hindsight`). A model that is never told counts as right where its modes cover the examples.
+        (`relgym.model.target.hindsight`). A model that is never told counts as right where its modes cover the
+        examples.
 
         Parameters
         ----------
@@ -663,14 +664,14 @@ class WorldModel:
             printed with the rules.
         frame, incline
             With ``"world"`` also what the laws in force give along the world's axes on surfaces with some inclines, in
-            degrees (`relgym.model.report.describe`).
+            degrees (`relgym.model.reports.report.describe`).
 
         Raises
         ------
         ConfigError
             Another frame, or a name that can't be one.
         """
-        from relgym.model.report import describe
+        from relgym.model.reports.report import describe
 
         digits = whole("digits", digits, 1, 18, ConfigError)
         return describe(
@@ -794,7 +795,7 @@ class WorldModel:
     @refusing(ObservationError)
     def explain(self, scene: Scene) -> str:
         """Why this prediction: mode, function, roles, clause and runner-up of every target."""
-        from relgym.model.explain import explain
+        from relgym.model.reports.explain import explain
 
         with self._calm(scene.vector):
             if large(scene.layout):

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import EXTRAPOLATED
 from relgym.numeric.stepwise import (
     COARSE,
     MANY,
@@ -30,9 +31,6 @@ from relgym.numeric.stepwise import (
 from relgym.scheduling.work import CALL, Steps, resumable
 
 __all__ = ["Consensus", "consensus", "draw_samples", "refine"]
-
-LOOSE = 100.0
-"""A fit to few rows is extrapolated: its inliers are first counted with a tolerance this much wider."""
 
 TIGHT, CLOSE = 4.0, 0.01
 """... but not so wide, where there is noise, that it tells nothing: no wider than this share of the responses' spread,
@@ -135,7 +133,7 @@ def consensus(
     n = len(y)
     if n < size:
         return None
-    loose = LOOSE if misfit else min(LOOSE, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
+    loose = EXTRAPOLATED if misfit else min(EXTRAPOLATED, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
     columns = varying_columns(x)
     samples = draw_samples(n, size, draws, rng=rng, strata=strata, apart=apart, anchors=anchors)
     yield CALL + 2 * draws * n

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_count, checked_least
-from relgym.envs.learned_model_rewards import TaskFunctions
+from relgym.envs.dreams.rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.planning.doubts import DoubtedTask
@@ -27,13 +27,13 @@ from relgym.planning.simulators import ModelSimulator, Simulator
 from relgym.planning.tree import TreeSearch
 from relgym.scene.objects import Float1D, Scene
 from relgym.wrappers.action_repeat import ActionRepeat
-from relgym.wrappers.sb3.acceptance import Spread
-from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.lens import Lens
-from relgym.wrappers.sb3.recorder import Experience, TransitionRecorder
-from relgym.wrappers.sb3.reward_models import LearnedRewardModel, RewardModel
-from relgym.wrappers.sb3.stock import DreamModel, changing
-from relgym.wrappers.sb3.trainer import ModelTrainer
+from relgym.wrappers.dyna.acceptance import Spread
+from relgym.wrappers.dyna.config import DynaConfig
+from relgym.wrappers.dyna.lens import Lens
+from relgym.wrappers.dyna.recorder import Experience, TransitionRecorder
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel, RewardModel
+from relgym.wrappers.dyna.stock import DreamModel, changing
+from relgym.wrappers.dyna.trainer import ModelTrainer
 from relgym.wrappers.views import ViewLike
 
 __all__ = ["PlanningAgent"]

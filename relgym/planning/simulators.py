@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from relgym.envs.arguments import checked_count
 from relgym.envs.base import SceneEnv
-from relgym.envs.learned_model_batch import DreamStep
-from relgym.envs.learned_model_rewards import BatchStepEvaluator, TaskFunctions, check_reward_functions
-from relgym.envs.learned_model_setting import Setting
+from relgym.envs.dreams.rewards import BatchStepEvaluator, TaskFunctions, check_reward_functions
+from relgym.envs.dreams.setting import Setting
+from relgym.envs.dreams.step import DreamStep
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError, RelgymError
 from relgym.model.world_model import WorldModel

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +25,13 @@ from relgym.logic.situations import mixed, situation
 from relgym.reporting.conditions import Condition, Test
 from relgym.reporting.functions import Column, Sum, evaluated
 from relgym.reporting.motion import MotionRules
-from relgym.reporting.rules import Bound, Experience, PropertyRules, RuleList, RuleRole
 from relgym.scene.objects import SceneLayout
 from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
 from relgym.scene.surroundings import Surroundings, surroundings
+
+if TYPE_CHECKING:
+    from relgym.reporting.rules import Bound, Experience, PropertyRules, RuleList, RuleRole
 
 __all__ = ["Evaluated", "SceneBatch", "bounds_reached", "branches_of", "evaluate", "holds"]
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
 from relgym.reporting.conditions import CONTEXTS, Condition, condition_text
+from relgym.reporting.evaluation import evaluate
 from relgym.reporting.functions import Sum, split_outside
 from relgym.reporting.motion import MotionRules
 
@@ -334,8 +335,6 @@ class RuleList:
         -------
         Next value by (object, property); NaN where the list makes no prediction.
         """
-        from relgym.reporting.evaluation import evaluate
-
         found = evaluate(self, scene.schema, scene.layout, scene.vector[None])
         return {key: float(values[0]) for key, values in found.values.items()}
 
@@ -343,8 +342,6 @@ class RuleList:
         self, schema: Any, layout: SceneLayout, vectors: NDArray[np.float64]
     ) -> dict[tuple[str, str], NDArray[np.float64]]:
         """The same for n scenes with the same objects, state vectors of shape ``(n, layout.width)``."""
-        from relgym.reporting.evaluation import evaluate
-
         return evaluate(self, schema, layout, vectors).values
 
     def renamed(self, names: Mapping[str, str]) -> RuleList:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.clustering.mode import Mode
 from relgym.errors import QueryError, SchemaError
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome
-from relgym.model.report_tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
+from relgym.model.reports.tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
 from relgym.scene.objects import POSE, Scene, SceneLayout, Target, Transition
 from relgym.scene.relations import Extractor
 from relgym.scene.schema import SceneSchema

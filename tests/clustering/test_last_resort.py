@@ -80,10 +80,10 @@ def test_an_approximation_gives_way_to_a_better_one_only() -> None:
     model = fly(400, 0, features=("trig", "products"))
     clusterer = model.property_model("self", "v").clusterer
     table = model._parts.tables["self"]
-    again = last_resort(clusterer, table, floor=clusterer.floor, again=True)
+    again = last_resort(clusterer.population, table, floor=clusterer.floor, again=True)
     assert again is None  # hardly better than what there is
-    clusterer.clusters = dict(list(clusterer.clusters.items())[:0])
-    found = last_resort(clusterer, table, floor=clusterer.floor, again=True)
+    clusterer.population.clusters = dict(list(clusterer.clusters.items())[:0])
+    found = last_resort(clusterer.population, table, floor=clusterer.floor, again=True)
     assert found is not None
     assert 0.04 < found.sigma < 0.09
 
@@ -97,11 +97,11 @@ def test_slices_of_noise_give_way_to_one_function() -> None:
     sigma = clusterer.scale.sigma
 
     def found(slices: int, less: float) -> bool:
-        clusterer.clusters = {
+        clusterer.population.clusters = {
             k: replace(cluster, mode=replace(cluster.mode, id=k)) for k in range(1, slices + 1)
         }
-        clusterer.scale = replace(clusterer.scale, sigma=sigma / less)
-        return last_resort(clusterer, table, floor=clusterer.floor, again=False) is not None
+        clusterer.population.scale = replace(clusterer.scale, sigma=sigma / less)
+        return last_resort(clusterer.population, table, floor=clusterer.floor, again=False) is not None
 
     assert found(3, 2.5)  # three slices of noise would leave a third of it
     assert not found(3, 4.0)
@@ -116,7 +116,7 @@ def test_a_shorter_approximation_is_taken_if_it_is_as_good() -> None:
     (cluster,) = clusterer.clusters.values()
     (role,) = cluster.mode.roles
     padded = replace(role, terms=(*role.terms, *((name, 0.0) for name in ("th", "sin(v)", "cos(v)"))))
-    clusterer.clusters = {1: replace(cluster, mode=replace(cluster.mode, roles=(padded,)))}
-    found = last_resort(clusterer, table, floor=clusterer.floor, again=True)
+    clusterer.population.clusters = {1: replace(cluster, mode=replace(cluster.mode, roles=(padded,)))}
+    found = last_resort(clusterer.population, table, floor=clusterer.floor, again=True)
     assert found is not None
     assert found.fit.terms <= cluster.mode.parameters

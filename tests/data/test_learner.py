@@ -132,7 +132,7 @@ def test_from_transitions_too(make: Callable[[], gym.Env[Any, Any]], steps: int,
 
 
 def test_from_what_a_recorder_kept(tmp_path: Path) -> None:
-    from relgym.wrappers.sb3.recorder import TransitionRecorder
+    from relgym.wrappers.dyna.recorder import TransitionRecorder
 
     online = lived(ball(), 90)
     recorder = TransitionRecorder(ball())

@@ -14,6 +14,8 @@ RUNS = {
     "read_the_laws.py": (["--steps", "400"], "vy' = vy - 0.00098"),
     "live_in_a_dream.py": (["--episodes", "8", "--trials", "1"], "trial 0: the trucks were never more than"),
     "grandparents.py": ([], "grandparent(A, B) ← parent(A, C) ∧ parent(C, B)"),
+    "periodic_law.py": ([], "+ 0.4605 sin(0.36319 x1) + 0.1947 cos(0.36319 x1)"),
+    "saturating_law.py": ([], "saturating: clip(0.799"),
     "plan_mountain_car.py": (["--steps", "300", "--episodes", "0"], "0 of 0 reach the flag"),
     "plan_ball.py": (
         ["--decisions", "22", "--expansions", "64", "--episodes", "1"],

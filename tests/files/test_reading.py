@@ -153,7 +153,7 @@ def _twice() -> bytes:
 def _loaded() -> None:
     """What a first file loads isn't the file's to answer for."""
     import relgym.files.records
-    import relgym.model.file_checks  # noqa: F401
+    import relgym.model.files.checks  # noqa: F401
 
 
 @pytest.mark.parametrize("name", BOMBS)

@@ -36,7 +36,7 @@ from relgym.model.world_model import WorldModel  # noqa: E402
 from relgym.scene.objects import ACTION, Scene, Transition  # noqa: E402
 from relgym.scene.schema import SceneSchema  # noqa: E402
 from relgym.wrappers import ModelLearner  # noqa: E402
-from relgym.wrappers.sb3.reward_models import LearnedRewardModel  # noqa: E402
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel  # noqa: E402
 
 FOLDER = Path(__file__).parent / "corpus"
 SMALL = ModelConfig(

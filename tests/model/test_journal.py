@@ -15,8 +15,8 @@ import pytest
 
 from relgym.experiments.rooms import rooms
 from relgym.model import journal, world_model
-from relgym.model.archive import parts_to_arrays
-from relgym.model.hindsight import hindsight_to_json
+from relgym.model.files.archive import parts_to_arrays
+from relgym.model.target.hindsight import hindsight_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 

@@ -9,7 +9,7 @@ import pytest
 
 from relgym.config import ModelConfig
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
-from relgym.envs.learned_model import LearnedModelEnv
+from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import ConfigError
 from relgym.experiments.data import ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
@@ -19,7 +19,7 @@ from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.experiments.rollouts import largest_errors
 from relgym.model.motion import FREE, TOUCHING
 from relgym.model.prediction import Outcome
-from relgym.model.report import report
+from relgym.model.reports.report import report
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Target
 

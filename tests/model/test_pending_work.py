@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from relgym.config import ModelConfig
-from relgym.model.archive import parts_to_json
+from relgym.model.files.archive import parts_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Transition
 from relgym.scene.schema import SceneSchema

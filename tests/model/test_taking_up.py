@@ -6,7 +6,7 @@ import gymnasium as gym
 import pytest
 
 import relgym
-from relgym.model.archive import parts_to_arrays, parts_to_json
+from relgym.model.files.archive import parts_to_arrays, parts_to_json
 from relgym.model.fitting import compare_and_learn
 from relgym.model.motion import Laws
 from relgym.model.prequential import compared

@@ -8,7 +8,7 @@ import numpy as np
 from relgym import WorldModel
 from relgym.planning.review import learned_again, right
 from relgym.scene.objects import Transition
-from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.dyna.recorder import TransitionRecorder
 
 
 def cart_steps(count: int) -> tuple[TransitionRecorder, list[Transition]]:

@@ -20,14 +20,14 @@ import numpy as np
 from file_mutations import Arrays, Mutator
 from numpy.typing import NDArray
 
-from relgym.envs.learned_model import LearnedModelEnv
+from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import RelgymError
+from relgym.model.files.storage import read_model, write_model
 from relgym.model.running import KERNEL, PATIENCE
-from relgym.model.storage import read_model, write_model
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers import ModelLearner
-from relgym.wrappers.sb3.reward_models import LearnedRewardModel
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel
 
 __all__ = ["CORPUS", "Finding", "Fuzzer", "Tally", "spied", "worlds"]
 

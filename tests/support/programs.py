@@ -11,7 +11,7 @@ from law_streams import Stream, taught
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.envs.learned_model_setting import recorded
+from relgym.envs.dreams.setting import recorded
 from relgym.experiments.law_trials import Trial, trial_rooms
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -46,9 +46,21 @@ class Module:
         return ast.parse(self.path.read_text(encoding="utf-8"), self.file)
 
     @cached_property
+    def needed(self) -> tuple[Import, ...]:
+        """What running it imports, sooner or later: all imports but those for type checkers."""
+        typing = {
+            id(node)
+            for branch in ast.walk(self.tree)
+            if isinstance(branch, ast.If) and ast.unparse(branch.test) == "TYPE_CHECKING"
+            for statement in branch.body
+            for node in ast.walk(statement)
+        }
+        return tuple(_imports(node for node in ast.walk(self.tree) if id(node) not in typing))
+
+    @cached_property
     def imports(self) -> tuple[Import, ...]:
         """All imports; also those in functions, under TYPE_CHECKING and by `import_module("…")`."""
-        return tuple(_imports(self.tree))
+        return tuple(_imports(ast.walk(self.tree)))
 
 
 def package_of(name: str) -> str:
@@ -72,8 +84,8 @@ def _dotted(package: str, relative: Path) -> str:
     return ".".join((package, *(parts[:-1] if parts[-1] == "__init__" else parts)))
 
 
-def _imports(tree: ast.Module) -> Iterator[Import]:
-    for node in ast.walk(tree):
+def _imports(nodes: Iterable[ast.AST]) -> Iterator[Import]:
+    for node in nodes:
         if isinstance(node, ast.Import):
             yield from (Import(alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

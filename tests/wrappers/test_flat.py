@@ -10,9 +10,9 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import relgym  # noqa: F401  (registers the ids)
+from relgym.envs.dreams.env import LearnedModelEnv
+from relgym.envs.dreams.vector import LearnedModelVectorEnv
 from relgym.envs.flat import FlatSpec
-from relgym.envs.learned_model import LearnedModelEnv
-from relgym.envs.learned_model_vector import LearnedModelVectorEnv
 from relgym.errors import ConfigError
 from relgym.wrappers.flat import FlatView, VectorFlatView
 from relgym.wrappers.model_learner import ModelLearner

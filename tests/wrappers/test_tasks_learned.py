@@ -10,7 +10,7 @@ import pytest
 
 import relgym  # noqa: F401  (registers the ids)
 from relgym.envs.base import SceneEnv
-from relgym.envs.learned_model import LearnedModelEnv
+from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.envs.scripted import ball_home
 from relgym.experiments.seeds import TUNING_SEEDS
 from relgym.scene.objects import Scene

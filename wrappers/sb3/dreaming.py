@@ -13,10 +13,10 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.config import DynaConfig, checked_config
-from relgym.wrappers.sb3.imagination import Imagination
-from relgym.wrappers.sb3.lens import Lens, Observations, picked
-from relgym.wrappers.sb3.trainer import ModelTrainer, check_model
+from relgym.wrappers.dyna.config import DynaConfig, checked_config
+from relgym.wrappers.dyna.imagination import Imagination
+from relgym.wrappers.dyna.lens import Lens, Observations, picked
+from relgym.wrappers.dyna.trainer import ModelTrainer, check_model
 
 __all__ = ["DreamCheckup", "DreamVecEnv", "explore"]
 

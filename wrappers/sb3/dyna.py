@@ -17,14 +17,14 @@ from stable_baselines3.common.utils import polyak_update
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.config import DynaConfig, checked_config
-from relgym.wrappers.sb3.imagination import Imagination, Imagined
-from relgym.wrappers.sb3.lens import Lens, Observations
+from relgym.wrappers.dyna.config import DynaConfig, checked_config
+from relgym.wrappers.dyna.imagination import Imagination, Imagined
+from relgym.wrappers.dyna.lens import Lens, Observations
+from relgym.wrappers.dyna.reward_models import RewardModel
+from relgym.wrappers.dyna.stock import DreamModel
+from relgym.wrappers.dyna.trainer import ModelTrainer, check_model, checked_reward_model
 from relgym.wrappers.sb3.quality import log_quality
 from relgym.wrappers.sb3.replay import MixedNStepReplayBuffer, Mixing
-from relgym.wrappers.sb3.reward_models import RewardModel
-from relgym.wrappers.sb3.stock import DreamModel
-from relgym.wrappers.sb3.trainer import ModelTrainer, check_model, checked_reward_model
 
 __all__ = ["Dyna", "check_algorithm", "lens_of", "reward_model_of"]
 

@@ -10,9 +10,9 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from relgym.errors import ConfigError
 from relgym.scene.objects import ACTION, TASK, SceneLayout
+from relgym.wrappers.dyna.imagination import Imagined
+from relgym.wrappers.dyna.recorder import Experience
 from relgym.wrappers.sb3.dyna import check_algorithm, lens_of
-from relgym.wrappers.sb3.imagination import Imagined
-from relgym.wrappers.sb3.recorder import Experience
 
 __all__ = ["PermutedReplay"]
 
@@ -21,7 +21,7 @@ class PermutedReplay(BaseCallback):  # type: ignore[misc]
     """Stores every real transition several times more, with objects of the same type renamed.
 
     This holds without a model: names of objects mean nothing. Exchanging which object stands where needs a model
-    (`relgym.wrappers.sb3.stock.permuted`).
+    (`relgym.wrappers.dyna.stock.permuted`).
 
     Parameters
     ----------

@@ -10,8 +10,8 @@ from stable_baselines3.common.buffers import DictReplayBuffer, NStepReplayBuffer
 
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.imagination import Imagined
-from relgym.wrappers.sb3.lens import Observations, picked
+from relgym.wrappers.dyna.imagination import Imagined
+from relgym.wrappers.dyna.lens import Observations, picked
 
 __all__ = ["MixedDictReplayBuffer", "MixedNStepReplayBuffer", "MixedReplayBuffer", "Mixing", "replay_options"]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.keys import check_keys
+from relgym.wrappers.dyna.keys import check_keys
 
 __all__ = ["VectorAsVecEnv"]
 

@@ -17,7 +17,7 @@ from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import MODES, published_pairs
 from relgym.experiments.chapter4.scores import pooled_scores, quantile
 from relgym.experiments.chapter4.tables_modes import row_of
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["CLAIMS", "NOT_MEASURED", "Claim", "claims_shown", "plan", "verdict_of"]
 

@@ -21,7 +21,7 @@ from relgym.experiments.chapter4.canvas import (
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.scores import pooled_scores, quantile
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["accuracy_shown", "by_mode_shown", "perfect_shown", "rates_shown", "scores_by_episodes"]
 

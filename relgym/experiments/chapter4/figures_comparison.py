@@ -14,7 +14,7 @@ from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import CLASSIFIER_ERRORS
 from relgym.experiments.chapter4.scores import quantile
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["classifiers_shown", "lwr_shown", "noise_shown"]
 

@@ -17,7 +17,7 @@ from relgym.experiments.chapter4.tables_modes import best_run
 from relgym.experiments.data import THESIS_EXPERIMENTS, ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.seeds import TRAINING_SEEDS
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = [
     "ball_modes_shown",

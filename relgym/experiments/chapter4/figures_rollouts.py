@@ -14,7 +14,7 @@ from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.rolled import trial_episodes
 from relgym.experiments.seeds import TEST_SEEDS
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 from relgym.scene.objects import Scene
 
 __all__ = ["failure_shown", "rollout_errors_shown"]

@@ -11,7 +11,7 @@ from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import MODES
 from relgym.experiments.chapter4.tables_modes import best_run, row_of
-from relgym.model.text import Cell
+from relgym.model.reports.text import Cell
 from relgym.numeric.tree import DecisionTree
 
 __all__ = ["trees_shown"]

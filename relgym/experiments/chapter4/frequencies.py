@@ -16,7 +16,7 @@ from relgym.experiments.evaluate import TOLERANCE
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.scenes import TOLD_APART
 from relgym.experiments.seeds import FREQUENCY_SEEDS
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["FEW", "count", "counts_shown", "plan"]
 

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.jobs.task import Task
-from relgym.model.text import Cell
+from relgym.model.reports.text import Cell
 
 __all__ = ["Job", "Plan", "Shown", "Values"]
 

@@ -14,8 +14,8 @@ from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.episodes import Episode
 from relgym.model.perception import Perception
-from relgym.model.report import report
-from relgym.model.report_tables import ModelReport
+from relgym.model.reports.report import report
+from relgym.model.reports.tables import ModelReport
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout
 from relgym.scene.schema import SceneSchema

@@ -23,7 +23,7 @@ from relgym.experiments.chapter4.testing import TARGETS, confusions, scores_of
 from relgym.experiments.chapter4.weight import weight_of
 from relgym.experiments.data import THESIS_EXPERIMENTS, BallExperiment, ball_episodes
 from relgym.experiments.episodes import Episode
-from relgym.model.text import plain
+from relgym.model.reports.text import plain
 from relgym.scene.schema import SceneSchema
 from relgym.thesis.model import ThesisModel
 

@@ -10,7 +10,7 @@ from relgym.experiments.analytic import truck_modes
 from relgym.experiments.chapter4.learners import modes_of, noise_of, report_of, settings_of, taught
 from relgym.experiments.data import truck_episodes
 from relgym.experiments.truck_check import truck_mode_of
-from relgym.model.text import plain
+from relgym.model.reports.text import plain
 from relgym.thesis.settings import ThesisSettings
 
 __all__ = ["lesson"]

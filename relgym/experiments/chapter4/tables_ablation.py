@@ -10,7 +10,7 @@ from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import ABLATIONS, Protocol
 from relgym.experiments.chapter4.published import RATES
 from relgym.experiments.chapter4.scores import pooled_scores
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["ablation_shown"]
 

@@ -13,7 +13,7 @@ from relgym.experiments.chapter4.canvas import TITLES, first_case
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.scores import pooled_scores, quantile
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["headline_shown", "tuning_shown"]
 

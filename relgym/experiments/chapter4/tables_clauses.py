@@ -10,7 +10,7 @@ from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import MODES, PublishedPair, published_pairs
 from relgym.experiments.chapter4.tables_modes import best_run, row_of
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["clauses_shown", "pushing_clauses_shown", "roles_shown"]
 

@@ -13,7 +13,7 @@ from relgym.experiments.chapter4.published import CONFUSIONS, MODES, RATES, ROLL
 from relgym.experiments.chapter4.rolled import CAUSES
 from relgym.experiments.chapter4.scores import pooled_scores, quantile
 from relgym.experiments.chapter4.tables_modes import best_run, row_of
-from relgym.model.text import Cell, table
+from relgym.model.reports.text import Cell, table
 
 __all__ = ["confusion_shown", "rates_shown", "rollouts_shown"]
 

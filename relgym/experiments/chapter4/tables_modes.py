@@ -10,7 +10,7 @@ from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import MODES, PublishedMode
 from relgym.experiments.data import BALL_EXPERIMENTS
-from relgym.model.text import Cell, amount, table
+from relgym.model.reports.text import Cell, amount, table
 
 __all__ = ["best_run", "modes_shown", "pushing_modes_shown", "row_of", "wrong_rate"]
 

@@ -9,7 +9,7 @@ from shapely.geometry import Point, Polygon
 from shapely.ops import unary_union
 
 from relgym.errors import ConfigError, ShapeError
-from relgym.model.storage import shape_from_json, shape_to_json
+from relgym.model.files.storage import shape_from_json, shape_to_json
 from relgym.scene import Compound, Extractor, ObjectType, SceneSchema
 from relgym.scene.geometry.arrays import ArrayGeometry, Bodies
 from relgym.scene.objects import POSE

@@ -11,9 +11,9 @@ from dyna_worlds import Flat, LineEnv, LineModel, LineTask
 
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.recorder import TransitionRecorder
-from relgym.wrappers.sb3.trainer import ModelTrainer
+from relgym.wrappers.dyna.config import DynaConfig
+from relgym.wrappers.dyna.recorder import TransitionRecorder
+from relgym.wrappers.dyna.trainer import ModelTrainer
 
 pytestmark = pytest.mark.sb3
 
@@ -175,8 +175,8 @@ def test_what_was_explored_has_all_been_learned() -> None:
 
 
 def test_a_task_can_be_learned_while_exploring() -> None:
+    from relgym.wrappers.dyna.reward_models import LearnedRewardModel
     from relgym.wrappers.sb3.dreaming import explore
-    from relgym.wrappers.sb3.reward_models import LearnedRewardModel
 
     found = ModelTrainer(LineModel(), "learned", QUICK)
     assert isinstance(found.reward_model, LearnedRewardModel)

@@ -17,8 +17,8 @@ import relgym
 from relgym.envs.tasks import TaskOutcome
 from relgym.envs.views import NumbersView
 from relgym.errors import ConfigError, QueryError
-from relgym.wrappers.sb3.config import DynaConfig
-from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.dyna.config import DynaConfig
+from relgym.wrappers.dyna.recorder import TransitionRecorder
 
 pytestmark = pytest.mark.sb3
 

@@ -10,7 +10,7 @@ import pytest
 from dyna_worlds import LineEnv
 
 from relgym.errors import ConfigError
-from relgym.wrappers.sb3.recorder import TransitionRecorder
+from relgym.wrappers.dyna.recorder import TransitionRecorder
 
 pytestmark = pytest.mark.sb3
 

@@ -1,0 +1,165 @@
+"""One step of many dreams, as a function of arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.envs.dreams.ends import CAUSES, Cause, causes, explained, horizon_reached, parts_of_row
+from relgym.envs.dreams.rewards import BatchStepEvaluator, TaskFunctions
+from relgym.envs.dreams.setting import Setting
+from relgym.envs.dreams.shown import Deeds
+from relgym.model.prediction import BatchPrediction
+from relgym.scene.objects import Float1D, Float2D, Scene
+
+__all__ = ["DreamStep", "Stepped"]
+
+_HORIZON, _NO_REWARD = CAUSES.index(Cause.HORIZON), CAUSES.index(Cause.NO_REWARD)
+
+
+@dataclass(frozen=True, slots=True)
+class Stepped:
+    """What one step made of n dreams; everything has a leading axis of length n.
+
+    Attributes
+    ----------
+    vectors
+        State vectors after the step; those before it where the prediction could not be followed.
+    rewards, terminated, truncated
+        As Gymnasium has them.
+    causes
+        Why an episode was truncated, as a position in `CAUSES`; -1 if it wasn't.
+    success
+        Whether the task succeeded; None if there is no task, or it doesn't tell.
+    foreseen
+        State vectors that the model predicted, followed or not.
+    prediction
+        The model's words.
+    """
+
+    vectors: Float2D
+    rewards: Float1D
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    causes: NDArray[np.int8]
+    success: NDArray[np.bool_] | None
+    foreseen: Float2D
+    prediction: BatchPrediction
+
+
+@dataclass(frozen=True)
+class DreamStep:
+    """The step function of dreams: pure, so that whoever keeps the scenes keeps the state.
+
+    Attributes
+    ----------
+    setting, evaluator, task
+        Where it takes place, and what steps are worth.
+    actions
+        Puts actions into scenes.
+    horizon
+        Longest episode in steps; None: no limit.
+    min_margin
+        Least margin of a prediction that is followed.
+    """
+
+    setting: Setting
+    evaluator: BatchStepEvaluator
+    task: TaskFunctions | None
+    actions: Deeds
+    horizon: int | None
+    min_margin: float
+
+    def __call__(
+        self,
+        before: Float2D,
+        steps: NDArray[np.int64],
+        actions: Any,
+        among: NDArray[np.bool_] | None = None,
+    ) -> Stepped:
+        """Step n dreams.
+
+        Parameters
+        ----------
+        before
+            State vectors without an action, shape ``(n, width)``; not changed.
+        steps
+            How many steps the dreams have lasted, this one included, shape ``(n,)``.
+        actions
+            Checked actions, shape ``(n, …)``.
+        among
+            Which of them go on, shape ``(n,)``; what comes of the others means nothing. Default: all.
+
+        Raises
+        ------
+        ConfigError
+            A reward is NaN or infinite.
+        """
+        acting = self.actions.joined(before, actions)
+        prediction = self.setting.model.predict_batch(self.actions.layout, acting)
+        after = self.actions.parted(prediction.vectors)
+        inside = self.setting.shown.still_inside(after, prediction.parts)
+        why = causes(prediction, inside, self.min_margin, self.evaluator.overruled)
+        if among is not None:
+            why[~among] = _HORIZON  # neither followed nor evaluated
+        rewards, ended, success = self._evaluated(before, actions, after, why < 0)
+        if (doubted := np.isnan(rewards)).any():
+            why[doubted], rewards[doubted], ended[doubted] = _NO_REWARD, 0.0, False
+        if self.horizon is not None:
+            why[(why < 0) & (steps >= self.horizon)] = _HORIZON
+        lost = (why >= 0) & (why != _HORIZON)
+        if among is not None:
+            why[~among] = -1
+        followed = after.copy()
+        if lost.any():
+            followed[lost] = before[lost]
+        if len(self.setting.brought):
+            followed[:, self.setting.brought] = 0.0  # what the next step will bring isn't known
+        return Stepped(followed, rewards, ended, why >= 0, why, success, after, prediction)
+
+    def _evaluated(
+        self, before: Float2D, actions: Any, after: Float2D, good: NDArray[np.bool_]
+    ) -> tuple[Float1D, NDArray[np.bool_], NDArray[np.bool_] | None]:
+        """Rewards, ends and successes; a step that can't be followed has none of them."""
+        tells = getattr(self.task, "successes", None)
+        layout = self.setting.layout
+        # Single dreams are frozen: a function that changes what it evaluates would change the dream.
+        before, after = _read_only(before), _read_only(after)
+        if tells is None and not self.evaluator.asks:
+            rewards, ended = self.evaluator(before, actions, after)
+            return np.where(good, rewards, 0.0), ended & good, None
+        if good.all():
+            success = (
+                None if tells is None else np.asarray(tells(layout, before, actions, after), dtype=np.bool_)
+            )
+            return (*self.evaluator(before, actions, after), success)
+        rewards, ended = np.zeros(len(before)), np.zeros(len(before), dtype=np.bool_)
+        success = None if tells is None else ended.copy()
+        if good.any():
+            steps = _read_only(before[good]), actions[good], _read_only(after[good])
+            rewards[good], ended[good] = self.evaluator(*steps)
+            if tells is not None and success is not None:
+                success[good] = tells(layout, *steps)
+        return rewards, ended, success
+
+    def reason(self, stepped: Stepped, row: int) -> str:
+        """Why a dream was truncated, in a sentence that names objects and properties."""
+        if stepped.causes[row] == _HORIZON:
+            return horizon_reached(self.horizon)
+        if stepped.causes[row] == _NO_REWARD:
+            return Cause.NO_REWARD.value
+        told = explained(parts_of_row(stepped.prediction, row), self.min_margin, self.evaluator.overruled)
+        if told is not None:
+            return told[1]
+        return self.setting.shown.outside(
+            Scene(self.setting.schema, self.setting.layout, stepped.foreseen[row].copy())
+        )
+
+
+def _read_only(vectors: Float2D) -> Float2D:
+    view = vectors.view()
+    view.flags.writeable = False
+    return view

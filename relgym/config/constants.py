@@ -1,0 +1,74 @@
+"""Constants that several parts of the learner share, each with its unit, what it means and what it follows from.
+
+They aren't settings: nothing in an env asks for others. What a user may want to change is a field of `ModelConfig`.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+__all__ = [
+    "BEYOND",
+    "CONTACTS_KEPT",
+    "DIGITS",
+    "EVIDENCE",
+    "EXTRAPOLATED",
+    "FIRST_ROOM",
+    "HOPELESS",
+    "POWERS",
+    "ROUGH",
+    "ROUNDINGS",
+    "SEARCHED_CELLS",
+    "STDS",
+    "TALLY_DIGITS",
+    "TIE_BITS",
+    "TOLD",
+]
+
+EVIDENCE: Final = 10.0
+"""Bits by which evidence must lead before anything is changed for it: such a lead misleads once in 2^10 times."""
+
+TIE_BITS: Final = 1e-6
+"""Difference in bits that decides nothing: sums of some thousand logarithms are rounded by less."""
+
+STDS: Final = 4.0
+"""Standard deviations within which an error is noise: a normal one is beyond them once in 16,000 times."""
+
+ROUNDINGS: Final = 32.0
+"""Roundings that a function of a few terms on differences of stored numbers carries at most: each of some eight terms
+has two of the difference, one of the product and one of the sum."""
+
+ROUGH: Final = 4.0
+"""So many times the rounding noise can't be rounding: two more bits than the largest estimate of it has."""
+
+EXTRAPOLATED: Final = 100.0
+"""A function through a few rows is evaluated at first with a tolerance this much wider: its errors grow with the
+distance from them, in units of how far they lie apart, and that is seldom more."""
+
+TOLD: Final = 100.0
+"""A change of so many tolerances tells a weight to 1 %."""
+
+BEYOND: Final = 0.5
+"""Changes may go beyond those that were seen by so much of their range: on other days somebody flies faster."""
+
+HOPELESS: Final = 200
+"""Examples among which there is a law, or it is doubtful that there is one: five times what the thesis' modes need."""
+
+SEARCHED_CELLS: Final = 1_000_000
+"""Numbers that one search looks at, at most: about 4 ms for each of the passes that it makes over them."""
+
+CONTACTS_KEPT: Final = 3_000
+"""Contacts that laws of touching pairs remember, at most: some hundred of each kind in a world of many kinds."""
+
+POWERS: Final = (1, 2, 3)
+"""Powers of extents that inertia and shares may go with: length, area, volume."""
+
+TALLY_DIGITS: Final = 7
+"""Decimals to which sums of examples' weights are compared. Weights are multiples of 1/64 or shares of 1; sums taken in
+another order differ by 1e-12 at most."""
+
+DIGITS: Final = 7
+"""Significant digits of numbers in formulas, unless somebody asks for others."""
+
+FIRST_ROOM: Final = 256
+"""Rows that a growing array has room for at first; it doubles whenever it is full."""

@@ -1,0 +1,1 @@
+"""What a model tells people: tables, rule lists, explanations, advice."""

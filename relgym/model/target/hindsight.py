@@ -1,0 +1,183 @@
+"""How often a target's own predictions were wrong on steps not learned yet: whether its clauses choose well.
+
+Modes that together cover all examples explain nothing if no condition tells which of them holds: of an env whose
+state is the number of a cell, a few constants and offsets cover every step. What gives them away is that the mode that
+wins the vote was the wrong one. So a learner that predicts before each step reports the outcome afterwards
+(`WorldModel.look_back`); of a model that only learns nothing is counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterable, Mapping
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
+
+from relgym.config.constants import STDS
+from relgym.model.calibration import OWN, Calibration
+from relgym.model.prediction import ScenePrediction
+
+if TYPE_CHECKING:
+    from relgym.model.parts import Parts
+
+__all__ = [
+    "LEAST",
+    "SHARE",
+    "WINDOW",
+    "WRONG",
+    "Hindsight",
+    "calibration_to_json",
+    "look_back",
+    "restore_calibration",
+]
+
+WRONG = 1e-9
+"""A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
+
+WINDOW, LEAST = 200, 50
+"""So many of the latest steps are remembered; fewer than `LEAST` say nothing."""
+
+SHARE, RECOVERED = 0.15, 0.075
+"""With a larger share of the predictions wrong than the first, the clauses don't tell which mode holds; with a
+smaller one than the second they do again. In between it stays as it was: within one of Taxi's episodes a tenth is
+wrong, from one to the next a quarter."""
+
+
+class Hindsight:
+    """The latest predictions of one target: how many there were in each step, and how many of them were wrong.
+
+    Parameters
+    ----------
+    steps
+        (predictions, wrong ones) by step, oldest first; of more than `WINDOW` the newest.
+    undecided
+        What was the case before, where they leave it open.
+
+    Attributes
+    ----------
+    spoken, wrong : int
+        Predictions in these steps, and how many of them were wrong.
+    undecided : bool
+        Whether so many were wrong that nothing tells which mode holds when.
+
+    Examples
+    --------
+    >>> known = Hindsight([(1, 0)] * 40)
+    >>> for _ in range(20):
+    ...     known.add(1, 1)
+    >>> known.wrong, known.spoken, known.undecided
+    (20, 60, True)
+    """
+
+    def __init__(self, steps: Iterable[tuple[int, int]] = (), *, undecided: bool = False) -> None:
+        self._steps = deque(((int(n), int(k)) for n, k in steps), maxlen=WINDOW)
+        self.spoken = sum(n for n, _ in self._steps)
+        self.wrong = sum(k for _, k in self._steps)
+        self.undecided = undecided
+        self._settle()
+
+    def __len__(self) -> int:
+        return len(self._steps)
+
+    def add(self, spoken: int, wrong: int) -> None:
+        """Take in one step. Cost O(1)."""
+        if len(self._steps) == WINDOW:
+            n, k = self._steps[0]
+            self.spoken, self.wrong = self.spoken - n, self.wrong - k
+        self._steps.append((spoken, wrong))
+        self.spoken, self.wrong = self.spoken + spoken, self.wrong + wrong
+        self._settle()
+
+    def _settle(self) -> None:
+        if len(self._steps) >= LEAST:
+            self.undecided = self.wrong > (RECOVERED if self.undecided else SHARE) * self.spoken
+
+    def united(self, other: Hindsight) -> Hindsight:
+        """What two models know together: the latest of both, in turns."""
+        pairs = zip_longest(reversed(self._steps), reversed(other._steps))
+        newest = [step for pair in pairs for step in pair if step is not None]
+        return Hindsight(newest[:WINDOW][::-1], undecided=self.undecided or other.undecided)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back: [predictions, wrong ones] by step, and what they are taken for."""
+        return {"steps": [list(step) for step in self._steps], "undecided": self.undecided}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Hindsight:
+        """Read what `to_json` wrote."""
+        return cls(((n, k) for n, k in data["steps"]), undecided=bool(data["undecided"]))
+
+
+def look_back(
+    parts: Parts, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
+) -> None:
+    """Report to each target how its predictions of a step came out; arguments as of `WorldModel.look_back`.
+
+    Only predictions of modes count: neither fallback values nor laws of motion, which abstain where they don't hold.
+    What rests on another property's next value that was off isn't evaluated, since the fault is that one's.
+    """
+    layout = prediction.scene.layout
+    targets = {(t.type, t.property): t for t in parts.targets}
+    counts: dict[tuple[str, str], list[int]] = {}
+    off: set[tuple[str, str]] = set()
+    for part in prediction.parts:
+        residual = residuals.get((part.object, part.property))
+        pair = (layout.types[layout.index(part.object)].name, part.property)
+        target = targets.get(pair)
+        if residual is None or target is None:
+            continue
+        came = part.value + residual
+        rounding = max(WRONG, precision * max(1.0, abs(came)))
+        turn = 2.0 * math.pi if part.property in layout.types[layout.index(part.object)].angles else 0.0
+        model = parts.models[target]
+        if part.audit is not None:
+            error, noise = parts.config.claim_error, parts.config.clustering.noise_std
+            if not isinstance(noise, str):  # who says how large the noise is takes it for granted
+                rounding = max(rounding, parts.config.clustering.inlier_stds * noise)
+            model.calibration.look_back(
+                part.audit, came, claimed=part.ok, rounding=rounding, error=error, turn=turn
+            )
+        if not abs(residual) <= rounding:
+            off.add(pair)
+        if not part.mode or parts.governs(target):
+            continue
+        if not off.isdisjoint(target.given) and not off.isdisjoint(model.needs):
+            continue
+        spread = STDS * part.spread if part.spread == part.spread else 0.0
+        if part.audit is not None and part.audit.speaker != OWN:  # another one gave the value, and the spread
+            residual, spread = came - part.audit.values[OWN], 0.0
+            residual = math.remainder(residual, turn) if turn else residual
+        count = counts.setdefault(pair, [0, 0])
+        count[0] += 1
+        count[1] += not abs(residual) <= max(rounding, model.clusterer.scale.tolerance, spread)
+    for pair, (spoken, wrong) in counts.items():
+        parts.models[targets[pair]].hindsight.add(spoken, wrong)
+
+
+def hindsight_to_json(parts: Parts) -> dict[str, Any]:
+    """Plain data that `restore_hindsight` reads back, by target; empty where nobody ever looked back."""
+    known = {str(t): parts.models[t].hindsight for t in parts.targets}
+    return {name: hindsight.to_json() for name, hindsight in known.items() if len(hindsight)}
+
+
+def restore_hindsight(parts: Parts, data: Mapping[str, Any]) -> None:
+    """Take over what `hindsight_to_json` wrote."""
+    for target in parts.targets:
+        if str(target) in data:
+            parts.models[target].hindsight = Hindsight.from_json(data[str(target)])
+
+
+def calibration_to_json(parts: Parts) -> dict[str, Any]:
+    """Plain data that `restore_calibration` reads back, by target; empty where nobody ever looked back."""
+    known = {str(t): parts.models[t].calibration for t in parts.targets}
+    return {name: calibration.to_json() for name, calibration in known.items() if calibration.trials}
+
+
+def restore_calibration(parts: Parts, data: Mapping[str, Any]) -> None:
+    """Take over what `calibration_to_json` wrote."""
+    for target in parts.targets:
+        if str(target) in data:
+            parts.models[target].calibration = Calibration.from_json(
+                data[str(target)], parts.config.claim_probability, len(parts.config.hypotheses)
+            )

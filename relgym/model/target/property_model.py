@@ -1,0 +1,675 @@
+"""The model of one target: its modes, when each holds, and which objects its roles are bound to (Figure 1.4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.classification.examples import NOISE as UNKNOWN
+from relgym.classification.examples import Example, Vocabulary
+from relgym.classification.mode_classifier import ModeClassifier
+from relgym.classification.ranking import RankingBatch
+from relgym.clustering.clusterer import ClusterReport, ModeClusterer
+from relgym.clustering.columns import SlotSignature
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.mode import NOISE, Mode
+from relgym.clustering.roles import Binding
+from relgym.config import ModelConfig
+from relgym.config.constants import HOPELESS
+from relgym.model.calibration import EXPERTS, LATEST, OWN, Assessment, Calibration, Key
+from relgym.model.grouping import distinct, members
+from relgym.model.perception import Percept, Situation
+from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.model.target.candidates import Candidates
+from relgym.model.target.casting import Casting
+from relgym.model.target.conditions import Conditions, needed
+from relgym.model.target.fallback import Fallback
+from relgym.model.target.functions import ModeFunctions, Verdict, bodies_of
+from relgym.model.target.guess import Guesses
+from relgym.model.target.hindsight import Hindsight
+from relgym.model.target.limits import Limits, find_limits
+from relgym.model.target.scope import EVERYWHERE, LEAF, Scope, find_scope
+from relgym.model.target.spread import Spreads, measure
+from relgym.model.target.stops import Stops, find_stops
+from relgym.scene.objects import Target
+from relgym.scene.schema import SceneSchema
+from relgym.scheduling.agenda import Budget
+
+__all__ = ["PropertyModel", "Verdict", "bodies_of"]
+
+MEASURE_EVERY = 256
+"""Spreads are measured after so many examples, and whenever the modes change."""
+
+DOUBTFUL = 500
+"""With most of so many recent examples unexplained there is hardly a law."""
+
+
+RECENT, LEFT = 200, 0.05
+"""Where a larger share of so many recent examples is unexplained, regressions may know better."""
+
+
+_PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
+    OUTCOMES.index(o)
+    for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
+)
+
+
+_NOTHING = Calibration()
+
+
+class PropertyModel:
+    """Learns and predicts one target.
+
+    Parameters
+    ----------
+    target
+        What it predicts.
+    vocabulary
+        Names of what its classifiers are shown, next values left aside.
+    config
+        Free parameters.
+    schema
+        The scenes' schema.
+
+    Attributes
+    ----------
+    clusterer, classifier, casting
+        The learners of modes, of their preconditions and of role bindings.
+    spreads
+        How far examples scatter about their modes.
+    limits
+        Which modes are limits: they take no part in the vote but cut off what its winner predicts.
+    stops
+        Which modes are walls at work: they take no part in the vote either.
+    hindsight
+        How the latest predictions came out, if somebody looked back at them.
+    calibration
+        How right predictions of every kind were, if somebody looked back at them, and who gives their values.
+    latest
+        Id of the mode that explained the latest example that any mode did.
+    leaned_on
+        Whether laws of other properties read this one's next value. Then its modes answer as long as it has any: what a
+        guess leaves would be magnified in those laws.
+    """
+
+    def __init__(
+        self, target: Target, vocabulary: Vocabulary, config: ModelConfig, schema: SceneSchema
+    ) -> None:
+        self.target = target
+        self.schema = schema
+        self.config = config
+        self._base = vocabulary
+        self.conditions = Conditions(schema, target)
+        self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
+        self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classifying)
+        self.casting = Casting(vocabulary, config.classification)
+        self.functions = ModeFunctions(self.clusterer, self.casting, config)
+        self.fallback = Fallback(self.clusterer)
+        self.spreads = Spreads()
+        self.limits = Limits()
+        self.stops = Stops()
+        self.hindsight = Hindsight()
+        self.candidates = Candidates(config.hypotheses)
+        self.calibration = Calibration(config.claim_probability, len(config.hypotheses))
+        self.latest = NOISE
+        self.leaned_on = False
+        self._unsettled = True
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """All modes but noise, by id."""
+        return self.clusterer.modes
+
+    def mode(self, number: int) -> Mode:
+        """The mode of that id."""
+        return self.functions.mode(number)
+
+    def _assess(self) -> bool:
+        seen = self.clusterer.seen
+        if not self.clusterer.clusters:
+            return seen >= HOPELESS
+        return seen >= DOUBTFUL and bool((self.clusterer.labels[-DOUBTFUL:] == NOISE).mean() > 0.5)
+
+    @property
+    def needs(self) -> frozenset[tuple[str, str]]:
+        """(type, property) pairs whose next values a mode's function reads or a clause tests."""
+        modes = [c.mode for c in self.clusterer.clusters.values()]
+        return needed(self.target, modes, self.classifier.classifiers)
+
+    # ------------------------------------------------------------------ learning
+    def learn_one(
+        self,
+        table: ExampleTable,
+        row: int,
+        y: float,
+        situation: Situation,
+        example: Example,
+        budget: Budget | None = None,
+    ) -> ClusterReport:
+        """Take up one example: cluster it, then let the classifiers see where it belongs.
+
+        Parameters
+        ----------
+        table, row
+            The example's regression row.
+        y
+            The property's next value.
+        situation, example
+            How the target object is situated, in a single scene.
+        budget
+            What may be spent on searches; default: as much as they take.
+        """
+        self._compare(situation, example, table.x[row], y)
+        report = self.clusterer.learn_one(table, row, y, budget)
+        self._unsettled = float((self.clusterer.labels[-RECENT:] == NOISE).mean()) > LEFT
+        if report.mode != NOISE and self.latest not in report.fits:
+            self.latest = report.mode
+        self.fallback.unexplained = self._assess()
+        if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
+            self._measure(table)
+        x = table.x[row : row + 1]
+        refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
+        if report.changed or refuted or self.stops.contradicted(report.mode, situation.signature, x[0]):
+            self._follow(table)
+        number = len(self.clusterer.y) - 1
+        own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
+        seen = replace(example, row=number, own=own)
+        fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
+        values = np.array(
+            self.functions.values_one(situation.signature, x[0].tolist(), self.classifier.modes)
+        )
+        assigned = UNKNOWN if report.mode == NOISE or self.bounds(report.mode) else report.mode
+        played = self.functions.played(table, np.array([number]), report.mode)[0].tolist()
+        self.classifier.observe(seen, assigned, fits, values, roles=played)
+        if played:
+            self.casting.observe(self.mode(report.mode), seen, played)
+        return report
+
+    def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
+        """Let the guess and the modes predict an example before it is learned from."""
+        binding = self.fallback.guessing(situation.signature)
+        if binding is None or self.fallback.unexplained or not self.classifier.modes:
+            return
+        row = x[: len(situation.signature.columns)].tolist()
+        if not self.fallback.scope.covers_one(row, situation.signature):
+            return
+        values = self.functions.values_one(situation.signature, row, self.classifier.modes)
+        own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])
+        first = self.classifier.rank(replace(example, own=own), values).modes[0]
+        said = values[self.classifier.modes.index(first)]
+        if np.isfinite(said):
+            self.fallback.guesses.compare(said - y, binding.value(row) - y)
+
+    @property
+    def flags(self) -> frozenset[str]:
+        """Names, as clauses use them, of the numbers that are 1 or 0 as something holds or not."""
+        others = {f"{t.name}.{prop}" for t in self.schema.types for prop in t.flags}
+        return frozenset(others.union(self.schema.type(self.target.type).flags))
+
+    @property
+    def base_features(self) -> int:
+        """Number of own features that classifiers are shown, next values left aside."""
+        return len(self._base.own)
+
+    def follow(self, table: ExampleTable) -> None:
+        """The modes changed from outside: classifiers and spreads follow."""
+        self._follow(table)
+        self.fallback.unexplained = self._assess()
+        self._measure(table)
+
+    def _measure(self, table: ExampleTable) -> None:
+        """How far examples scatter, and how far approximations go."""
+        self.spreads = measure(self.clusterer, table)
+        # Of bodies relations may tell what the numbers of a row don't.
+        bodiless = not any(t.has_body for t in self.schema.types)
+        bounded = self.fallback.guessable or (bodiless and self.clusterer.noise_examples >= LEAF)
+        asked = self.config.abstain and bounded and len(self.clusterer.rows)
+        self.fallback.scope = (
+            find_scope(self.clusterer, table, guessing=self.fallback.guessable) if asked else EVERYWHERE
+        )
+
+    def start_over(self, table: ExampleTable) -> None:
+        """Learn all classifiers anew, of what they remember."""
+        self._widen(table, self.classifier.vocabulary.follows)
+
+    def remember(self, table: ExampleTable, example: Example, weight: float) -> None:
+        """Let the classifiers remember one more of the examples there are, by its number in ``example.row``."""
+        number = np.array([example.row])
+        assigned = int(self.clusterer.labels[example.row])
+        modes = self.classifier.modes
+        known, fits = self.clusterer.fits(table, number)
+        shown = np.array([bool(fits[0, known.index(i)]) for i in modes], dtype=bool)
+        values = self.functions.values_many(table, self.clusterer.rows[number], modes)[0]
+        played = self.functions.played(table, number, assigned)[0].tolist()
+        label = assigned if assigned in modes else UNKNOWN
+        self.classifier.exemplars.add(example, label, shown, values, roles=played, weight=weight)
+        if played:
+            self.casting.observe(self.mode(assigned), example, played)
+
+    def keep(self, rows: NDArray[np.bool_]) -> None:
+        """Forget the examples of dropped rows of the example table, shape ``(rows,)``."""
+        numbers = self.clusterer.keep(rows)
+        exemplars = self.classifier.exemplars.columns["row"]
+        exemplars[:] = numbers[exemplars]
+
+    def go_on(self, table: ExampleTable, budget: Budget) -> None:
+        """Go on with a search for modes that is under way, as far as the budget goes."""
+        if self.clusterer.go_on(table, budget):
+            self.follow(table)
+
+    def approximate(self, table: ExampleTable, budget: Budget) -> None:
+        """Look for an approximation if one is due, as far as the budget goes."""
+        if self.clusterer.due and self.clusterer.approximate_now(table, budget):
+            self.follow(table)
+
+    def search(self, table: ExampleTable, budget: Budget) -> None:
+        """Finish the searches that are under way or due."""
+        changed = False
+        while self.clusterer.searching or self.clusterer.due:
+            changed |= self.clusterer.go_on(table, budget) | self.clusterer.approximate_now(table, budget)
+        if changed:
+            self.follow(table)
+
+    def refresh(self, budget: int | None) -> int:
+        """Re-learn stale classifiers within a budget of work (None: all); returns the work spent."""
+        left = float("inf") if budget is None else budget
+        spent = self.classifier.refresh(left)
+        return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
+
+    def reconsider(self, table: ExampleTable, budget: Budget) -> None:
+        """Guess anew where nothing is explained, and ask for hypotheses, if it is time, as far as the budget goes."""
+        if self.fallback.guessable and self.fallback.guesses.stale(self.clusterer.seen):
+            self.fallback.guesses.renew(self.clusterer, table, self.fallback.scope, budget)
+        if self.candidates.due(self.clusterer.seen) and len(self.clusterer.rows):
+            for renewed in self.candidates.renew(self.clusterer, table, budget):
+                self.calibration.renewed(len(EXPERTS) + renewed)
+
+    def retarget(self, target: Target, table: ExampleTable) -> None:
+        """Be given other next values: modes and classifiers are learned again, from what is remembered."""
+        self.target = target
+        self.conditions = Conditions(self.schema, target)
+        self.clusterer.retarget(target)
+        self.casting = Casting(self._base, self.config.classification)
+        self.functions = ModeFunctions(self.clusterer, self.casting, self.config)
+        self.fallback.guesses.drop()
+        self.hindsight = Hindsight()  # what follows is another model's word
+        self.calibration.forget()
+        self.candidates.forget()
+        self._follow(table)
+        self._widen(table, self.classifier.vocabulary.follows)
+
+    def lead(self, prop: str, step: float, table: ExampleTable) -> None:
+        """Take note that ``prop' = prop + step * target'``: clauses may test where that leads to."""
+        others = tuple(pair for pair in self.classifier.vocabulary.follows if pair[0] != prop)
+        self._widen(table, (*others, (prop, step)))
+        self._follow(table)
+
+    def _widen(self, table: ExampleTable, follows: tuple[tuple[str, float], ...]) -> None:
+        exemplars = self.classifier.exemplars
+        rows = self.clusterer.rows[exemplars.rows.astype(np.intp)]
+        ahead = np.full((len(rows), len(self.conditions.pairs)), np.nan)
+        for number in np.unique(table.signature_ids[rows]):
+            part = np.flatnonzero(table.signature_ids[rows] == number)
+            ahead[part] = self.conditions.values(table.signatures[int(number)], table.x[rows[part]])
+        own = exemplars.columns["own"][:, : len(self._base.own)]
+        vocabulary = self.conditions.vocabulary(self._base, follows)
+        self.classifier.widen(vocabulary, np.concatenate([own, ahead], axis=1))
+
+    def _follow(self, table: ExampleTable) -> None:
+        """The set of modes changed: what the classifiers remember is labelled anew."""
+        self.functions.bound.clear()
+        self.fallback.bound.clear()
+        self.limits = find_limits(self.clusterer, table)
+        self.stops = self._find_stops(table)
+        numbers = self.classifier.exemplars.rows.astype(np.intp)
+        known, fits = self.clusterer.fits(table, numbers)
+        ids = tuple(i for i in known if not self.bounds(i))
+        fits = fits[:, [not self.bounds(i) for i in known]]
+        values = self.functions.values_many(table, self.clusterer.rows[numbers], ids)
+        labels = self.clusterer.labels[numbers].astype(np.int64)
+        self.calibration.keep(ids)
+        self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
+        self.casting.sync({m.id: m for m in self.modes})
+        self.functions.recast(table, self.classifier.exemplars)
+        self.casting.recall(self.classifier.exemplars)
+
+    def _find_stops(self, table: ExampleTable) -> Stops:
+        given = [prop for name, prop in self.conditions.pairs if name == self.target.type]
+        taken = (self.limits.low, self.limits.high)
+        return find_stops(self.clusterer, table, self.classifier.vocabulary.follows, given, taken)
+
+    # ------------------------------------------------------------------ answering
+    def bounds(self, mode: int) -> bool:
+        """Whether a mode takes no part in the vote, but stands in where the others would lead too far."""
+        return mode in self.limits or mode in self.stops
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether it is known by now that modes don't describe the target: just some of its examples, or not when."""
+        return (self.fallback.unexplained or self.undecided) and self.explained_by is None
+
+    @property
+    def explained_by(self) -> int | None:
+        """Number of the hypothesis that gives most of the values, if it can be claimed; None where none does."""
+        speakers = self.calibration.speakers() if self.candidates else {}
+        most = max(speakers, key=lambda k: speakers[k], default=OWN) - len(EXPERTS)
+        return most if most >= 0 and self.candidates.laws[most] is not None else None
+
+    def explanation(self) -> str | None:
+        """Name and law of the hypothesis that gives most of the values, for people; None where none does."""
+        number = self.explained_by
+        return None if number is None else self.candidates.statement(number)
+
+    @property
+    def undecided(self) -> bool:
+        """Whether modes cover the examples, but nothing tells which of them holds when.
+
+        See `relgym.model.target.hindsight`. With a single mode there is no choice; whether it holds is told by the
+        examples that it leaves over.
+        """
+        return len(self.classifier.modes) > 1 and self.hindsight.undecided
+
+    def assess(self, key: Key, values: Sequence[float]) -> Assessment:
+        """Who gives the value of a prediction, and how right it will be."""
+        return self.record.assess(key, values)
+
+    def assess_many(
+        self, key: Key, values: NDArray[np.float64]
+    ) -> Iterator[tuple[NDArray[np.intp], Assessment]]:
+        """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
+        return self.record.assess_many(key, values)
+
+    def claims(self, told: Assessment) -> bool:
+        """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
+        if told.speaker not in (OWN, LATEST) and told.speaker < len(EXPERTS):
+            return False
+        least, slips = self.config.claim_probability, self.config.claim_slips
+        if self.record.slips > slips:
+            least = max(least, 1.0 - slips)
+        return told.probability >= least or not self.record.trials
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether no kind of its modes' predictions came true often enough to be claimed."""
+        kinds = [told for _, told in self.record.kinds(_PREDICTED)]
+        return bool(kinds) and not any(map(self.claims, kinds))
+
+    def latest_values(
+        self, percept: Percept, index: int, following: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """What the mode that held last says of one object of n scenes, shape ``(n,)``; None where nobody asks it.
+
+        Nobody does where the vote's winners are mostly right. NaN where its roles are open.
+        """
+        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
+        asked = self.rough or self.record.doubts(_PREDICTED, self.config.claim_probability)
+        if not known or not asked or len(self.classifier.modes) < 2:
+            return None
+        x = percept.rows(index, following, ordered=False)
+        return self.functions.values(percept.situation(index).signature, x, (self.latest,))[:, 0]
+
+    @property
+    def record(self) -> Calibration:
+        """What is known of earlier predictions; of a model that always answers nothing."""
+        return self.calibration if self.config.abstain else _NOTHING
+
+    @property
+    def rough(self) -> bool:
+        """Whether so much is unexplained, or explained only roughly, that regressions may know better."""
+        return self.fallback.guessable or self._unsettled
+
+    @property
+    def lost(self) -> bool:
+        """Whether modes aren't asked: nothing is explained, or an approximation errs more than the guess."""
+        return self.fallback.unexplained or (
+            not self.leaned_on and self.fallback.guess is not None and self.fallback.guesses.superior
+        )
+
+    def mode_values(self, percept: Percept, index: int, following: NDArray[np.float64]) -> list[float]:
+        """What every mode would predict, in the order of ``classifier.modes``; NaN where its roles are open.
+
+        Arguments as of `predict_one`.
+        """
+        x = percept.rows(index, following[None])[0].tolist()
+        return self.functions.values_one(percept.situation(index).signature, x, self.classifier.modes)
+
+    def example(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Example:
+        """What the classifiers are shown of a single scene; arguments as of `predict_one`."""
+        situation = percept.situation(index)
+        # Conditions are of objects alone of their type, so their order doesn't matter.
+        x = percept.rows(index, following[None], ordered=False)
+        return replace(self._shown(situation, x), key=situation.keys[0])
+
+    def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
+        """`example` without the key, by which examples are kept and not classified."""
+        first = situation.examples[0]
+        if not self.conditions.pairs:
+            return first
+        ahead = self.conditions.values(situation.signature, x)[0]
+        return replace(first, own=np.concatenate([first.own, ahead]))
+
+    def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
+        """Predict for one object of a single scene; the caller fills in names.
+
+        Parameters
+        ----------
+        percept
+            The scene.
+        index
+            The object.
+        following
+            Next values predicted so far, shape ``(width,)``.
+        """
+        situation = percept.situation(index)
+        outcome = Outcome.UNEXPLAINED if self.lost else Outcome.NO_MODE
+        nothing = Prediction("", "", float("nan"), outcome)
+        if self.lost or not self.classifier.modes:
+            return nothing
+        casts = self._casts(situation.signature)
+        row = percept.rows(index, following[None], ordered=casts)
+        x = row[0].tolist()
+        if not self.fallback.scope.covers_one(x, situation.signature):
+            return replace(nothing, outcome=Outcome.UNEXPLAINED)
+        example = self._shown(situation, row)
+        ranking = self.classifier.rank(
+            example, self.functions.values_one(situation.signature, x, self.classifier.modes)
+        )
+        if self.config.abstain and not ranking.seen and len(self.classifier.modes) > 1:
+            return self._leaning(ranking.modes[0], situation.signature, row)
+        layout, order = percept.layout, situation.order[0] if casts else situation.plain
+        for place, mode in enumerate(ranking.modes):
+            binding = self.functions.binding(situation.signature, mode)
+            if binding is None:
+                continue
+            slots: tuple[int, ...] | None = ()
+            if binding.open:
+                slots = self.functions.cast(mode, binding, example, order, layout)
+            if slots is None:
+                if not self.config.abstain:
+                    continue
+                # What lost the vote doesn't become likely because the winner's players are in doubt.
+                return replace(nothing, outcome=Outcome.OUTSIDE)
+            rest = iter(slots)
+            played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
+            roles = tuple(layout.names[order[s]] for s in played)
+            margin = ranking.margin if place == 0 else 0.0
+            outcome = Outcome.UNEXPLAINED if self.undecided else Outcome.PREDICTED
+            value = self.fallback.within(binding.value(x, slots), situation.signature, row)
+            found = Prediction("", "", value, outcome, mode, roles, margin)
+            found = self._stopped(self.limits.cut_off(found), situation.signature, row)
+            return replace(found, spread=self.spreads.at(found.mode, situation.signature, x))
+        return replace(nothing, outcome=Outcome.NO_ROLES)
+
+    def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
+        """Predict for one object of n scenes; bit for bit what `predict_one` gives.
+
+        Parameters
+        ----------
+        percept
+            The scenes.
+        index
+            The object.
+        following
+            Next values predicted so far, shape ``(n, width)``.
+        """
+        n = len(percept)
+        verdict = Verdict(
+            np.full(n, np.nan), np.zeros(n, dtype=np.int64), np.full(n, _NO_MODE, dtype=np.int8), np.zeros(n)
+        )
+        modes = self.classifier.modes
+        if self.lost:
+            verdict.outcomes[:] = _UNEXPLAINED
+        if self.lost or not modes:
+            return verdict
+        situation = percept.situation(index)
+        x = percept.rows(index, following, ordered=self._casts(situation.signature))
+        ranking = self._rank_batch(situation, x)
+        verdict.outcomes[:] = _NO_ROLES
+        said = _UNEXPLAINED if self.undecided else _PREDICTED
+        outside = ~ranking.seen if self.config.abstain and len(modes) > 1 else np.zeros(n, dtype=np.bool_)
+        beyond = ~self.fallback.scope.covers(x, situation.signature)
+        verdict.outcomes[outside], verdict.outcomes[beyond] = _OUTSIDE, _UNEXPLAINED
+        waiting = ~(outside | beyond)
+        for place in range(len(modes)):
+            for mode in np.unique(ranking.modes[waiting, place]):
+                binding = self.functions.binding(situation.signature, int(mode))
+                if binding is None:
+                    continue
+                part = np.flatnonzero(waiting & (ranking.modes[:, place] == mode))
+                done, values = self._apply(int(mode), binding, percept, situation, x, part)
+                verdict.values[done], verdict.modes[done] = values, mode
+                verdict.outcomes[done] = said
+                verdict.margins[done] = ranking.margin[done] if place == 0 else 0.0
+                waiting[done] = False
+                if self.config.abstain:  # in doubt about the players
+                    verdict.outcomes[part[waiting[part]]] = _OUTSIDE
+                    waiting[part] = False
+            if not waiting.any():
+                break
+        verdict.values[:] = self.fallback.all_within(verdict.values, situation.signature, x)
+        self.limits.cut_off_all(verdict.values, verdict.modes)
+        self.stops.apply(situation.signature, x, verdict.values, verdict.modes)
+        self._lean(verdict, ranking.modes[:, 0], outside & ~beyond, situation.signature, x)
+        return verdict
+
+    def _leaning(self, mode: int, signature: SlotSignature, row: NDArray[np.float64]) -> Prediction:
+        """Outside experience: no claim, but the value that the vote's winner gives, if none of its roles is open."""
+        binding = self.functions.binding(signature, mode)
+        if binding is None or binding.open:
+            return Prediction("", "", float("nan"), Outcome.OUTSIDE)
+        x = row[0].tolist()
+        value, spread = (
+            self.fallback.within(binding.value(x), signature, row),
+            self.spreads.at(mode, signature, x),
+        )
+        return Prediction("", "", value, Outcome.OUTSIDE, spread=spread)
+
+    def _lean(
+        self,
+        verdict: Verdict,
+        winners: NDArray[np.int64],
+        outside: NDArray[np.bool_],
+        signature: SlotSignature,
+        x: NDArray[np.float64],
+    ) -> None:
+        """`_leaning` of all scenes that are outside experience, shape ``(n,)``."""
+        for mode in np.unique(winners[outside]):
+            binding = self.functions.binding(signature, int(mode))
+            if binding is not None and not binding.open:
+                part = outside & (winners == mode)
+                verdict.values[part] = self.fallback.all_within(
+                    binding.values(x[part])[:, 0], signature, x[part]
+                )
+
+    def _stopped(self, found: Prediction, signature: SlotSignature, row: NDArray[np.float64]) -> Prediction:
+        """The prediction, or the constant of a stop that it runs into."""
+        if not self.stops.every:
+            return found
+        values, modes = np.array([found.value]), np.array([found.mode])
+        self.stops.apply(signature, row, values, modes)
+        if modes[0] == found.mode:
+            return found
+        return replace(found, value=float(values[0]), mode=int(modes[0]), roles=found.roles[:1])
+
+    def _apply(
+        self,
+        mode: int,
+        binding: Binding,
+        percept: Percept,
+        situation: Situation,
+        x: NDArray[np.float64],
+        part: NDArray[np.intp],
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Those of the given examples whose roles can be filled, and the mode's values there."""
+        if not binding.open:
+            return part, binding.values(x[part])[:, 0]
+        examples, order = situation.examples, situation.order
+        done, values = np.zeros(len(part), dtype=np.bool_), np.full(len(part), np.nan)
+        # Players depend on the relations and the order alone: one search for all scenes that share them.
+        first, which = distinct(examples.table[part], order[part])
+        for i, alike in zip(part[first].tolist(), members(which), strict=True):
+            slots = self.functions.cast(mode, binding, examples[i], order[i], percept.layout)
+            if slots is not None:
+                done[alike], values[alike] = True, binding.values_as(x[part[alike]], slots)
+        return part[done], values[done]
+
+    def _casts(self, signature: SlotSignature) -> bool:
+        """Whether some mode has a role that several objects could play."""
+        bindings = (self.functions.binding(signature, mode) for mode in self.classifier.modes)
+        return any(binding is not None and bool(binding.open) for binding in bindings)
+
+    def _rank_batch(self, situation: Situation, x: NDArray[np.float64]) -> RankingBatch:
+        """Rank the modes for n examples; a single mode has no runner-up and needs no look at the scene."""
+        modes, n = self.classifier.modes, len(x)
+        if len(modes) == 1:
+            sure = np.ones(n, dtype=np.bool_)
+            return RankingBatch(np.full((n, 1), modes[0]), np.zeros((n, 1)), np.full(n, np.inf), sure, sure)
+        shown = situation.preview(self.classifier.relations)
+        if self.conditions.pairs:
+            ahead = self.conditions.values(situation.signature, x)
+            shown = replace(shown, own=np.concatenate([shown.own, ahead], axis=1))
+        return self.classifier.rank_batch(shown, self.functions.values(situation.signature, x, modes))
+
+    # ------------------------------------------------------------------ saving
+    def to_json(self, *, history: bool) -> dict[str, Any]:
+        """Plain data: modes, classifiers and roles; exemplars only with history."""
+        return {
+            "clusterer": self.clusterer.to_json(),
+            "unexplained": self.fallback.unexplained,
+            "guess": self.fallback.guesses.to_json(),
+            "spreads": self.spreads.to_json(),
+            "scope": self.fallback.scope.to_json(),
+            "latest": self.latest,
+            "unsettled": self._unsettled,
+            "classifier": self.classifier.to_dict(exemplars=history),
+            "casting": self.casting.to_json(),
+            **({"candidates": self.candidates.to_json()} if self.candidates else {}),
+            "limits": self.limits.to_json(),
+            "stops": self.stops.to_json(),
+        }
+
+    def to_arrays(self) -> dict[str, NDArray[Any]]:
+        """What further learning needs beside `to_json`."""
+        return self.clusterer.to_arrays()
+
+    def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+        """Take over what `to_json` and `to_arrays` wrote."""
+        self.clusterer.restore(data["clusterer"], arrays)
+        self.fallback.unexplained = bool(data["unexplained"])
+        self.fallback.guesses = Guesses.from_json(self.target, data.get("guess", {}))
+        self.spreads = Spreads.from_json(data["spreads"])
+        self.fallback.scope = Scope.from_json(data.get("scope", {}))
+        self.latest = int(data.get("latest", NOISE))
+        self._unsettled = bool(data.get("unsettled", False))
+        self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
+        self.casting.restore(data["casting"])
+        if self.candidates:
+            self.candidates.restore(data["candidates"])
+        self.limits = Limits.from_json(data.get("limits", {}))
+        self.stops = Stops.from_json(data.get("stops", {}))
+        self.functions.bound.clear()
+        self.fallback.bound.clear()

@@ -1,0 +1,338 @@
+"""Files of today are read, and what doesn't fit in one is named: types, ranges, references, shapes."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import tracemalloc
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from relgym.errors import ModelFileError
+from relgym.files import reading
+from relgym.files.reading import FileLimits
+from relgym.model.files.storage import read_model, write_model
+from relgym.model.world_model import WorldModel
+
+FILES = Path(__file__).parent / "v1"
+NAMES = sorted(path.stem for path in FILES.glob("*.relgym"))
+HISTORIES = [name for name in NAMES if name.endswith("-history")]
+
+Change = Callable[[dict[str, Any], dict[str, Any]], object]
+
+
+def changed(name: str, change: Change, path: Path) -> Path:
+    """A file whose content was changed, with the checksum that goes with that."""
+    body, stored = read_model(FILES / f"{name}.relgym")
+    arrays = None if stored is None else dict(stored)
+    change(body, arrays or {})
+    write_model(path, body, arrays)
+    return path
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_files_of_version_1_are_read_and_saved_as_version_2(name: str, tmp_path: Path) -> None:
+    model = WorldModel.load(FILES / f"{name}.relgym")
+    assert model.frozen is not name.endswith("-history")
+    assert model.seen > 100
+    model.save(tmp_path / "one", history=not model.frozen)
+    again = WorldModel.load(tmp_path / "one")
+    assert again.describe(details=True) == model.describe(details=True)
+    assert again.describe() == model.describe()  # without rules, what is printed are the details
+    again.save(tmp_path / "two", history=not model.frozen)
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+    assert b'"version":2' in (tmp_path / "one").read_bytes()
+
+
+def test_the_checksum_covers_the_history(tmp_path: Path) -> None:
+    from relgym.files.reading import read_members, write_arrays, write_members
+
+    body, stored = read_model(FILES / "mountain-car-history.relgym")
+    assert stored is not None
+    arrays = dict(stored)
+    write_model(tmp_path / "file", body, arrays)
+    members = read_members((tmp_path / "file").read_bytes(), ("model.json", "history.npz"))
+    arrays["target0.y"][0] += 1.0
+    members["history.npz"] = write_arrays(arrays)
+    (tmp_path / "file").write_bytes(write_members(members))
+    with pytest.raises(ModelFileError, match="checksum"):
+        WorldModel.load(tmp_path / "file")
+
+
+def test_limits_are_the_callers(tmp_path: Path) -> None:
+    path = FILES / "truck-history.relgym"
+    for limits, name in ((FileLimits(file=1000), "file"), (FileLimits(arrays=1000), "arrays")):
+        with pytest.raises(ModelFileError, match=rf"limits=FileLimits\({name}=\d+\)"):
+            WorldModel.load(path, limits=limits)
+    assert WorldModel.load(path, limits=FileLimits()).seen == 500
+
+
+@pytest.mark.parametrize(
+    "extra", [{1: "a"} | {"b": 2}, {"x": object()}, {"x": b"1"}, {"x": "\ud800"}, {"x": {1, 2}}]
+)
+def test_extra_that_is_no_plain_data_is_refused(extra: dict[Any, Any], tmp_path: Path) -> None:
+    model = WorldModel.load(FILES / "mountain-car.relgym")
+    with pytest.raises(ModelFileError, match="expected extra to be plain data"):
+        model.save(tmp_path / "file", extra=extra)
+    circle: dict[str, Any] = {}
+    circle["circle"] = circle
+    with pytest.raises(ModelFileError, match="nested too deep"):
+        model.save(tmp_path / "file", extra=circle)
+    assert not list(tmp_path.iterdir())
+
+
+def _target(body: dict[str, Any], k: int = 0) -> dict[str, Any]:
+    model: dict[str, Any] = body["targets"][k]["model"]
+    return model
+
+
+def _pair(body: dict[str, Any]) -> dict[str, Any]:
+    """The first pair of modes that has a clause."""
+    pairs = [pair for part in body["targets"] for pair in part["model"]["classifier"]["pairs"]]
+    found: dict[str, Any] = next(p for p in pairs if any(p["classifier"]["definition"]["clauses"]))
+    return found
+
+
+def _literal(body: dict[str, Any]) -> dict[str, Any]:
+    clauses = _pair(body)["classifier"]["definition"]["clauses"]
+    found: dict[str, Any] = next(literal for clause in clauses for literal in clause)
+    return found
+
+
+def _columns(body: dict[str, Any]) -> dict[str, Any]:
+    found: dict[str, Any] = _target(body)["classifier"]["exemplars"]["columns"]
+    return found
+
+
+def _scrambled(text: str, dtype: str, value: int) -> str:
+    numbers = np.frombuffer(base64.b64decode(text), dtype=dtype).copy()
+    numbers[0] = value
+    return base64.b64encode(numbers.tobytes()).decode()
+
+
+DAMAGES: dict[str, tuple[str, Change, str]] = {
+    "a missing field": ("truck", lambda b, a: b.pop("seen"), "missing required field `seen`"),
+    "a field too many": ("truck", lambda b, a: b.update(more=1), "unknown field `more`"),
+    "text for a number": ("truck", lambda b, a: b.update(seen="1"), r"Expected `int`, got `str` - at `\$\.seen`"),
+    "a negative count": ("truck", lambda b, a: b.update(seen=-1), "Expected `int` >= 0"),
+    "a number that is none": (
+        "truck", lambda b, a: _target(b)["clusterer"].update(largest=float("nan")), "largest"
+    ),
+    "a configuration out of range": ("truck", lambda b, a: b["config"].update(history=1), "history must be at least"),
+    "a search for ever": (
+        "truck", lambda b, a: b["config"]["clustering"].update(draws=10**9), "draws must be at most 100,000"
+    ),
+    "a noise of zero": ("truck", lambda b, a: _target(b)["clusterer"].update(sigma=0.0), "sigma"),
+    "a noise whose square overflows": (
+        "truck", lambda b, a: _target(b)["clusterer"].update(rounding=1e200), "rounding"
+    ),
+    "rules that leave a target out": (
+        "truck", lambda b, a: b.update(report={"rules": "Learned from 9 transitions."}), "expected rules of"
+    ),
+    "advice with a field too many": (
+        "truck",
+        lambda b, a: b.update(
+            report={
+                "rules": "",
+                "advice": [
+                    {"target": "x", "unexplained": 0, "left": 1, "features": [], "law": "", "remains": 1, "kind": 1}
+                ],
+            }
+        ),
+        "unknown",
+    ),
+    "laws without a tolerance": ("ball-laws", lambda b, a: b["laws"]["laws"].update(tolerance=0.0), "tolerance"),
+    "a number in the history that is no size": (
+        "truck-history", lambda b, a: a["table0.x"].__setitem__((0, 0), 1e200), "at most 1e"
+    ),
+    "an unknown type": ("truck", lambda b, a: b["schema"]["objects"][0].__setitem__(1, "cow"), "unknown type 'cow'"),
+    "a shape without a surface": (
+        "truck",
+        lambda b, a: b["schema"]["types"][0].update(shape={"kind": "prism", "vertices": [[0, 0], [1, 0], [2, 0]]}),
+        "lies on the line of its neighbours",
+    ),
+    "a target that is none": ("truck", lambda b, a: b["targets"][0]["target"].__setitem__(1, "px"), "target"),
+    "a mode twice": (
+        "truck", lambda b, a: _target(b)["clusterer"]["modes"].append(_target(b)["clusterer"]["modes"][0]), "twice"
+    ),
+    "a mode of another property": (
+        "truck", lambda b, a: _target(b)["clusterer"]["modes"][0]["roles"][0]["terms"].append(["wings", 1.0]), "wings"
+    ),
+    "a role of no type": (
+        "truck", lambda b, a: _target(b)["clusterer"]["modes"][0]["roles"][-1].update(type="cow"), "cow|target's own"
+    ),
+    "a vote for no mode": ("truck", lambda b, a: _target(b)["classifier"]["modes"].append(99), "expected some of"),
+    "a pair of modes missing": (
+        "truck", lambda b, a: _target(b)["classifier"]["pairs"].pop(), "every pair of modes once"
+    ),
+    "an unknown relation": (
+        "ball-modes", lambda b, a: _literal(b).update(relation="likes"), "there is no .*'likes'"
+    ),
+    "a variable left out": ("truck", lambda b, a: _literal(b)["args"].__setitem__(0, 9), "variables below"),
+    "an unknown context": (
+        "ball-modes", lambda b, a: _pair(b)["classifier"].update(context="far"), "Invalid enum value 'far'"
+    ),
+    "counts for other outcomes": (
+        "ball-modes", lambda b, a: _pair(b)["classifier"]["counts"].append([1.0, 0.0]), "counts: expected"
+    ),
+    "a tree in a circle": (
+        "ball-modes",
+        lambda b, a: _pair(b)["classifier"]["trees"].__setitem__(
+            0,
+            {"columns": ["vx"], "column": [0, -1], "threshold": [0.0, 0.0], "below": [1, 1], "above": [0, 1],
+             "positive": [1.0, 1.0], "negative": [0.0, 0.0]},
+        ),
+        "trees",
+    ),
+    "another vocabulary": (
+        "truck", lambda b, a: _target(b)["classifier"]["vocabulary"]["unary"].append("cow"), "vocabulary.unary"
+    ),
+    "players of other roles": ("truck", lambda b, a: _target(b)["casting"][0][1]["kinds"].clear(), "kinds"),
+    "a limit that takes part in the vote": (
+        "truck",
+        lambda b, a: _target(b)["limits"].update(high=[_target(b)["classifier"]["modes"][0], 1.0]),
+        "takes part in the vote|below the high one",
+    ),
+    "exemplars of other sizes": (
+        "truck-history", lambda b, a: _columns(b)["sizes"].update(K=10**4, K2=10**4), "bytes for the shape"
+    ),
+    "an exemplar of no object": (
+        "truck-history",
+        lambda b, a: _columns(b)["arrays"].update(target=_scrambled(_columns(b)["arrays"]["target"], "<i8", 77)),
+        "expected one of the objects",
+    ),
+    "an exemplar that isn't there": (
+        "truck-history",
+        lambda b, a: _columns(b)["arrays"].update(row=_scrambled(_columns(b)["arrays"]["row"], "<i8", 10**6)),
+        "that aren't there",
+    ),
+    "cells that share a slot": (
+        "truck-history",
+        lambda b, a: _target(b)["classifier"]["exemplars"]["cells"][0][3].append(0),
+        "every slot in one cell",
+    ),
+    "a law of nothing": (
+        "ball-laws", lambda b, a: b["laws"]["laws"]["free"][0]["components"][0].append(["wings", 1.0]), "wings"
+    ),
+    "a law of another axis": (
+        "ball-laws", lambda b, a: b["laws"]["laws"]["pair"]["axes"].append([]), "laws|axes"
+    ),
+    "a law that governs nothing": ("ball-laws", lambda b, a: b["laws"]["governed"].append("box"), "governed"),
+    "no laws": ("ball-laws", lambda b, a: b.update(laws=None), "config.frames"),
+    "more wrong than said": (
+        "ball-modes", lambda b, a: b["hindsight"]["ball.vx"]["steps"].__setitem__(0, [1, 2]), "more wrong than said"
+    ),
+    "a missing array": ("truck-history", lambda b, a: a.pop("target0.y"), "target0.y"),
+    "an array too many": ("truck-history", lambda b, a: a.update(more=np.zeros(1)), "too many: .*more"),
+    "an array of another type": (
+        "truck-history", lambda b, a: a.update({"target0.y": a["target0.y"].astype(np.int64)}), "expected float64"
+    ),
+    "an array of another shape": (
+        "truck-history", lambda b, a: a.update({"table0.x": a["table0.x"][:, 1:]}), "of shape"
+    ),
+    "a row that isn't there": (
+        "truck-history", lambda b, a: a["target0.rows"].__setitem__(0, 10**6), "expected rows of the table"
+    ),
+    "a label of no mode": ("truck-history", lambda b, a: a["target0.labels"].__setitem__(0, 99), "one of"),
+    "a body twice": (
+        "truck-history",
+        lambda b, a: np.copyto(a["table0.bodies"], 0, where=a["table0.bodies"] > 0),
+        "every body once",
+    ),
+    "an infinite value": (
+        "truck-history", lambda b, a: a["target0.y"].__setitem__(0, np.inf), "expected finite numbers"
+    ),
+    "a state of another random generator": (
+        "truck-history",
+        lambda b, a: _target(b)["clusterer"]["random"].update(bit_generator="MT19937"),
+        "bit_generator",
+    ),
+    "extra that is nested too deep": ("truck", lambda b, a: b.update(extra={"a": _deep(64)}), "at most 64 levels"),
+}  # fmt: skip
+
+
+def _deep(levels: int) -> Any:
+    found: Any = []
+    for _ in range(levels):
+        found = [found]
+    return found
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_what_does_not_fit_is_named(name: str, tmp_path: Path) -> None:
+    file, change, match = DAMAGES[name]
+    path = tmp_path / "model"
+    with pytest.raises(ModelFileError, match=match):
+        WorldModel.load(changed(file, change, path))
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "said"),
+    [
+        ("table0.x", (20_000, 3), "expected float64 of shape"),
+        ("table0.serial", (20_000,), "expected int64 of shape"),
+        ("target0.y", (20_000,), "as many as there are rows"),
+        ("target0.forgotten", (20_000, 2), "more than modes"),
+    ],
+)
+def test_arrays_that_can_not_fit_are_refused_by_their_headers(
+    name: str, shape: tuple[int, ...], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def more(body: dict[str, Any], arrays: dict[str, Any]) -> None:
+        arrays[name] = np.zeros(shape, dtype=arrays[name].dtype)
+
+    path = changed("truck-history", more, tmp_path / "model")
+    monkeypatch.setattr(reading, "_array", lambda *_: pytest.fail("room was made for an array"))
+    with pytest.raises(ModelFileError, match=said):
+        WorldModel.load(path)
+
+
+def test_a_number_of_the_next_mode_needs_no_memory(tmp_path: Path) -> None:
+    path = changed(
+        "truck-history",
+        lambda b, a: _target(b)["clusterer"].update(next_id=2**31 - 1),
+        tmp_path / "model",
+    )
+    tracemalloc.start()
+    assert WorldModel.load(path).describe(details=True)
+    assert tracemalloc.get_traced_memory()[1] < 100 << 20
+    tracemalloc.stop()
+
+
+SMALL = Path(__file__).parent.parent.parent / "fuzz" / "corpus"
+
+
+def _fields(value: Any, where: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], dict[str, Any], str]]:
+    """Every field of a body, with the names of the fields that it lies in."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield (*where, key), value, key
+            yield from _fields(inner, (*where, key))
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _fields(inner, where)
+
+
+@pytest.mark.parametrize("name", ["puck", "pay", "discs-frozen"])
+@pytest.mark.parametrize("empty", [None, [], {}], ids=["null", "list", "object"])
+def test_every_field_may_be_empty_or_is_refused(name: str, empty: Any) -> None:
+    """One of each kind; what is accepted describes and saves."""
+    body, stored = read_model(SMALL / f"{name}.relgym")
+    arrays = None if stored is None else dict(stored)
+    kinds = {where[-3:]: (inside, key) for where, inside, key in _fields(body)}
+    for where, (inside, key) in kinds.items():
+        kept, inside[key] = inside[key], copy.copy(empty)
+        try:
+            model = WorldModel._restored(copy.deepcopy(body), arrays)
+            model.describe(details=True)
+            model.to_json()
+        except ModelFileError:
+            pass
+        except Exception as error:
+            raise AssertionError(f"{'.'.join(where)} = {empty}") from error
+        finally:
+            inside[key] = kept
