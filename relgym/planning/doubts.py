@@ -10,7 +10,7 @@ import numpy as np
 from relgym.envs.tasks import RewardFunctions, TaskOutcome
 from relgym.numeric.rival_boxes import RivalBoxes
 from relgym.scene.objects import TASK, Float2D, SceneLayout
-from relgym.wrappers.sb3.reward_models import LearnedRewardModel
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel
 
 __all__ = ["DoubtedTask"]
 

@@ -8,7 +8,7 @@ import pytest
 from relgym.planning.doubts import DoubtedTask
 from relgym.scene.objects import Float1D, Float2D, ObjectType, Target, Transition
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.sb3.reward_models import LearnedRewardModel
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel
 
 CAR = ObjectType("car", ("x", "v"))
 SCHEMA = SceneSchema((CAR,), (("car", "car"),), targets=(Target("car", "x"), Target("car", "v")))
