@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from relgym.envs.tasks import RewardFunctions, TaskOutcome
-from relgym.numeric.rival_boxes import RivalBoxes
+from relgym.numeric.version_space import VersionSpace
 from relgym.scene.objects import TASK, Float2D, SceneLayout
 from relgym.wrappers.dyna.reward_models import LearnedRewardModel
 
@@ -28,7 +28,7 @@ class DoubtedTask(RewardFunctions):
     bonus, which lies somewhere between what was seen to pay and what wasn't, or far outside of all that a rule was ever
     right of. And of a bonus that was paid once or twice the model says nothing yet: a mode takes more examples.
 
-    Here each pair of modes of reward and end is compared with the rules (`RivalBoxes`) that hold of all remembered
+    Here each pair of modes of reward and end is compared with the rules (`VersionSpace`) that hold of all remembered
     steps of which the pair was right and of none of which its claim is wrong. Where only a share of them holds the step
     is worth that share of what the model says; the rest counts as if the worst of all known modes held. And what was
     paid beyond the model's word is expected again by the share of the rules that tell these steps from all others,
@@ -55,12 +55,12 @@ class DoubtedTask(RewardFunctions):
         self._state: tuple[Any, ...] = ()
         self._seen = 0
         self._groups: dict[tuple[int, int], _Group] = {}
-        self._beyond: tuple[RivalBoxes, float] | None = None
+        self._beyond: tuple[VersionSpace, float] | None = None
 
     def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         """Expected rewards, and ends as the model says; NaN where it knows nothing."""
         vectors = self.model.joined(layout, before, actions, after)
-        rewards, ended, modes = self.model.judge(vectors)
+        rewards, ended, modes = self.model.outcomes(vectors)
         self._review()
         known = np.isfinite(rewards)
         worth = rewards.copy()
@@ -93,7 +93,7 @@ class DoubtedTask(RewardFunctions):
         if state == self._state:
             return
         self._state = state
-        rewards, ended, pairs = own.judge(lessons)
+        rewards, ended, pairs = own.outcomes(lessons)
         right = (np.abs(paid - rewards) <= _RIGHT) & (ended == over)
         claims = own.claims(lessons, over)
         # Where nothing is known: beyond the most that any mode would have said.
@@ -107,7 +107,7 @@ class DoubtedTask(RewardFunctions):
             false = (np.abs(claims[reward] - paid) > _RIGHT) | (over != ends_so)
             if not false.any():
                 continue
-            rules = RivalBoxes(features[mine & right], features[false], rng=self._rng)
+            rules = VersionSpace(features[mine & right], features[false], rng=self._rng)
             if rules.found:
                 worst = float(paid[mine & ~right].min(initial=np.inf))
                 self._groups[reward, end] = _Group(rules, worst)
@@ -115,7 +115,7 @@ class DoubtedTask(RewardFunctions):
         if (most := float(surplus.max(initial=0.0))) > _RIGHT:
             # What is paid in several places for several reasons isn't told apart from the rest by one rule.
             more = surplus >= 0.5 * most
-            rules = RivalBoxes(features[more], features[surplus <= _RIGHT], rng=self._rng)
+            rules = VersionSpace(features[more], features[surplus <= _RIGHT], rng=self._rng)
             if rules.found:
                 self._beyond = rules, float(surplus[more].mean())
 
@@ -124,5 +124,5 @@ class DoubtedTask(RewardFunctions):
 class _Group:
     """A pair of modes: rules that tell where it holds, and the least that was paid where it was wrong."""
 
-    rules: RivalBoxes
+    rules: VersionSpace
     worst: float

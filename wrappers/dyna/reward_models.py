@@ -292,18 +292,18 @@ class LearnedRewardModel(RewardFunctions):
 
     def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         """Rewards and ends as modes predict them; NaN where none does."""
-        rewards, ended, _ = self.judge(self.joined(layout, before, actions, after))
+        rewards, ended, _ = self.outcomes(self.joined(layout, before, actions, after))
         return TaskOutcome(rewards, ended, np.zeros(len(before), dtype=bool))
 
     def joined(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float2D:
-        """State vectors of its own model, of n steps: what `judge` takes."""
+        """State vectors of its own model, of n steps: what `outcomes` takes."""
         small = self.model.schema.layout()
         vectors = np.zeros((len(before), small.width))
         for k, name in enumerate(small.names):
             vectors[:, small.slice(k)] = self._part(name, layout, before, actions, after)
         return vectors
 
-    def judge(self, vectors: Float2D) -> tuple[Float1D, NDArray[np.bool_], NDArray[np.int64]]:
+    def outcomes(self, vectors: Float2D) -> tuple[Float1D, NDArray[np.bool_], NDArray[np.int64]]:
         """Rewards, ends, and by which modes of reward and of termination; of n steps.
 
         Parameters
@@ -328,7 +328,7 @@ class LearnedRewardModel(RewardFunctions):
         Parameters
         ----------
         vectors
-            As for `judge`.
+            As for `outcomes`.
         ended
             Whether the step ends the episode, shape ``(n,)``.
 

@@ -8,13 +8,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RivalBoxes"]
+__all__ = ["VersionSpace"]
 
 _HALF: Final = 0.5
 """Prior odds of a bound, and of a rule with one column more."""
 
 
-class RivalBoxes:
+class VersionSpace:
     """A sample of the version space of boxes: intervals of a few columns that hold of some examples and of no others.
 
     A threshold that is learned lies somewhere between the nearest examples on either side, and which properties it is
@@ -45,10 +45,10 @@ class RivalBoxes:
     >>> import numpy as np
     >>> held = np.array([[0.0, 1.0], [0.0, -1.0]])
     >>> not_held = np.array([[0.0, 3.0], [2.0, 0.0], [0.0, -3.0]])
-    >>> rivals = RivalBoxes(held, not_held, rng=np.random.default_rng(0))
-    >>> rivals.share(np.array([[0.0, 0.5], [0.0, 3.0], [2.0, 0.0]])).tolist()
+    >>> boxes = VersionSpace(held, not_held, rng=np.random.default_rng(0))
+    >>> boxes.share(np.array([[0.0, 0.5], [0.0, 3.0], [2.0, 0.0]])).tolist()
     [1.0, 0.0, 0.0]
-    >>> bool(0.0 < rivals.share(np.array([[0.0, 2.0]]))[0] < 1.0)
+    >>> bool(0.0 < boxes.share(np.array([[0.0, 2.0]]))[0] < 1.0)
     True
 
     Notes
