@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from relgym.planning.planner import Planner
     from relgym.planning.rollouts import Objective, Plan
     from relgym.planning.sequences import CrossEntropy, PathIntegral, RandomShooting, Search
-    from relgym.planning.simulators import EnvSimulator, ModelSimulator, Simulator, Steps
+    from relgym.planning.simulators import Correctable, EnvSimulator, ModelSimulator, Simulator, Steps
     from relgym.planning.tree import TreeSearch
 
 _HOMES = {
     "ActionCoder": "relgym.planning.actions",
+    "Correctable": "relgym.planning.simulators",
     "Coverage": "relgym.planning.exploration",
     "CrossEntropy": "relgym.planning.sequences",
     "DoubtedTask": "relgym.planning.doubts",
@@ -46,6 +47,7 @@ _HOMES = {
 
 __all__ = [
     "ActionCoder",
+    "Correctable",
     "Coverage",
     "CrossEntropy",
     "DoubtedTask",

@@ -20,7 +20,7 @@ from relgym.model.world_model import WorldModel
 from relgym.planning.doubts import DoubtedTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
-from relgym.planning.review import learned_again, right
+from relgym.planning.review import learned_again, length, mixed, right
 from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
 from relgym.planning.simulators import ModelSimulator, Simulator
@@ -161,6 +161,8 @@ class PlanningAgent:
         self._options = {"commit": commit, "tolerance": tolerance, "seed": seed}
         self._rng = np.random.default_rng([seed, 5])
         self._history: deque[Experience] = deque(maxlen=_REMEMBERED)
+        self._episodes: deque[int] = deque(maxlen=_REMEMBERED)
+        self._begun = 0
         self._wrong: deque[bool] = deque(maxlen=_LATEST)
         self._task_wrong: deque[bool] = deque(maxlen=_LATEST)
         self._at_random = True
@@ -258,6 +260,7 @@ class PlanningAgent:
             if self._observation is None:
                 self._observation, _ = self.env.reset(seed=int(self._rng.integers(2**31)))
                 self._thread, self._held = PlannerState(), (0, None)
+                self._begun += 1
                 self._hold = int(self._rng.choice(_HOLDS, p=_SHARES))
                 self._at_random = self.steps < self.random_steps or self._rng.random() < self.doubt
             action = self._choose(self._observation)
@@ -326,6 +329,7 @@ class PlanningAgent:
         self.steps += 1
         self._size.add(real.reward)
         self._history.append(real)
+        self._episodes.append(self._begun)
         after = real.transition.after
         if self.coverage is None:
             kinds = changing(self.model)
@@ -358,8 +362,9 @@ class PlanningAgent:
     def _review(self) -> None:
         """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often.
 
-        What they are compared by is what they make of all that was seen. A new model has learned from that, but laws
-        hold exactly or not at all: of few steps those that fit more of them hold more often elsewhere, too.
+        What they are compared by is how many values it takes to state the model, and what it gets wrong of all that
+        was seen (`length`). New models have learned from that, and so many numbers fit few steps exactly; but laws are
+        short.
         """
         self._next_review = int(self.steps * _GROWTH) + 1
         if isinstance(self.model, WorldModel) and not self.model.frozen and any(self._wrong):
@@ -370,20 +375,22 @@ class PlanningAgent:
     def _review_model(self) -> None:
         # What the model at work has learned from: one that took over in a changed world knows nothing of the old one.
         seen = [real.transition for real in self._history][-self.model.seen :]
-        best, least = None, int((~right(self.model, seen)).sum())
+        episodes = np.array(self._episodes)[-len(seen) :]
+
+        def cost(model: WorldModel) -> float:
+            return float((~right(model, seen)).sum()) + length(model)
+
+        best, least = None, cost(self.model)
         for _ in range(_ORDERS):
-            if not least:
-                break
-            fresh = learned_again(self.model, seen, rng=self._rng)
-            wrong = int((~right(fresh, seen)).sum())
-            if fresh.targets and wrong < least:
-                best, least = fresh, wrong
+            fresh = learned_again(self.model, seen, rng=self._rng, episodes=episodes)
+            if fresh.targets and (found := cost(fresh)) < least:
+                best, least = fresh, found
         if best is not None:
             self.trainer.adopt(best)
             # It knows what it has learned from, and more than one does that hasn't learned the latest of it: what it
             # makes of the next steps lies in between.
             count = min(_LATEST, len(seen) // 2) // 2
-            tested = learned_again(self.model, seen[:-count], rng=self._rng)
+            tested = learned_again(self.model, seen[:-count], rng=self._rng, episodes=episodes[:-count])
             parts = right(best, seen[-2 * count : -count]), right(tested, seen[-count:])
             self._wrong = deque((~np.concatenate(parts)).tolist(), maxlen=_LATEST)
 
@@ -395,7 +402,7 @@ class PlanningAgent:
             if not least:
                 break
             fresh = own.untaught()
-            for k in self._rng.permutation(len(seen)).tolist():
+            for k in mixed(np.array(self._episodes), self._rng):
                 fresh.learn_step(seen[k].transition, seen[k].reward, terminated=seen[k].terminated)
             fresh.model.finish()
             wrong = self._missed(fresh, seen)

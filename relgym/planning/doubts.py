@@ -17,6 +17,9 @@ __all__ = ["DoubtedTask"]
 _RIGHT: Final = 1e-6
 """How far a right verdict may be off."""
 
+_LIKELY: Final = 0.5
+"""What always ended the episode does so where at least this share of the rules holds."""
+
 _REVIEW: Final = 10
 """Real steps after which the rules are drawn again at the latest, if no other mode was found and no episode ended."""
 
@@ -55,7 +58,7 @@ class DoubtedTask(RewardFunctions):
         self._state: tuple[Any, ...] = ()
         self._seen = 0
         self._groups: dict[tuple[int, int], _Group] = {}
-        self._beyond: tuple[VersionSpace, float] | None = None
+        self._beyond: _Beyond | None = None
 
     def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         """Expected rewards, and ends as the model says; NaN where it knows nothing."""
@@ -76,8 +79,11 @@ class DoubtedTask(RewardFunctions):
             worst = np.minimum.reduce([group.worst + np.zeros(len(rows)), *others.values()])
             worth[rows] = share * rewards[rows] + (1.0 - share) * np.minimum(worst, rewards[rows])
         if self._beyond is not None:
-            rules, surplus = self._beyond
-            worth += surplus * rules.share(vectors)
+            share = self._beyond.rules.share(vectors)
+            if self._beyond.ends:  # or it would be paid in one plan again and again
+                ended = ended | (share >= _LIKELY)
+                share = np.where(ended, share, 0.0)
+            worth += self._beyond.surplus * share
         return TaskOutcome(worth, ended, np.zeros(len(before), dtype=bool))
 
     def _review(self) -> None:
@@ -117,7 +123,7 @@ class DoubtedTask(RewardFunctions):
             more = surplus >= 0.5 * most
             rules = VersionSpace(features[more], features[surplus <= _RIGHT], rng=self._rng)
             if rules.found:
-                self._beyond = rules, float(surplus[more].mean())
+                self._beyond = _Beyond(rules, float(surplus[more].mean()), bool(over[more].all()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,3 +132,12 @@ class _Group:
 
     rules: VersionSpace
     worst: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Beyond:
+    """What was paid beyond the model's word: rules that tell where, how much, and whether it always ended episodes."""
+
+    rules: VersionSpace
+    surplus: float
+    ends: bool

@@ -15,7 +15,7 @@ from relgym.errors import ConfigError
 from relgym.planning.actions import ActionCoder
 from relgym.planning.rollouts import Objective, Plan
 from relgym.planning.sequences import Search
-from relgym.planning.simulators import Simulator
+from relgym.planning.simulators import Correctable, Simulator
 from relgym.planning.tree import TreeSearch
 from relgym.scene.objects import Float1D
 
@@ -40,6 +40,11 @@ class PlannerState:
         Taken in this episode.
     searches, surprises
         How often the planner has searched, and how often because the world did something else than predicted.
+    error
+        By how much the state was off the simulator's prediction at the last surprise, shape ``(width,)``; None before
+        the first one, and where the simulator was right after all.
+    last
+        State and action of the last decision.
     """
 
     plan: Plan | None = None
@@ -47,6 +52,8 @@ class PlannerState:
     decisions: int = 0
     searches: int = 0
     surprises: int = 0
+    error: Float1D | None = None
+    last: tuple[Float1D, Any] | None = None
 
 
 States: TypeAlias = tuple[Any, ...]
@@ -75,7 +82,13 @@ class Planner:
     seconds
         Time for one search; None: all its rounds.
     safe
-        Never to take an action whose outcome the simulator doesn't know while it knows that of another one.
+        Never to take an action whose outcome the simulator doesn't know while it knows that of another one; nor to
+        guess.
+    adapts
+        Whether to correct a `Correctable` simulator: much of what a law misses, a friction or a wind, stays the same
+        for an episode, so by as much as the last prediction was off the next ones are taken to be off as well (offset-
+        free predictive control, Pannocchia and Rawlings 2003). And where it knows the outcome of no action, to plan
+        with its guesses.
     source
         Function from an observation to the scene (or observation of the model's env) that it shows; for agents whose
         wrappers hide part of it: ``lambda _: env.get_wrapper_attr("scene")``. Default: the observation itself.
@@ -107,6 +120,7 @@ class Planner:
     limit: int | None = None
     seconds: float | None = None
     safe: bool = False
+    adapts: bool = True
     source: Callable[[Any], Any] | None = None
     seed: int = 0
 
@@ -168,10 +182,13 @@ class Planner:
         """Choose an action for one observation, and note in `thread` how far the plan has come."""
         shown = observation if self.source is None else self.source(observation)
         now = self.simulator.state(shown)
+        surprises = thread.surprises
         if (plan := thread.plan) is None or self._due(plan, thread, now):
             warm = None if plan is None else plan.latents[thread.taken :]
             left = None if self.limit is None else max(1, self.limit - thread.decisions)
-            plan = self.plan(now, warm=warm, left=left)
+            if plan is not None and (thread.surprises > surprises or thread.taken >= len(plan.states)):
+                thread.error = self._off(thread, now)
+            plan = self.plan(now, warm=warm, left=left, error=thread.error)
             thread.plan, thread.taken = plan, 0
             thread.searches += 1
         action = plan.actions[thread.taken]
@@ -179,10 +196,30 @@ class Planner:
             action = self._known(now, action)
         thread.taken += 1
         thread.decisions += 1
+        thread.last = now, action
         return action
 
-    def plan(self, now: Float1D, *, warm: NDArray[np.float64] | None = None, left: int | None = None) -> Plan:
-        """Search from a state vector; `warm`: latents to begin with; `left`: decisions that the episode still has."""
+    def plan(
+        self,
+        now: Float1D,
+        *,
+        warm: NDArray[np.float64] | None = None,
+        left: int | None = None,
+        error: Float1D | None = None,
+    ) -> Plan:
+        """Search from a state vector.
+
+        Parameters
+        ----------
+        now
+            The state, shape ``(width,)``.
+        warm
+            Latents to begin with.
+        left
+            Decisions that the episode still has.
+        error
+            What is added to the states that a `Correctable` simulator predicts.
+        """
         self.simulator.prepare()
         given: Any = self.search  # of any class
         search: Search = given
@@ -190,9 +227,32 @@ class Planner:
             search = cast(Search, replace(cast(Any, given), horizon=left))
             warm = None if warm is None else warm[:left]
         deadline = None if self.seconds is None else perf_counter() + self.seconds
-        return search.plan(
-            self.simulator, self.coder, now, self.objective, warm=warm, rng=self._rng, deadline=deadline
-        )
+
+        def searched(simulator: Simulator) -> Plan:
+            return search.plan(
+                simulator, self.coder, now, self.objective, warm=warm, rng=self._rng, deadline=deadline
+            )
+
+        own = self.simulator
+        if not (self.adapts and isinstance(own, Correctable)):
+            return searched(own)
+        found = searched(own if error is None else own.corrected(error))
+        if len(found.rewards) or self.safe or self.objective.curiosity is not None:
+            return found
+        return searched(own.corrected(error, guesses=True))
+
+    def _off(self, thread: PlannerState, now: Float1D) -> Float1D | None:
+        """By how much the simulator was off in the last decision; None where it wasn't."""
+        if thread.last is None or not (self.adapts and isinstance(self.simulator, Correctable)):
+            return None
+        before, action = thread.last
+        self.simulator.prepare()
+        guess = self.simulator.corrected(None, guesses=True).step(before[None], np.asarray(action)[None])
+        if not guess.known[0] or guess.states[0].shape != now.shape:
+            return None
+        off: Float1D = now - guess.states[0]
+        off[np.abs(off) <= self.tolerance * np.maximum(1.0, np.abs(now))] = 0.0
+        return off if off.any() else None
 
     def _known(self, now: Float1D, otherwise: Any) -> Any:
         """The best of some random actions whose outcomes are known; if there is none, the one that was to be taken."""

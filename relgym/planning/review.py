@@ -1,9 +1,10 @@
-"""Learning again, in random order, from what was met in the order of life."""
+"""Learning again, in other orders, from what was met in the order of life."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,11 @@ from numpy.typing import NDArray
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout, Transition
 
-__all__ = ["learned_again", "right"]
+__all__ = ["learned_again", "length", "mixed", "right"]
+
+_LITERALS: Final = 5
+"""So many literals of clauses take as many bits as a number: some four each (which relation, of which objects), and a
+number that is right to the tolerance within the range of its target some twenty."""
 
 
 def right(
@@ -51,27 +56,69 @@ def right(
     return found
 
 
+def length(model: WorldModel) -> float:
+    """How long a model is, in numbers: what it takes to state its functions, and when each of them holds.
+
+    A value that a model gets wrong has to be stated as well, so a number that is part of it has to save more than one
+    of them: the sum of both is its minimum description length (Rissanen 1978). Weights that are equal within a mode are
+    stated once. It tells laws from functions that fit each episode by numbers of its own.
+    """
+    found = 0.0
+    for target in model.targets:
+        known = model.property_model(target.type, target.property)
+        for mode in known.modes:
+            weights = {round(weight, 9) for role in mode.roles for _, weight in role.terms}
+            found += len(weights) + (mode.intercept != 0.0)
+        for pair in known.classifier.classifiers:
+            found += sum(len(clause) for clause in pair.definition.clauses) / _LITERALS
+    return found
+
+
+def mixed(episodes: NDArray[np.intp], rng: np.random.Generator) -> list[int]:
+    """A random order in which the steps of all episodes take turns.
+
+    Parameters
+    ----------
+    episodes
+        To which episode each of n steps belongs, shape ``(n,)``.
+    rng
+        Draws the order.
+    """
+    drawn = rng.permutation(len(episodes))
+    rounds = np.zeros(len(drawn), dtype=np.intp)
+    for episode in np.unique(episodes):
+        own = episodes[drawn] == episode
+        rounds[own] = np.arange(own.sum())
+    return [int(k) for k in drawn[np.argsort(rounds, kind="stable")]]
+
+
 def learned_again(
-    model: WorldModel, transitions: Sequence[Transition], *, rng: np.random.Generator
+    model: WorldModel,
+    transitions: Sequence[Transition],
+    *,
+    rng: np.random.Generator,
+    episodes: NDArray[np.intp] | None = None,
 ) -> WorldModel:
-    """A new model of the same world that has met the same transitions in random order.
+    """A new model of the same world that has met the same transitions in random order, one of each episode in turn.
 
     Throughout an episode much stays as it is: which objects there are, where they stand, what they are made of. Laws
-    that are found while only a few episodes were seen have that in them as if it were a constant. In random order the
-    first examples already are of many episodes: of 150 random steps of TruckPush models get 71 % to 100 % of fresh
-    steps right when learned in random order, and 23 % to 100 % in the order of life (three seeds, two ways to act).
+    that are found while only a few episodes were seen have that in them as if it were a constant. In turns the first
+    examples already are of all episodes: of 200 steps of TruckPush five models of five got all of them right, of
+    those in any random order two, in the order of life none (of 100 steps none; one seed).
 
     Parameters
     ----------
     model
         Gives schema, configuration and targets.
     transitions
-        What to learn from.
+        What to learn from, n of them.
     rng
         Draws the order.
+    episodes
+        To which episode each of them belongs, shape ``(n,)``; default: each is its own.
     """
     fresh = model.untaught()
-    for k in rng.permutation(len(transitions)).tolist():
+    for k in mixed(np.arange(len(transitions)) if episodes is None else episodes, rng):
         fresh.learn_one(transitions[k])
     fresh.finish()
     return fresh

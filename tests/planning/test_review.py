@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from relgym import WorldModel
-from relgym.planning.review import learned_again, right
+from relgym.planning.review import learned_again, length, mixed, right
 from relgym.scene.objects import Transition
 from relgym.wrappers.dyna.recorder import TransitionRecorder
 
@@ -44,3 +44,24 @@ def test_each_transition_is_told_from_the_others() -> None:
 def test_nothing_is_right_of_nothing() -> None:
     env, _ = cart_steps(1)
     assert right(WorldModel(env.schema), []).tolist() == []
+
+
+def test_the_steps_of_all_episodes_take_turns(rng: np.random.Generator) -> None:
+    episodes = np.array([0, 0, 0, 0, 1, 1, 2, 2, 2])
+    order = mixed(episodes, rng)
+    assert sorted(order) == list(range(9))
+    turns = [sorted(episodes[order[begin:end]].tolist()) for begin, end in ((0, 3), (3, 6), (6, 8), (8, 9))]
+    assert turns == [[0, 1, 2], [0, 1, 2], [0, 2], [0]]
+    assert mixed(episodes[:0], rng) == []
+
+
+def test_what_a_model_states_makes_its_length() -> None:
+    env, seen = cart_steps(60)
+    assert length(WorldModel(env.schema)) == 0.0
+    model = learned_again(WorldModel(env.schema), seen, rng=np.random.default_rng(0))
+    numbers = sum(
+        len({round(weight, 9) for role in mode.roles for _, weight in role.terms}) + (mode.intercept != 0.0)
+        for target in model.targets
+        for mode in model.modes(target.type, target.property)
+    )
+    assert numbers <= length(model) < numbers + 10
