@@ -20,7 +20,7 @@ from relgym.model.world_model import WorldModel
 from relgym.planning.doubts import DoubtedTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
-from relgym.planning.review import learned_again, length, mixed, right
+from relgym.planning.review import learned_again, length, missed, mixed, right
 from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
 from relgym.planning.simulators import ModelSimulator, Simulator
@@ -362,9 +362,9 @@ class PlanningAgent:
     def _review(self) -> None:
         """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often.
 
-        What they are compared by is how many values it takes to state the model, and what it gets wrong of all that
-        was seen (`length`). New models have learned from that, and so many numbers fit few steps exactly; but laws are
-        short.
+        What they are compared by is how many values it takes to state the model, and what it misses of all that was
+        seen (`length`, `missed`). New models have learned from that, and many numbers fit a few episodes exactly; but
+        laws are short.
         """
         self._next_review = int(self.steps * _GROWTH) + 1
         if isinstance(self.model, WorldModel) and not self.model.frozen and any(self._wrong):
@@ -378,7 +378,7 @@ class PlanningAgent:
         episodes = np.array(self._episodes)[-len(seen) :]
 
         def cost(model: WorldModel) -> float:
-            return float((~right(model, seen)).sum()) + length(model)
+            return missed(model, seen, episodes) + length(model)
 
         best, least = None, cost(self.model)
         for _ in range(_ORDERS):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
 from relgym.planning.actions import ActionCoder
-from relgym.planning.rollouts import Objective, Plan
+from relgym.planning.rollouts import Objective, Plan, roll_out
 from relgym.planning.sequences import Search
 from relgym.planning.simulators import Correctable, Simulator
 from relgym.planning.tree import TreeSearch
@@ -45,6 +45,8 @@ class PlannerState:
         the first one, and where the simulator was right after all.
     last
         State and action of the last decision.
+    due
+        Decisions of the plan after which there is another search.
     """
 
     plan: Plan | None = None
@@ -54,6 +56,7 @@ class PlannerState:
     surprises: int = 0
     error: Float1D | None = None
     last: tuple[Float1D, Any] | None = None
+    due: int = 0
 
 
 States: TypeAlias = tuple[Any, ...]
@@ -73,8 +76,9 @@ class Planner:
     objective
         What for; default: the sum of rewards.
     commit
-        Decisions of a plan that are taken before the next search; default: half the search's horizon, and all of a plan
-        that ends the episode. A surprise is followed by a search at once.
+        Decisions of a plan that are taken before the next search; default: half the search's horizon. Of a plan that
+        ends the episode always half of what is left: a search from nearer by hits a narrow goal more often, and the
+        plan goes on where that finds nothing better. A surprise is followed by a search at once.
     tolerance
         How far a property may be off its prediction without a surprise, relative to its size (absolute below 1).
     limit
@@ -182,15 +186,9 @@ class Planner:
         """Choose an action for one observation, and note in `thread` how far the plan has come."""
         shown = observation if self.source is None else self.source(observation)
         now = self.simulator.state(shown)
-        surprises = thread.surprises
-        if (plan := thread.plan) is None or self._due(plan, thread, now):
-            warm = None if plan is None else plan.latents[thread.taken :]
-            left = None if self.limit is None else max(1, self.limit - thread.decisions)
-            if plan is not None and (thread.surprises > surprises or thread.taken >= len(plan.states)):
-                thread.error = self._off(thread, now)
-            plan = self.plan(now, warm=warm, left=left, error=thread.error)
-            thread.plan, thread.taken = plan, 0
-            thread.searches += 1
+        plan = self._kept(thread, now)
+        if plan is None or thread.taken >= thread.due:
+            plan = self._looked_again(plan, thread, now)
         action = plan.actions[thread.taken]
         if self.safe and thread.taken >= len(plan.rewards):
             action = self._known(now, action)
@@ -233,13 +231,11 @@ class Planner:
                 simulator, self.coder, now, self.objective, warm=warm, rng=self._rng, deadline=deadline
             )
 
-        own = self.simulator
-        if not (self.adapts and isinstance(own, Correctable)):
-            return searched(own)
-        found = searched(own if error is None else own.corrected(error))
-        if len(found.rewards) or self.safe or self.objective.curiosity is not None:
+        found = searched(self._advised(error))
+        guesses = self.adapts and not self.safe and self.objective.curiosity is None
+        if len(found.rewards) or not guesses or not isinstance(self.simulator, Correctable):
             return found
-        return searched(own.corrected(error, guesses=True))
+        return searched(self._advised(error, guesses=True))
 
     def _off(self, thread: PlannerState, now: Float1D) -> Float1D | None:
         """By how much the simulator was off in the last decision; None where it wasn't."""
@@ -264,21 +260,45 @@ class Planner:
             return otherwise
         return actions[int(np.where(stepped.known, stepped.rewards, -np.inf).argmax())]
 
-    def _due(self, plan: Plan, thread: PlannerState, now: Float1D) -> bool:
-        """Whether to search: the plan is used up, or the world did something else."""
-        taken = thread.taken
-        if taken >= len(plan.states):  # its outcome wasn't known
-            return True
-        expected = plan.states[taken]
-        off = np.abs(now - expected) > self.tolerance * np.maximum(1.0, np.abs(expected))
-        if now.shape != expected.shape or bool(off.any()):
+    def _kept(self, thread: PlannerState, now: Float1D) -> Plan | None:
+        """The plan if it can go on: it isn't used up, and the world did what it said."""
+        plan, taken = thread.plan, thread.taken
+        if plan is None:
+            return None
+        if taken < len(plan.states):
+            expected = plan.states[taken]
+            off = np.abs(now - expected) > self.tolerance * np.maximum(1.0, np.abs(expected))
+            if now.shape == expected.shape and not off.any():
+                return plan if taken < len(plan.actions) else None
             thread.surprises += 1
-            return True
-        if taken >= len(plan.actions):
-            return True
-        if plan.terminates:
-            return False
-        return taken >= (self.commit or max(1, self.search.horizon // 2))
+        thread.error = self._off(thread, now)
+        return None
+
+    def _looked_again(self, kept: Plan | None, thread: PlannerState, now: Float1D) -> Plan:
+        """Search; what is found takes the place of a plan that can go on if it is better."""
+        warm = None if thread.plan is None else thread.plan.latents[thread.taken :]
+        left = None if self.limit is None else max(1, self.limit - thread.decisions)
+        found = self.plan(now, warm=warm, left=left, error=thread.error)
+        thread.searches += 1
+        # Of plans that don't end the episode one that begins now looks further ahead.
+        if kept is not None and kept.terminates:
+            actions = kept.actions[None, thread.taken :]
+            rest = roll_out(self._advised(thread.error), now, actions, self.objective)
+            if rest.worth[0] >= found.worth:
+                thread.due += max(1, (len(kept) - thread.due) // 2)
+                return kept
+        thread.plan, thread.taken = found, 0
+        thread.due = self.commit or max(1, self.search.horizon // 2)
+        if found.terminates:
+            thread.due = max(1, len(found) // 2)
+        return found
+
+    def _advised(self, error: Float1D | None, *, guesses: bool = False) -> Simulator:
+        """The simulator, corrected if it can be."""
+        own = self.simulator
+        if (error is None and not guesses) or not isinstance(own, Correctable):
+            return own
+        return own.corrected(error, guesses=guesses)
 
     def _batch(self, observation: Any) -> int | None:
         """How many observations there are; None: one, without a leading axis."""

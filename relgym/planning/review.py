@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout, Transition
 
-__all__ = ["learned_again", "length", "mixed", "right"]
+__all__ = ["learned_again", "length", "missed", "mixed", "right"]
 
 _LITERALS: Final = 5
 """So many literals of clauses take as many bits as a number: some four each (which relation, of which objects), and a
@@ -37,30 +37,72 @@ def right(
     -------
     Shape ``(n,)``.
     """
-    found = np.zeros(len(transitions), dtype=np.bool_)
+    claimed, off = _off(model, transitions, tolerance)
+    return claimed & np.array([not len(rest) for rest in off], dtype=np.bool_)
+
+
+def missed(
+    model: WorldModel,
+    transitions: Sequence[Transition],
+    episodes: NDArray[np.intp],
+    *,
+    tolerance: float = 1e-6,
+) -> int:
+    """How many values it takes to state what a model misses of each episode.
+
+    A law that is off by the same in all of an episode, since it has a friction wrong, misses one value, not one for
+    each step: so it is corrected where plans are made (`Planner`), and so little evidence the episode is for one
+    that has a number for each episode instead.
+
+    Parameters
+    ----------
+    model, transitions, tolerance
+        As for `right`; where the model abstains, what it would have said counts.
+    episodes
+        To which episode each transition belongs, shape ``(n,)``.
+    """
+    _, off = _off(model, transitions, tolerance)
+    return len({(int(episode), rest) for episode, rest in zip(episodes, off, strict=True) if rest})
+
+
+def _off(
+    model: WorldModel, transitions: Sequence[Transition], tolerance: float
+) -> tuple[NDArray[np.bool_], list[bytes]]:
+    """Which of n transitions a model claims to predict, and by how much it is off, empty where it is right."""
+    claimed = np.zeros(len(transitions), dtype=np.bool_)
+    found = [b""] * len(transitions)
     order = sorted(range(len(transitions)), key=lambda k: _layouts(transitions[k])[0].names)
     for _, group in groupby(order, key=lambda k: _layouts(transitions[k])):
         rows = list(group)
         before, after = _layouts(transitions[rows[0]])
         told = model.predict_batch(before, np.stack([transitions[k].before.vector for k in rows]))
         seen = np.stack([transitions[k].after.vector for k in rows])
-        good = told.ok.copy()
-        for target in model.targets:
-            for name in (before.names[k] for k in before.of_type(target.type)):
-                if name not in after.names:
-                    continue
-                said = told.vectors[:, before.column(before.index(name), target.property)]
-                real = seen[:, after.column(after.index(name), target.property)]
-                good &= np.abs(said - real) <= tolerance * np.maximum(1.0, np.abs(real))
-        found[rows] = good
-    return found
+        parts = [
+            (
+                before.column(before.index(name), target.property),
+                after.column(after.index(name), target.property),
+            )
+            for target in model.targets
+            for name in (before.names[k] for k in before.of_type(target.type))
+            if name in after.names
+        ]
+        real = seen[:, [column for _, column in parts]]
+        off = real - told.vectors[:, [column for column, _ in parts]]
+        size = np.maximum(1.0, np.abs(real))
+        # A hundred tolerances apart errors aren't the same one, rounded.
+        step = 100.0 * tolerance * size.max(axis=0, initial=1.0)
+        off = np.where(np.abs(off) <= tolerance * size, 0.0, np.round(off / step) + np.copysign(0.5, off))
+        claimed[rows] = told.ok
+        for k, rest in zip(rows, off, strict=True):
+            found[k] = rest.tobytes() if rest.any() else b""
+    return claimed, found
 
 
 def length(model: WorldModel) -> float:
     """How long a model is, in numbers: what it takes to state its functions, and when each of them holds.
 
-    A value that a model gets wrong has to be stated as well, so a number that is part of it has to save more than one
-    of them: the sum of both is its minimum description length (Rissanen 1978). Weights that are equal within a mode are
+    What a model misses has to be stated as well (`missed`), so a number that is part of it has to save more than one
+    value: the sum of both is its minimum description length (Rissanen 1978). Weights that are equal within a mode are
     stated once. It tells laws from functions that fit each episode by numbers of its own.
     """
     found = 0.0

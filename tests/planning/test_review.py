@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from relgym import WorldModel
-from relgym.planning.review import learned_again, length, mixed, right
+from relgym.planning.review import learned_again, length, missed, mixed, right
 from relgym.scene.objects import Transition
 from relgym.wrappers.dyna.recorder import TransitionRecorder
 
@@ -65,3 +65,18 @@ def test_what_a_model_states_makes_its_length() -> None:
         for mode in model.modes(target.type, target.property)
     )
     assert numbers <= length(model) < numbers + 10
+
+
+def test_what_stays_the_same_in_an_episode_is_missed_once() -> None:
+    env, seen = cart_steps(60)
+    model = learned_again(WorldModel(env.schema), seen, rng=np.random.default_rng(0))
+    good = [seen[k] for k in np.flatnonzero(right(model, seen))[:6]]
+
+    def slower(told: Transition, by: float) -> Transition:
+        return replace(told, after=told.after.replace({("truck", "vx"): told.after["truck"]["vx"] - by}))
+
+    episodes = np.array([0, 0, 0, 1, 1, 1])
+    assert missed(model, good, episodes) == 0
+    assert missed(model, [slower(told, 0.5) for told in good], episodes) == 2
+    assert missed(model, [slower(told, 0.5 + 0.1 * k) for k, told in enumerate(good)], episodes) == 6
+    assert missed(model, good, episodes[::-1]) == 0
