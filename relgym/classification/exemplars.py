@@ -18,6 +18,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from heapq import heapify, heappop, heapreplace
 from typing import Any, Final
 
 import numpy as np
@@ -28,6 +29,9 @@ from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabu
 from relgym.config import ClassificationConfig
 
 __all__ = ["COLUMNS", "Exemplars", "dyadic"]
+
+_FEWEST: Final = 100
+"""So many examples are kept whatever memory they take; also the least `max_exemplars`."""
 
 _UNDEFINED: Final = float("nan")
 _MASK64: Final = (1 << 64) - 1
@@ -103,7 +107,8 @@ class Exemplars:
 
     Notes
     -----
-    Cost of `add`: O(R K^2), some 20 µs; no randomness: the reservoir's choices are hashes of key and count.
+    Cost of `add`: O(R K^2), some 20 µs; memory at most `exemplar_memory`; no randomness: the
+    reservoir's choices are hashes of key and count.
     """
 
     def __init__(self, vocabulary: Vocabulary, config: ClassificationConfig) -> None:
@@ -169,9 +174,12 @@ class Exemplars:
             How many seen examples it stands for.
         """
         check_example(self.vocabulary, example)
+        most = self._most(len(example.close))
+        if len(self) > most:
+            self._shed(most)
         cell = self._cells[number := self._cell(assigned, example.key)]
         cell.count += weight
-        slot = self._room(cell, hard)
+        slot = self._room(cell, hard, most)
         if slot is None:
             return None
         self.version += 1
@@ -292,11 +300,31 @@ class Exemplars:
             return self.config.noise_per_state
         return self.config.exemplars_per_state if cell.key else self.config.exemplars_alone
 
-    def _room(self, cell: _Cell, hard: bool) -> int | None:
+    def _most(self, bodies: int) -> int:
+        """How many examples are kept once they have columns for so many bodies."""
+        size = self.columns.row_bytes({"K": bodies, "K2": bodies})
+        return min(self.config.max_exemplars, max(_FEWEST, self.config.exemplar_memory * 2**20 // size))
+
+    def _shed(self, most: int) -> None:
+        """Give up examples, of the most crowded cells first: those of larger scenes to come take more memory."""
+        crowded = [(-len(cell), number) for number, cell in enumerate(self._cells) if len(cell)]
+        heapify(crowded)
+        for _ in range(len(self) - most):
+            _, number = crowded[0]
+            cell = self._cells[number]
+            cell.give_up()
+            if len(cell):
+                heapreplace(crowded, (-len(cell), number))
+            else:
+                heappop(crowded)
+        self._compact()
+        self.version += 1
+
+    def _room(self, cell: _Cell, hard: bool, most: int) -> int | None:
         """A slot for a new example of this cell, or none if the reservoir passes it over."""
         if len(cell) < self._cap(cell):
-            if len(self) < self.config.max_exemplars:
-                cell.keep(slot := self.columns.append(), hard)
+            if len(self) < most:
+                cell.keep(slot := self.columns.append(most), hard)
                 return slot
             crowded = max(self._cells, key=len)
             if len(cell) < len(crowded):
@@ -314,6 +342,10 @@ class Exemplars:
         for cell in self._cells:
             while len(cell) > self._cap(cell):
                 cell.give_up()
+        return self._compact()
+
+    def _compact(self) -> NDArray[np.intp]:
+        """Number the slots anew that cells still have; the numbers they had."""
         kept = sorted(slot for cell in self._cells for slot in cell.members)
         left = np.array(kept, dtype=np.intp)
         if len(kept) < len(self):

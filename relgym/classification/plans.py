@@ -35,7 +35,8 @@ Key: TypeAlias = tuple[int, bytes, bytes, bytes, bytes]
 """Target, approached and close objects, binary and unary relations of an example."""
 
 _SOME: Final = "some object"  # stands for a numeric test of a variable while objects are looked for
-_MOST_PLANS: Final = 4096
+_MOST_MEMORY: Final = 32 * 2**20  # of plans that are remembered, in bytes
+_PLAN: Final = 8192  # of a plan besides its tables, in bytes
 _NAN: Final = float("nan")
 
 _Binding: TypeAlias = tuple[int, ...]
@@ -130,6 +131,7 @@ class Planner:
         self._version = 0
         self._everything = False
         self._plans: dict[Key, Plan] = {}
+        self._memory = 0
 
     def set_pairs(self, classifiers: Sequence[BinaryClassifier]) -> None:
         """Set the pairs, in order; those that are the same objects as before keep what is known of them."""
@@ -140,6 +142,7 @@ class Planner:
         if everything != self._everything:
             self._everything = everything
             self._plans.clear()
+            self._memory = 0
 
     def outcomes(self, example: Example, values: Sequence[float]) -> list[int]:
         """Number of the outcome of every pair.
@@ -173,8 +176,11 @@ class Planner:
         key = (example.target, struck.tobytes(), close.tobytes(), table.tobytes(), unary.tobytes())
         plan = self._plans.get(key)
         if plan is None:
-            if len(self._plans) >= _MOST_PLANS:
+            # A plan has tables twice: in its key, and as what clauses are asked of.
+            self._memory += _PLAN + 2 * (table.nbytes + unary.nbytes)
+            if self._memory > _MOST_MEMORY:
                 self._plans.clear()
+                self._memory = _PLAN + 2 * (table.nbytes + unary.nbytes)
             plan = self._plans[key] = self._new_plan(key, table, unary, (struck, close))
         if plan.version != self._version:
             self._update(plan)

@@ -102,6 +102,10 @@ class ClassificationConfig:
         10,000,000.
     max_exemplars
         Examples kept in all. Default 6000, range 100 to 10,000,000.
+    exemplar_memory
+        Memory that they may take, for each target, in MB. Relations are told of all pairs of bodies, so an example of
+        40 bodies takes 21 kB and one of 200 takes 0.5 MB. Default 128, which is 6000 examples of 40 bodies, as many
+        as large scenes are taken apart into; range 1 to 1,000,000. At least 100 examples are kept whatever they take.
     repair
         Whether a contradicted definition is first mended (a threshold moved, a clause dropped or added) and
         only learned anew where that isn't enough (§5.1). Default true.
@@ -135,6 +139,7 @@ class ClassificationConfig:
     exemplars_alone: int = 3000
     noise_per_state: int = 200
     max_exemplars: int = 6000
+    exemplar_memory: int = 128
     repair: bool = True
     relearn_growth: float = 1.5
 
@@ -147,12 +152,13 @@ class ClassificationConfig:
         at_least(self, 1, "exemplars_per_state", "exemplars_alone", "noise_per_state")
         at_least(self, 0, "max_new_variables")
         at_least(self, 100, "max_exemplars")
+        at_least(self, 1, "exemplar_memory")
         # Searches may take long, but not for ever.
         at_most(self, max_literals=64, max_clauses=256, max_new_variables=4, beam=256, tree_max_depth=64)
         at_most(
             self, **dict.fromkeys(("exemplars_per_state", "exemplars_alone", "noise_per_state"), 10_000_000)
         )
-        at_most(self, max_exemplars=10_000_000, tree_min_leaf=1_000_000)
+        at_most(self, max_exemplars=10_000_000, exemplar_memory=1_000_000, tree_min_leaf=1_000_000)
         unit(self, "min_precision", "clause_tree_threshold", "fall_through_tree_threshold", "class_balance")
         at_least(self, 0.5, "min_precision")
         if not self.relearn_growth > 1:

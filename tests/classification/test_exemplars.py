@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from toy_situations import BALL_VOCABULARY, Labelled, ball_stream
 
-from relgym.classification.examples import NOISE
+from relgym.classification.examples import NOISE, Example
 from relgym.classification.exemplars import Exemplars
 from relgym.config import ClassificationConfig
 
@@ -102,3 +103,37 @@ def test_content_survives_json_and_goes_on_alike(items: list[Labelled]) -> None:
             each.add(item.example, item.mode, item.fits, item.values)
     np.testing.assert_array_equal(again.rows, exemplars.rows)
     np.testing.assert_array_equal(again.weights(), exemplars.weights())
+
+
+def _among(example: Example, bodies: int, key: bytes) -> Example:
+    """The example with bystanders of which nothing is true."""
+    more = bodies - len(example.close)
+    return replace(
+        example,
+        table=np.pad(example.table, ((0, 0), (0, more), (0, more))),
+        unary=np.pad(example.unary, ((0, 0), (0, more))),
+        close=np.pad(example.close, (0, more)),
+        pair=np.pad(example.pair, ((0, more), (0, 0)), constant_values=np.nan),
+        approached=np.pad(example.struck, (0, more)),
+        key=key,
+    )
+
+
+def test_memory_is_bounded_however_many_bodies_come(items: list[Labelled]) -> None:
+    exemplars = Exemplars(BALL_VOCABULARY, ClassificationConfig(exemplar_memory=1))
+    exemplars.set_modes(range(6), np.empty(0, int), np.empty((0, 6), bool), np.empty((0, 6)))
+    memory = lambda: sum(exemplars.columns[name].nbytes for name in exemplars.columns.columns)  # noqa: E731
+    kept = {}
+    for bodies in (8, 16, 24):
+        for number in range(3000):
+            item, key = items[number % len(items)], b"%d of %d" % (number % 700, bodies)
+            slot = exemplars.add(_among(item.example, bodies, key), item.mode, item.fits, item.values)
+            assert slot is None or exemplars.key_of(slot) == key
+        assert memory() <= 2**20
+        assert memory() > 2**19 or len(exemplars) == 700
+        kept[bodies] = len(exemplars)
+        slots = sorted(slot for _, _, members in exemplars.cells for slot in members)
+        assert slots == list(range(len(exemplars)))
+    assert kept[8] > kept[16] > kept[24] > 100
+    exemplars.add(_among(items[0].example, 200, b""), 0, items[0].fits, items[0].values)
+    assert len(exemplars) == 100
