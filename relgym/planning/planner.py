@@ -266,13 +266,16 @@ class Planner:
         if plan is None:
             return None
         if taken < len(plan.states):
-            expected = plan.states[taken]
-            off = np.abs(now - expected) > self.tolerance * np.maximum(1.0, np.abs(expected))
-            if now.shape == expected.shape and not off.any():
+            if self._as_expected(now, plan.states[taken]):
                 return plan if taken < len(plan.actions) else None
             thread.surprises += 1
         thread.error = self._off(thread, now)
         return None
+
+    def _as_expected(self, now: Float1D, expected: Float1D) -> bool:
+        if now.shape != expected.shape:  # objects have come or gone
+            return False
+        return bool((np.abs(now - expected) <= self.tolerance * np.maximum(1.0, np.abs(expected))).all())
 
     def _looked_again(self, kept: Plan | None, thread: PlannerState, now: Float1D) -> Plan:
         """Search; what is found takes the place of a plan that can go on if it is better."""
