@@ -58,6 +58,10 @@ leads somewhere."""
 _SHARES: Final = tuple(1 / hold / sum(1 / each for each in _HOLDS) for hold in _HOLDS)
 """How often: as many different actions of each."""
 
+_BANG: Final = 0.5
+"""Share of the random actions whose every component is at one end of its range or the other, as where systems are
+identified with binary noise: nothing excites a world more, and limits show where it is driven to them."""
+
 _LATEST: Final = 50
 """Latest real steps by which the agent doubts its model."""
 
@@ -317,7 +321,10 @@ class PlanningAgent:
     def _drawn(self) -> Any:
         space = self.env.action_space
         if isinstance(space, gym.spaces.Box):
-            return self._rng.uniform(space.low, space.high).astype(space.dtype)
+            share = self._rng.random(space.shape)
+            if self._rng.random() < _BANG:
+                share = np.round(share)
+            return (space.low + share * (space.high - space.low)).astype(space.dtype)
         space.seed(int(self._rng.integers(2**31)))
         return space.sample()
 
