@@ -172,8 +172,8 @@ def explored(store: ResultStore, *, seeds: int) -> tuple[str, list[Task]]:
     rows: list[list[Cell]] = []
     ratios = []
     for seed in SEEDS[:seeds]:
-        pair = [known.get((seed, explores)) for explores in (True, False)]
-        if None in pair:
+        pair = [known[key] for key in ((seed, True), (seed, False)) if key in known]
+        if len(pair) < 2:
             continue
         own, other = (_EXPLORATION + 25 if one["known_at"] is None else one["known_at"] for one in pair)
         ratios.append(other / own)

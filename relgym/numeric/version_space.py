@@ -88,7 +88,8 @@ class VersionSpace:
     def share(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Share of the rules that hold of n points, shape ``(n,)``."""
         asked = points[:, self._columns]
-        held: NDArray[np.bool_] = ((asked >= self._low) & (asked <= self._high)).all(axis=2)
+        inside: NDArray[np.bool_] = (asked >= self._low) & (asked <= self._high)
+        held = np.asarray(inside.all(axis=2), dtype=np.bool_)
         share: NDArray[np.float64] = held.mean(axis=1)
         return share
 
@@ -99,7 +100,7 @@ class VersionSpace:
         found: list[tuple[int, ...]] = []
         for size in range(1, longest + 1):
             if size == 1:
-                told = [(j,) for j in open_columns if not inside[:, j].any()]
+                told: list[tuple[int, ...]] = [(j,) for j in open_columns if not inside[:, j].any()]
             else:
                 told = []
                 for start in combinations(open_columns, size - 2):
