@@ -19,7 +19,7 @@ class Args:
 
     steps: int = 300
     """real steps to explore and learn in"""
-    random_steps: int = 150
+    random_steps: int = 100
     """at random at first"""
     episodes: int = 20
     """episodes to plan"""

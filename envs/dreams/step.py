@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,6 +66,10 @@ class DreamStep:
         Longest episode in steps; None: no limit.
     min_margin
         Least margin of a prediction that is followed.
+    corrected
+        What is made of predicted state vectors before they are evaluated; None: nothing.
+    guesses
+        Whether abstentions are followed, too: to what the model would have said, else as if nothing changed.
     """
 
     setting: Setting
@@ -73,6 +78,8 @@ class DreamStep:
     actions: Deeds
     horizon: int | None
     min_margin: float
+    corrected: Callable[[Float2D], Float2D] | None = None
+    guesses: bool = False
 
     def __call__(
         self,
@@ -102,8 +109,12 @@ class DreamStep:
         acting = self.actions.joined(before, actions)
         prediction = self.setting.model.predict_batch(self.actions.layout, acting)
         after = self.actions.parted(prediction.vectors)
+        if self.corrected is not None:
+            after = self.corrected(after)
         inside = self.setting.shown.still_inside(after, prediction.parts)
         why = causes(prediction, inside, self.min_margin, self.evaluator.overruled)
+        if self.guesses:
+            why[inside & np.isfinite(after).all(axis=1)] = -1
         if among is not None:
             why[~among] = _HORIZON  # neither followed nor evaluated
         rewards, ended, success = self._evaluated(before, actions, after, why < 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import process_time
 from typing import Any, Final, Literal
 
@@ -12,17 +12,41 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.envs.scripted import push_knowing
+from relgym.envs.truck_push import GRAVITY
 from relgym.experiments.dyna import EPISODES, solved_at
 from relgym.planning import EnvSimulator, Objective, Planner, PlanningAgent, Steps, TreeSearch
+from relgym.planning.review import right
 from relgym.scene.objects import Float1D, Float2D, Scene
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.dyna.acting import acting_all
+from relgym.wrappers.dyna.recorder import Experience, TransitionRecorder
 from relgym.wrappers.dyna.trainer import ModelTrainer
 
-__all__ = ["ARMS", "COURSES", "Arm", "Course", "Tests", "ceiling", "learning"]
+__all__ = [
+    "ARMS",
+    "COURSES",
+    "Arm",
+    "ChangingWorld",
+    "Course",
+    "Tests",
+    "ceiling",
+    "knowing",
+    "learning",
+    "recovering",
+]
 
 _FIRST_EPISODE: Final = 50_000
 """Seed of the first test episode: those of the agents that dream, far from those of training."""
+
+_FRESH: Final = 40
+"""Episodes of fresh steps that laws and task are tested on: at random and by who knows, in turn."""
+
+_KNOWN: Final = 0.99
+"""Share of the fresh steps that have to be right."""
+
+_CHANGE: Final = 1_000
+"""Real steps after which the world changes."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +94,7 @@ COURSES: Final = {
             "relgym/BallGoal-v0",
             repeat=5,
             limit=100,
+            agent={"commit": 10},
             search=TreeSearch(horizon=60, batch=512, expansions=8_192),
         ),
     )
@@ -189,9 +214,9 @@ class NeuralSimulator:
         return Steps(found, rewards, ended, np.full(len(states), bool(self.model.ensemble.ready)))
 
 
-def make_agent(course: Course, arm: Arm, *, seed: int) -> PlanningAgent:
-    """An agent that has seen nothing yet."""
-    env = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
+def make_agent(course: Course, arm: Arm, *, seed: int, env: gym.Env[Any, Any] | None = None) -> PlanningAgent:
+    """An agent that has seen nothing yet, in the course's env or another one with the same spaces."""
+    env = gym.make(course.env_id, disable_env_checker=True, **course.arguments) if env is None else env
     options: dict[str, Any] = {"search": course.search, "repeat": course.repeat, "seed": seed, **course.agent}
     if not arm.explores:
         options["exploration"] = 0.0
@@ -256,6 +281,118 @@ def learning(*, course: str, arm: str, seed: int, steps: int, episodes: int = EP
         "decision": decision,
         "laws": describe() if describe is not None else "",
     }
+
+
+def knowing(*, explores: bool, seed: int, steps: int, every: int = 25) -> dict[str, Any]:
+    """How many real steps it takes to know TruckPush and its task: laws, reward and end of 99 % of fresh steps.
+
+    Fresh steps are those of random play and of a controller that knows the way to the goal, in equal shares.
+
+    Parameters
+    ----------
+    explores
+        Whether the agent looks for what is new, or acts at random throughout.
+    seed
+        Of everything random.
+    steps
+        Real steps at most.
+    every
+        Real steps between two tests.
+
+    Returns
+    -------
+    ``curve``: (real steps, share of laws right, share of rewards and ends right) at each test; ``known_at``: real steps
+    at the first test at which both are enough, or None.
+    """
+    course = COURSES["truck"]
+    options = {} if explores else {"random_steps": 10**9}
+    agent = make_agent(replace(course, agent={**course.agent, **options}), ARMS["relgym"], seed=seed)
+    fresh = _fresh_steps(course)
+    curve: list[tuple[int, float, float]] = []
+    known_at = None
+    for at in range(every, steps + 1, every):
+        agent.learn(at)
+        laws = float(right(agent.model, [real.transition for real in fresh]).mean())
+        curve.append((at, laws, float(1.0 - agent.mistaken(fresh).mean())))
+        print(f"explores: {explores}, seed {seed}, {at:,}: {curve[-1][1:]}", file=sys.stderr, flush=True)
+        if min(curve[-1][1:]) >= _KNOWN:
+            known_at = at
+            break
+    return {"curve": curve, "known_at": known_at}
+
+
+def _fresh_steps(course: Course) -> list[Experience]:
+    env = TransitionRecorder(gym.make(course.env_id, disable_env_checker=True, **course.arguments))
+    env.action_space.seed(0)
+    found: list[Experience] = []
+    for k in range(_FRESH):
+        env.reset(seed=2 * _FIRST_EPISODE + k)
+        over = False
+        while not over:
+            scene = env.get_wrapper_attr("scene")
+            action = env.action_space.sample() if k % 2 else push_knowing(scene)
+            _, _, terminated, truncated, _ = env.step(action)
+            over = terminated or truncated
+        found += env.take()
+    return found
+
+
+class ChangingWorld(gym.Wrapper[Any, Any, Any, Any]):
+    """One world at first and another one afterwards, from the next episode on.
+
+    Parameters
+    ----------
+    before, after
+        Worlds with the same spaces.
+    steps
+        So many steps the first one lasts at least.
+    """
+
+    def __init__(self, before: gym.Env[Any, Any], after: gym.Env[Any, Any], steps: int) -> None:
+        super().__init__(before)
+        self._after, self._left = after, steps
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode, in the new world if it is time."""
+        if self._left <= 0:
+            self.env = self._after
+        return self.env.reset(seed=seed, options=options)
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Step the world of this episode."""
+        self._left -= 1
+        return self.env.step(action)
+
+
+def recovering(*, seed: int, steps: int, episodes: int) -> dict[str, Any]:
+    """What becomes of an agent that has learned everything when gravity, and all friction with it, is halved.
+
+    Parameters
+    ----------
+    seed
+        Of everything random.
+    steps
+        Real steps after the change.
+    episodes
+        Of a test.
+
+    Returns
+    -------
+    ``curve``: (real steps since the change, successes of 100 in the world of that time) at each test.
+    """
+    course = COURSES["truck"]
+    half = {**course.arguments, "gravity": GRAVITY / 2.0}
+    worlds = [gym.make(course.env_id, disable_env_checker=True, **made) for made in (course.arguments, half)]
+    agent = make_agent(course, ARMS["relgym"], seed=seed, env=ChangingWorld(worlds[0], worlds[1], _CHANGE))
+    curve: list[tuple[int, int]] = []
+    for at in range(0, steps + 1, course.every):
+        agent.learn(_CHANGE + at)
+        tests = Tests(replace(course, arguments=half) if at else course, episodes)
+        curve.append((at, round(tests.successes(agent) * 100 / episodes)))
+        print(f"changed world, seed {seed}: {curve[-1]}", file=sys.stderr, flush=True)
+    return {"curve": curve}
 
 
 def ceiling(*, course: str, episodes: int = EPISODES) -> dict[str, Any]:

@@ -14,17 +14,20 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from relgym.planning.actions import ActionCoder
     from relgym.planning.agent import PlanningAgent
+    from relgym.planning.doubts import DoubtedTask
     from relgym.planning.exploration import Coverage, Explore, Familiar
     from relgym.planning.planner import Planner
     from relgym.planning.rollouts import Objective, Plan
     from relgym.planning.sequences import CrossEntropy, PathIntegral, RandomShooting, Search
-    from relgym.planning.simulators import EnvSimulator, ModelSimulator, Simulator, Steps
+    from relgym.planning.simulators import Correctable, EnvSimulator, ModelSimulator, Simulator, Steps
     from relgym.planning.tree import TreeSearch
 
 _HOMES = {
     "ActionCoder": "relgym.planning.actions",
+    "Correctable": "relgym.planning.simulators",
     "Coverage": "relgym.planning.exploration",
     "CrossEntropy": "relgym.planning.sequences",
+    "DoubtedTask": "relgym.planning.doubts",
     "EnvSimulator": "relgym.planning.simulators",
     "Explore": "relgym.planning.exploration",
     "Familiar": "relgym.planning.exploration",
@@ -44,8 +47,10 @@ _HOMES = {
 
 __all__ = [
     "ActionCoder",
+    "Correctable",
     "Coverage",
     "CrossEntropy",
+    "DoubtedTask",
     "EnvSimulator",
     "Explore",
     "Familiar",

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import Any, Final, cast
 
 import gymnasium as gym
@@ -16,9 +17,10 @@ from relgym.envs.arguments import checked_count, checked_least
 from relgym.envs.dreams.rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
+from relgym.planning.doubts import DoubtedTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
-from relgym.planning.review import learned_again, right
+from relgym.planning.review import learned_again, length, missed, mixed, right
 from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
 from relgym.planning.simulators import ModelSimulator, Simulator
@@ -36,12 +38,15 @@ from relgym.wrappers.views import ViewLike
 
 __all__ = ["PlanningAgent"]
 
-_GROWTH: Final = 1.15
+_GROWTH: Final = 1.1
 """Between two reviews the agent's experience grows by this factor: all of them together cost as much as to learn from
-everything fifteen times, but they only take place while the model is wrong."""
+everything some ten times, for each order, but they only take place while the model is wrong."""
 
-_ORDERS: Final = 2
-"""Random orders that a review tries: of few steps one may miss what another finds."""
+_ORDERS: Final = 3
+"""Random orders that a review tries at most: of few steps one may miss what another finds."""
+
+_FIRST_REVIEW: Final = 100
+"""Real steps before the first review."""
 
 _REMEMBERED: Final = 5_000
 """Latest real steps that a review looks at."""
@@ -52,6 +57,10 @@ leads somewhere."""
 
 _SHARES: Final = tuple(1 / hold / sum(1 / each for each in _HOLDS) for hold in _HOLDS)
 """How often: as many different actions of each."""
+
+_BANG: Final = 0.5
+"""Share of the random actions whose every component is at one end of its range or the other, as where systems are
+identified with binary noise: nothing excites a world more, and limits show where it is driven to them."""
 
 _LATEST: Final = 50
 """Latest real steps by which the agent doubts its model."""
@@ -123,7 +132,7 @@ class PlanningAgent:
         view: ViewLike = None,
         search: Search | None = None,
         repeat: int = 1,
-        random_steps: int = 150,
+        random_steps: int = 100,
         exploration: float = 0.5,
         discount: float = DISCOUNT,
         safe: bool = False,
@@ -152,13 +161,16 @@ class PlanningAgent:
         self.steps = 0
         self._like, self._simulator = env, simulator
         self._search = TreeSearch() if search is None else search
+        self._seed, self._doubted = seed, cast(DoubtedTask | None, None)
         self._options = {"commit": commit, "tolerance": tolerance, "seed": seed}
         self._rng = np.random.default_rng([seed, 5])
         self._history: deque[Experience] = deque(maxlen=_REMEMBERED)
+        self._episodes: deque[int] = deque(maxlen=_REMEMBERED)
+        self._begun = 0
         self._wrong: deque[bool] = deque(maxlen=_LATEST)
         self._task_wrong: deque[bool] = deque(maxlen=_LATEST)
         self._at_random = True
-        self._next_review = max(self.random_steps, 50)
+        self._next_review = _FIRST_REVIEW
         self._size = Spread()
         self._limit: int | None = None
         self._hold = 1
@@ -201,7 +213,7 @@ class PlanningAgent:
         if self._simulator is not None:
             simulator: Simulator = self._simulator(self.trainer)
         else:
-            task = cast(TaskFunctions, self.trainer.reward_model)
+            task = cast(TaskFunctions, self._task())
             simulator = ModelSimulator(
                 self.model, self._like, view=self._recorder.view, task=task, repeat=self.repeat
             )
@@ -210,6 +222,15 @@ class PlanningAgent:
             simulator = Familiar(simulator, self.coverage)
         objective, options = self._objective(explores=explores), {"safe": safe, "limit": self._limit}
         return Planner(simulator, self._search, objective, **options, **self._options)  # type: ignore[arg-type]
+
+    def _task(self) -> Any:
+        """What steps are worth in plans: as far as what was seen bears out what was learned of it."""
+        own = self.trainer.reward_model
+        if not isinstance(own, LearnedRewardModel):
+            return own
+        if self._doubted is None or self._doubted.model is not own:
+            self._doubted = DoubtedTask(own, seed=self._seed)
+        return self._doubted
 
     def _objective(self, *, explores: bool) -> Objective:
         objective = Objective(discount=self.discount)
@@ -243,6 +264,7 @@ class PlanningAgent:
             if self._observation is None:
                 self._observation, _ = self.env.reset(seed=int(self._rng.integers(2**31)))
                 self._thread, self._held = PlannerState(), (0, None)
+                self._begun += 1
                 self._hold = int(self._rng.choice(_HOLDS, p=_SHARES))
                 self._at_random = self.steps < self.random_steps or self._rng.random() < self.doubt
             action = self._choose(self._observation)
@@ -259,6 +281,10 @@ class PlanningAgent:
             if callback is not None and callback(self) is False:
                 break
         return self
+
+    def mistaken(self, steps: Sequence[Experience]) -> NDArray[np.bool_]:
+        """Of which real steps it is wrong about reward or end, or knows nothing; shape ``(n,)``."""
+        return self._missed(self.trainer.reward_model, steps)
 
     def predict(
         self,
@@ -295,18 +321,22 @@ class PlanningAgent:
     def _drawn(self) -> Any:
         space = self.env.action_space
         if isinstance(space, gym.spaces.Box):
-            return self._rng.uniform(space.low, space.high).astype(space.dtype)
+            share = self._rng.random(space.shape)
+            if self._rng.random() < _BANG:
+                share = np.round(share)
+            return (space.low + share * (space.high - space.low)).astype(space.dtype)
         space.seed(int(self._rng.integers(2**31)))
         return space.sample()
 
     def _take_up(self, real: Experience) -> None:
         """Learn from a real step."""
-        surplus, missed = self._surplus(self.trainer.reward_model, real)
-        self._task_wrong.append(missed)
+        surplus, missed = self._surplus(self.trainer.reward_model, [real])
+        self._task_wrong.append(bool(missed[0]))
         self.trainer.take_up(real)
         self.steps += 1
         self._size.add(real.reward)
         self._history.append(real)
+        self._episodes.append(self._begun)
         after = real.transition.after
         if self.coverage is None:
             kinds = changing(self.model)
@@ -321,7 +351,7 @@ class PlanningAgent:
                 after.vector,
                 before=real.start.vector,
                 surprised=self._surprised(),
-                surplus=surplus,
+                surplus=float(surplus[0]),
                 paid=real.reward,
             )
         if self.steps >= self._next_review:
@@ -339,8 +369,9 @@ class PlanningAgent:
     def _review(self) -> None:
         """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often.
 
-        Both are tested on steps that they had not learned from: the model at work when they came, the new one on the
-        latest of them before it learns those, too.
+        What they are compared by is how many values it takes to state the model, and what it misses of all that was
+        seen (`length`, `missed`). New models have learned from that, and many numbers fit a few episodes exactly; but
+        laws are short.
         """
         self._next_review = int(self.steps * _GROWTH) + 1
         if isinstance(self.model, WorldModel) and not self.model.frozen and any(self._wrong):
@@ -349,54 +380,66 @@ class PlanningAgent:
             self._review_task(self.trainer.reward_model)
 
     def _review_model(self) -> None:
-        seen = [real.transition for real in self._history]
-        count = min(len(self._wrong), len(seen) // 5)
-        least = sum(list(self._wrong)[-count:])
-        best = None
+        # What the model at work has learned from: one that took over in a changed world knows nothing of the old one.
+        seen = [real.transition for real in self._history][-self.model.seen :]
+        episodes = np.array(self._episodes)[-len(seen) :]
+
+        def cost(model: WorldModel) -> float:
+            return missed(model, seen, episodes) + length(model)
+
+        best, least = None, cost(self.model)
         for _ in range(_ORDERS):
-            fresh = learned_again(self.model, seen[:-count], rng=self._rng)
-            wrong = ~right(fresh, seen[-count:])
-            if fresh.targets and wrong.sum() <= least:
-                best, least = (fresh, wrong), int(wrong.sum())
-            if not least:
-                break
+            fresh = learned_again(self.model, seen, rng=self._rng, episodes=episodes)
+            if fresh.targets and (found := cost(fresh)) < least:
+                best, least = fresh, found
         if best is not None:
-            fresh, wrong = best
-            for transition in seen[-count:]:
-                fresh.learn_one(transition)
-            self.trainer.adopt(fresh)
-            self._wrong = deque(wrong.tolist(), maxlen=_LATEST)
+            self.trainer.adopt(best)
+            # It knows what it has learned from, and more than one does that hasn't learned the latest of it: what it
+            # makes of the next steps lies in between.
+            count = min(_LATEST, len(seen) // 2) // 2
+            tested = learned_again(self.model, seen[:-count], rng=self._rng, episodes=episodes[:-count])
+            parts = right(best, seen[-2 * count : -count]), right(tested, seen[-count:])
+            self._wrong = deque((~np.concatenate(parts)).tolist(), maxlen=_LATEST)
 
     def _review_task(self, own: LearnedRewardModel) -> None:
         """The same for reward and end."""
         seen = list(self._history)
-        count = min(len(self._task_wrong), len(seen) // 5)
-        least = sum(list(self._task_wrong)[-count:])
-        best = None
+        best, least = None, int(self._missed(own, seen).sum())
         for _ in range(_ORDERS):
+            if not least:
+                break
             fresh = own.untaught()
-            for k in self._rng.permutation(len(seen) - count).tolist():
+            for k in mixed(np.array(self._episodes), self._rng):
                 fresh.learn_step(seen[k].transition, seen[k].reward, terminated=seen[k].terminated)
             fresh.model.finish()
-            wrong = [self._surplus(fresh, real)[1] for real in seen[-count:]]
-            if sum(wrong) < least:
-                best, least = (fresh, wrong), sum(wrong)
+            wrong = self._missed(fresh, seen)
+            if wrong.sum() < least:
+                best, least = (fresh, wrong), int(wrong.sum())
         if best is not None:
-            fresh, wrong = best
-            for real in seen[-count:]:
-                fresh.learn_step(real.transition, real.reward, terminated=real.terminated)
-            self.trainer.reward_model = fresh
-            self._task_wrong = deque(wrong, maxlen=_LATEST)
+            self.trainer.reward_model, wrong = best
+            self._task_wrong = deque(wrong[-_LATEST:].tolist(), maxlen=_LATEST)
 
-    def _surplus(self, task: RewardModel, real: Experience) -> tuple[float, bool]:
-        """What a step paid beyond what a reward model says, 0 where it says nothing; whether it was wrong."""
-        after = _fitted(real.transition.after, real.start)
+    def _missed(self, task: RewardModel, seen: Sequence[Experience]) -> NDArray[np.bool_]:
+        """Of which steps a reward model is wrong about reward or end."""
+        found = np.zeros(len(seen), dtype=np.bool_)
+        order = sorted(range(len(seen)), key=lambda k: seen[k].start.layout.names)
+        for _, group in groupby(order, key=lambda k: seen[k].start.layout.names):
+            rows = list(group)
+            found[rows] = self._surplus(task, [seen[k] for k in rows])[1]
+        return found
+
+    def _surplus(self, task: RewardModel, seen: Sequence[Experience]) -> tuple[Float1D, NDArray[np.bool_]]:
+        """What steps of one layout paid beyond what a reward model says, 0 where it says nothing; which were wrong."""
         told = task.evaluate(
-            real.start.layout, real.start.vector[None], np.asarray(real.action)[None], after[None]
+            seen[0].start.layout,
+            np.stack([real.start.vector for real in seen]),
+            np.stack([np.asarray(real.action) for real in seen]),
+            np.stack([_fitted(real.transition.after, real.start) for real in seen]),
         )
-        surplus = real.reward - float(told.rewards[0])
-        wrong = not abs(surplus) <= 1e-6 or bool(told.terminated[0]) != real.terminated
-        return (surplus if np.isfinite(surplus) else 0.0), wrong
+        surplus = np.array([real.reward for real in seen]) - told.rewards
+        ended = np.array([real.terminated for real in seen])
+        wrong = ~(np.abs(surplus) <= 1e-6) | (told.terminated != ended)
+        return np.where(np.isfinite(surplus), surplus, 0.0), wrong
 
 
 def _fitted(after: Scene, like: Scene) -> Float1D:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import checked_least
 from relgym.errors import ConfigError
 from relgym.planning.rollouts import Bonus
-from relgym.planning.simulators import Simulator, Steps
+from relgym.planning.simulators import Correctable, Simulator, Steps
 from relgym.scene.objects import POSE, TASK, Float1D, Float2D, Scene, SceneLayout
 from relgym.wrappers.views import ViewLike, recordable, view_of
 
@@ -242,6 +242,15 @@ class Familiar:
     def prepare(self) -> None:
         """As the simulator's."""
         self._simulator.prepare()
+
+    def corrected(self, error: Float1D | None, *, guesses: bool = False) -> Simulator:
+        """As the simulator's, if it can be corrected; what isn't familiar stays of unknown outcome."""
+        own = self._simulator
+        return (
+            Familiar(own.corrected(error, guesses=guesses), self._coverage)
+            if isinstance(own, Correctable)
+            else self
+        )
 
     def step(self, states: Float2D, actions: NDArray[Any]) -> Steps:
         """Follow n actions from n states."""

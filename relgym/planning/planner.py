@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
 from relgym.planning.actions import ActionCoder
-from relgym.planning.rollouts import Objective, Plan
+from relgym.planning.rollouts import Objective, Plan, roll_out
 from relgym.planning.sequences import Search
-from relgym.planning.simulators import Simulator
+from relgym.planning.simulators import Correctable, Simulator
 from relgym.planning.tree import TreeSearch
 from relgym.scene.objects import Float1D
 
@@ -40,6 +40,13 @@ class PlannerState:
         Taken in this episode.
     searches, surprises
         How often the planner has searched, and how often because the world did something else than predicted.
+    error
+        By how much the state was off the simulator's prediction at the last surprise, shape ``(width,)``; None before
+        the first one, and where the simulator was right after all.
+    last
+        State and action of the last decision.
+    due
+        Decisions of the plan after which there is another search.
     """
 
     plan: Plan | None = None
@@ -47,6 +54,9 @@ class PlannerState:
     decisions: int = 0
     searches: int = 0
     surprises: int = 0
+    error: Float1D | None = None
+    last: tuple[Float1D, Any] | None = None
+    due: int = 0
 
 
 States: TypeAlias = tuple[Any, ...]
@@ -66,8 +76,9 @@ class Planner:
     objective
         What for; default: the sum of rewards.
     commit
-        Decisions of a plan that are taken before the next search; default: half the search's horizon, and all of a plan
-        that ends the episode. A surprise is followed by a search at once.
+        Decisions of a plan that are taken before the next search; default: half the search's horizon. Of a plan that
+        ends the episode always half of what is left: a search from nearer by hits a narrow goal more often, and the
+        plan goes on where that finds nothing better. A surprise is followed by a search at once.
     tolerance
         How far a property may be off its prediction without a surprise, relative to its size (absolute below 1).
     limit
@@ -75,7 +86,13 @@ class Planner:
     seconds
         Time for one search; None: all its rounds.
     safe
-        Never to take an action whose outcome the simulator doesn't know while it knows that of another one.
+        Never to take an action whose outcome the simulator doesn't know while it knows that of another one; nor to
+        guess.
+    adapts
+        Whether to correct a `Correctable` simulator: much of what a law misses, a friction or a wind, stays the same
+        for an episode, so by as much as the last prediction was off the next ones are taken to be off as well (offset-
+        free predictive control, Pannocchia and Rawlings 2003). And where it knows the outcome of no action, to plan
+        with its guesses.
     source
         Function from an observation to the scene (or observation of the model's env) that it shows; for agents whose
         wrappers hide part of it: ``lambda _: env.get_wrapper_attr("scene")``. Default: the observation itself.
@@ -107,6 +124,7 @@ class Planner:
     limit: int | None = None
     seconds: float | None = None
     safe: bool = False
+    adapts: bool = True
     source: Callable[[Any], Any] | None = None
     seed: int = 0
 
@@ -168,21 +186,38 @@ class Planner:
         """Choose an action for one observation, and note in `thread` how far the plan has come."""
         shown = observation if self.source is None else self.source(observation)
         now = self.simulator.state(shown)
-        if (plan := thread.plan) is None or self._due(plan, thread, now):
-            warm = None if plan is None else plan.latents[thread.taken :]
-            left = None if self.limit is None else max(1, self.limit - thread.decisions)
-            plan = self.plan(now, warm=warm, left=left)
-            thread.plan, thread.taken = plan, 0
-            thread.searches += 1
+        plan = self._kept(thread, now)
+        if plan is None or thread.taken >= thread.due:
+            plan = self._looked_again(plan, thread, now)
         action = plan.actions[thread.taken]
         if self.safe and thread.taken >= len(plan.rewards):
             action = self._known(now, action)
         thread.taken += 1
         thread.decisions += 1
+        thread.last = now, action
         return action
 
-    def plan(self, now: Float1D, *, warm: NDArray[np.float64] | None = None, left: int | None = None) -> Plan:
-        """Search from a state vector; `warm`: latents to begin with; `left`: decisions that the episode still has."""
+    def plan(
+        self,
+        now: Float1D,
+        *,
+        warm: NDArray[np.float64] | None = None,
+        left: int | None = None,
+        error: Float1D | None = None,
+    ) -> Plan:
+        """Search from a state vector.
+
+        Parameters
+        ----------
+        now
+            The state, shape ``(width,)``.
+        warm
+            Latents to begin with.
+        left
+            Decisions that the episode still has.
+        error
+            What is added to the states that a `Correctable` simulator predicts.
+        """
         self.simulator.prepare()
         given: Any = self.search  # of any class
         search: Search = given
@@ -190,9 +225,30 @@ class Planner:
             search = cast(Search, replace(cast(Any, given), horizon=left))
             warm = None if warm is None else warm[:left]
         deadline = None if self.seconds is None else perf_counter() + self.seconds
-        return search.plan(
-            self.simulator, self.coder, now, self.objective, warm=warm, rng=self._rng, deadline=deadline
-        )
+
+        def searched(simulator: Simulator) -> Plan:
+            return search.plan(
+                simulator, self.coder, now, self.objective, warm=warm, rng=self._rng, deadline=deadline
+            )
+
+        found = searched(self._advised(error))
+        guesses = self.adapts and not self.safe and self.objective.curiosity is None
+        if len(found.rewards) or not guesses or not isinstance(self.simulator, Correctable):
+            return found
+        return searched(self._advised(error, guesses=True))
+
+    def _off(self, thread: PlannerState, now: Float1D) -> Float1D | None:
+        """By how much the simulator was off in the last decision; None where it wasn't."""
+        if thread.last is None or not (self.adapts and isinstance(self.simulator, Correctable)):
+            return None
+        before, action = thread.last
+        self.simulator.prepare()
+        guess = self.simulator.corrected(None, guesses=True).step(before[None], np.asarray(action)[None])
+        if not guess.known[0] or guess.states[0].shape != now.shape:
+            return None
+        off: Float1D = now - guess.states[0]
+        off[np.abs(off) <= self.tolerance * np.maximum(1.0, np.abs(now))] = 0.0
+        return off if off.any() else None
 
     def _known(self, now: Float1D, otherwise: Any) -> Any:
         """The best of some random actions whose outcomes are known; if there is none, the one that was to be taken."""
@@ -204,21 +260,48 @@ class Planner:
             return otherwise
         return actions[int(np.where(stepped.known, stepped.rewards, -np.inf).argmax())]
 
-    def _due(self, plan: Plan, thread: PlannerState, now: Float1D) -> bool:
-        """Whether to search: the plan is used up, or the world did something else."""
-        taken = thread.taken
-        if taken >= len(plan.states):  # its outcome wasn't known
-            return True
-        expected = plan.states[taken]
-        off = np.abs(now - expected) > self.tolerance * np.maximum(1.0, np.abs(expected))
-        if now.shape != expected.shape or bool(off.any()):
+    def _kept(self, thread: PlannerState, now: Float1D) -> Plan | None:
+        """The plan if it can go on: it isn't used up, and the world did what it said."""
+        plan, taken = thread.plan, thread.taken
+        if plan is None:
+            return None
+        if taken < len(plan.states):
+            if self._as_expected(now, plan.states[taken]):
+                return plan if taken < len(plan.actions) else None
             thread.surprises += 1
-            return True
-        if taken >= len(plan.actions):
-            return True
-        if plan.terminates:
+        thread.error = self._off(thread, now)
+        return None
+
+    def _as_expected(self, now: Float1D, expected: Float1D) -> bool:
+        if now.shape != expected.shape:  # objects have come or gone
             return False
-        return taken >= (self.commit or max(1, self.search.horizon // 2))
+        return bool((np.abs(now - expected) <= self.tolerance * np.maximum(1.0, np.abs(expected))).all())
+
+    def _looked_again(self, kept: Plan | None, thread: PlannerState, now: Float1D) -> Plan:
+        """Search; what is found takes the place of a plan that can go on if it is better."""
+        warm = None if thread.plan is None else thread.plan.latents[thread.taken :]
+        left = None if self.limit is None else max(1, self.limit - thread.decisions)
+        found = self.plan(now, warm=warm, left=left, error=thread.error)
+        thread.searches += 1
+        # Of plans that don't end the episode one that begins now looks further ahead.
+        if kept is not None and kept.terminates:
+            actions = kept.actions[None, thread.taken :]
+            rest = roll_out(self._advised(thread.error), now, actions, self.objective)
+            if rest.worth[0] >= found.worth:
+                thread.due += max(1, (len(kept) - thread.due) // 2)
+                return kept
+        thread.plan, thread.taken = found, 0
+        thread.due = self.commit or max(1, self.search.horizon // 2)
+        if found.terminates:
+            thread.due = max(1, len(found) // 2)
+        return found
+
+    def _advised(self, error: Float1D | None, *, guesses: bool = False) -> Simulator:
+        """The simulator, corrected if it can be."""
+        own = self.simulator
+        if (error is None and not guesses) or not isinstance(own, Correctable):
+            return own
+        return own.corrected(error, guesses=guesses)
 
     def _batch(self, observation: Any) -> int | None:
         """How many observations there are; None: one, without a leading axis."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import gymnasium as gym
@@ -21,7 +21,7 @@ from relgym.errors import ConfigError, ObservationError, RelgymError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float1D, Float2D, Scene
 
-__all__ = ["EnvSimulator", "ModelSimulator", "Simulator", "Steps"]
+__all__ = ["Correctable", "EnvSimulator", "ModelSimulator", "Simulator", "Steps"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +73,23 @@ class Simulator(Protocol):
         ...
 
 
+@runtime_checkable
+class Correctable(Protocol):
+    """A simulator that may err, and takes advice of how."""
+
+    def corrected(self, error: Float1D | None, *, guesses: bool = False) -> Simulator:
+        """The same simulator, with a correction.
+
+        Parameters
+        ----------
+        error
+            What is added to the state after each decision, shape ``(width,)``; None: nothing.
+        guesses
+            Whether it guesses where it knows no outcome, and says that it knows.
+        """
+        ...
+
+
 class ModelSimulator:
     """A learned model as a simulator; live, so that what it learns in the meantime counts.
 
@@ -121,6 +138,8 @@ class ModelSimulator:
         self.repeat = checked_count("repeat", repeat, 1, 10**6)
         self._actions = self._setting.shown.deeds()
         self._margin = float(min_margin)
+        self._error: Float1D | None = None
+        self._guesses = False
         self.prepare()
 
     @property
@@ -157,7 +176,49 @@ class ModelSimulator:
         """Settle who says what steps are worth; a live model may have learned it by now."""
         place = self._setting
         evaluates = BatchStepEvaluator.of(None, None, self._task, self.model, place.layout)
-        self._step = DreamStep(place, evaluates, self._task, self._actions, None, self._margin)
+        corrects = None if self._error is None else self._correct
+        self._within = DreamStep(
+            place, evaluates, self._task, self._actions, None, self._margin, guesses=self._guesses
+        )
+        self._last = replace(self._within, corrected=corrects)
+        self._low, self._high = self._limits()
+
+    def corrected(self, error: Float1D | None, *, guesses: bool = False) -> ModelSimulator:
+        """The same simulator, with a correction that ends at the model's limits; see `Correctable`.
+
+        Of a decision of several steps only the state after the last one is corrected. What a limit cuts off, a truck
+        that has come to rest, is as the limit says, and no correction leads beyond a limit: nothing of a state is
+        corrected by a larger share than what meets its limit first.
+        """
+        found = copy.copy(self)
+        found._error, found._guesses = error, guesses
+        found.prepare()
+        return found
+
+    def _limits(self) -> tuple[Float1D, Float1D]:
+        """The least and the most that the model knows of each column, shape ``(width,)``; infinite without a limit."""
+        layout = self._setting.layout
+        low, high = np.full(layout.width, -np.inf), np.full(layout.width, np.inf)
+        for target in self.model.targets:
+            known = self.model.property_model(target.type, target.property).limits
+            for k in layout.of_type(target.type):
+                column = layout.column(k, target.property)
+                low[column], high[column] = known.least, known.most
+        return low, high
+
+    def _correct(self, states: Float2D) -> Float2D:
+        """Predicted states with the error added, as far as limits allow."""
+        assert self._error is not None, "asked only then"
+        columns = np.flatnonzero(self._error)
+        error, found = self._error[columns], states[:, columns]
+        low, high = self._low[columns], self._high[columns]
+        room = np.where(error < 0.0, low - found, high - found) / error
+        room[(found <= low) | (found >= high)] = 0.0
+        share = np.clip(room.min(axis=1, initial=1.0), 0.0, 1.0)
+        corrected: Float2D = states + share[:, None] * self._error
+        # To the last bit: whether something rests is asked of zero itself.
+        corrected[:, columns] = np.clip(corrected[:, columns], low, high)
+        return corrected
 
     def step(self, states: Float2D, actions: NDArray[Any]) -> Steps:
         """Follow n actions from n states."""
@@ -168,11 +229,12 @@ class ModelSimulator:
         acts = np.asarray(actions)
         if isinstance(self.action_space, spaces.Box):
             acts = acts.astype(np.float64)
-        for _ in range(self.repeat):
+        for k in range(self.repeat):
             going = np.flatnonzero(known & ~ended)
             if not len(going):
                 break
-            stepped = self._step(found[going], once[going], acts[going])
+            follow = self._last if k == self.repeat - 1 else self._within
+            stepped = follow(found[going], once[going], acts[going])
             found[going] = stepped.vectors
             rewards[going] += stepped.rewards
             ended[going], known[going] = stepped.terminated, ~stepped.truncated

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,21 @@ from relgym.scene.objects import Float1D, Float2D
 
 __all__ = ["TreeSearch"]
 
+_COARSER: Final = 8
+"""How many of the fine cells' widths a coarse cell is wide: with 32 cells a property has four coarse ones."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TreeSearch:
     """Grows a tree of states where it has hardly been, and takes the best branch.
 
     Sequences of actions that are drawn about a mean stay this side of an obstacle when the way round it pays less at
-    first. The tree goes wherever the world lets it: it keeps, of every cell of a coarse grid over the properties that
-    change, the best branch, and grows again from cells that were seldom grown from (cells as in Go-Explore, Ecoffet et
-    al. 2021; kinodynamic trees, LaValle and Kuffner 2001, the RRT that the thesis wished for, §5.1). While it grows,
+    first. The tree goes wherever the world lets it: it keeps, of every cell of a grid over the properties that change,
+    the best branch, and grows again from cells that were seldom grown from (cells as in Go-Explore, Ecoffet et al.
+    2021; kinodynamic trees, LaValle and Kuffner 2001, the RRT that the thesis wished for, §5.1). There are two grids,
+    and each batch grows from one: in fine cells states that differ a little stay apart, as a narrow goal asks for; but
+    there are so many of them that nearly every state is the first in its own, and none is rare. Of the coarse ones
+    those far from all that is usual are soon told from the others. While it grows,
     branches of different lengths are compared as if what remains of the horizon paid the mean reward of all steps of
     the tree. The plan is a whole branch: one that ends the episode or lasts to the horizon, or, with curiosity, leads
     to a step of unknown outcome. Of others nobody knows what they lead to: who races towards a goal does well until
@@ -44,7 +50,8 @@ class TreeSearch:
     hold
         Most decisions that an action is held for; the numbers tried are the powers of two up to it.
     cells
-        Intervals that the range of each changing property is cut into.
+        Intervals that the range of each changing property is cut into by the fine grid; an eighth of it by the coarse
+        one.
     greedy
         Share of the expansions that begin at the best branches so far, in [0, 1].
     patience
@@ -61,12 +68,12 @@ class TreeSearch:
     """
 
     horizon: int = 50
-    expansions: int = 4_096
+    expansions: int = 8_192
     batch: int = 128
     hold: int = 8
     cells: int = 32
     greedy: float = 0.3
-    patience: int = 2_048
+    patience: int = 4_096
     refine: Search | None = None
 
     def __post_init__(self) -> None:
@@ -166,6 +173,17 @@ class TreeSearch:
 
 
 @dataclass
+class _Grid:
+    """Cells of one width: the best node of each, and how often it was grown from."""
+
+    cells: int
+    range: Float1D | None = None
+    members: dict[bytes, int] = field(default_factory=dict)
+    visits: dict[bytes, int] = field(default_factory=dict)
+    root_visits: int = 0
+
+
+@dataclass
 class _Tree:
     """States that were reached, each with the decision that led to it."""
 
@@ -194,18 +212,16 @@ class _Tree:
         self.states[0] = self.start
         self.rewards, self.worths = np.zeros(room), np.zeros(room)
         self.depths, self.parents = np.zeros(room, dtype=np.intp), np.full(room, -1, dtype=np.intp)
-        self._members: dict[bytes, int] = {}
-        self._visits: dict[bytes, int] = {}
         self._low, self._high = self.start.copy(), self.start.copy()
-        self._sizes = np.full(len(self.start), np.inf)
-        self._root_visits = 0
+        self._grids = [_Grid(cells) for cells in sorted({self.cells, max(2, self.cells // _COARSER)})]
         self._place(np.zeros(1, dtype=np.intp))
 
     def chosen(self, count: int, greedy: float, rng: np.random.Generator) -> NDArray[np.intp]:
         """Nodes to grow from: the best of seldom visited cells, and of all the best. The root always is one."""
-        keys = [key for key, node in self._members.items() if self.depths[node] < self.horizon]
-        nodes = np.array([0, *(self._members[key] for key in keys)], dtype=np.intp)
-        visits = np.array([self._root_visits, *(self._visits[key] for key in keys)], dtype=np.float64)
+        grid = self._grids[int(rng.integers(len(self._grids)))]
+        keys = [key for key, node in grid.members.items() if self.depths[node] < self.horizon]
+        nodes = np.array([0, *(grid.members[key] for key in keys)], dtype=np.intp)
+        visits = np.array([grid.root_visits, *(grid.visits[key] for key in keys)], dtype=np.float64)
         weights = 1.0 / np.sqrt(1.0 + visits)
         drawn = rng.choice(len(nodes), size=count, p=weights / weights.sum())
         eager = rng.random(count) < greedy
@@ -214,9 +230,9 @@ class _Tree:
             drawn[eager] = best[rng.integers(len(best), size=int(eager.sum()))]
         for k in drawn.tolist():
             if k:
-                self._visits[keys[k - 1]] += 1
+                grid.visits[keys[k - 1]] += 1
             else:
-                self._root_visits += 1
+                grid.root_visits += 1
         return nodes[drawn]
 
     def scores(self, nodes: NDArray[np.intp]) -> Float1D:
@@ -287,23 +303,34 @@ class _Tree:
             return
         span = self._high - self._low
         # Powers of two: ranges grow as the tree does, and cells are to stay what they are for a while.
-        sizes = np.exp2(np.ceil(np.log2(np.where(span > 0.0, span, 1.0)))) / self.cells
-        sizes[span == 0.0] = np.inf  # what doesn't change tells nothing apart
-        if not np.array_equal(sizes, self._sizes):
-            self._sizes = sizes
-            members, self._members, self._visits = list(self._members.values()), {}, {}
-            self._place(np.array(members, dtype=np.intp))
+        range_ = np.exp2(np.ceil(np.log2(np.where(span > 0.0, span, 1.0))))
+        range_[span == 0.0] = np.inf  # what doesn't change tells nothing apart
+        for grid in self._grids:
+            if grid.range is None or not np.array_equal(range_, grid.range):
+                grid.range = range_
+                members, grid.members, grid.visits = list(grid.members.values()), {}, {}
+                self._place(np.array(members, dtype=np.intp), grid)
         self._place(nodes)
 
-    def _place(self, nodes: NDArray[np.intp]) -> None:
-        grid = np.floor((self.states[nodes] - self.start) / self._sizes).astype(np.int16)
+    def _place(self, nodes: NDArray[np.intp], only: _Grid | None = None) -> None:
+        """Let nodes take the cells of all grids, or of one, that they are the best of."""
         scores = self.scores(nodes)
-        for node, cell, score in zip(nodes.tolist(), grid, scores.tolist(), strict=True):
-            key = cell.tobytes()
-            old = self._members.get(key)
-            if old is None or score > float(self.scores(np.array([old]))[0]):
-                self._members[key] = node
-                self._visits.setdefault(key, 0)
+        for grid in self._grids if only is None else (only,):
+            size = np.inf if grid.range is None else grid.range / grid.cells
+            where = np.floor((self.states[nodes] - self.start) / size).astype(np.int16)
+            keys = [row.tobytes() for row in where]
+            olds = [grid.members.get(key, -1) for key in keys]
+            best = dict(
+                zip(
+                    keys,
+                    np.where(np.array(olds) < 0, -np.inf, self.scores(np.array(olds))).tolist(),
+                    strict=True,
+                )
+            )
+            for node, key, score in zip(nodes.tolist(), keys, scores.tolist(), strict=True):
+                if score > best[key] or key not in grid.members:
+                    grid.members[key], best[key] = node, score
+                    grid.visits.setdefault(key, 0)
 
     def best(self) -> int:
         """The branch that is worth most: of whole ones, if there are any."""
@@ -315,7 +342,7 @@ class _Tree:
             found = self.ended
         if found >= 0:
             return found
-        nodes = np.array(list(self._members.values()), dtype=np.intp)
+        nodes = np.array(list(self._grids[-1].members.values()), dtype=np.intp)
         scores = self.scores(nodes)
         if (value := self.objective.value) is not None:
             scores += self.objective.discount ** self.depths[nodes] * value(self.states[nodes])

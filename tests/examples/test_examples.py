@@ -17,6 +17,10 @@ RUNS = {
     "periodic_law.py": ([], "+ 0.4605 sin(0.36319 x1) + 0.1947 cos(0.36319 x1)"),
     "saturating_law.py": ([], "saturating: clip(0.799"),
     "plan_mountain_car.py": (["--steps", "300", "--episodes", "0"], "0 of 0 reach the flag"),
+    "plan_ball.py": (
+        ["--decisions", "22", "--expansions", "64", "--episodes", "1"],
+        "of 1 balls stay at the goal after 22 real decisions",
+    ),
     "plan_truck.py": (
         ["--steps", "62", "--random_steps", "60", "--episodes", "1"],
         "of 1 episodes end on the goal after 62 real steps",

@@ -1,13 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from simulated import Line
 
 from relgym.errors import ConfigError
-from relgym.planning import CrossEntropy, Planner
+from relgym.planning import CrossEntropy, Planner, Steps
 
 SEARCH = CrossEntropy(horizon=6, candidates=64, rounds=4)
 
@@ -46,6 +48,56 @@ def test_plans_are_looked_at_again_after_so_many_decisions() -> None:
         x = x + 0.5 * np.asarray(action, dtype=np.float64) * 0.0
         state[0].plan.states[:] = x  # the world as it was predicted
     assert world.calls == 2
+
+
+@dataclass
+class Advised(Line):
+    """A line that takes advice: who doubts it adds to what it predicts, and it can guess what lies below -2."""
+
+    error: NDArray[np.float64] | None = None
+    guesses: bool = False
+
+    def corrected(self, error: NDArray[np.float64] | None, *, guesses: bool = False) -> Advised:
+        return replace(self, error=error, guesses=guesses)
+
+    def step(self, states: NDArray[np.float64], actions: NDArray[Any]) -> Steps:
+        found = super().step(states, actions)
+        after = states + actions if self.guesses else found.states
+        after = after if self.error is None else after + self.error
+        off = np.abs(after[:, 0] - 3.0)
+        return Steps(after, -off, off < 0.05, found.known | self.guesses)
+
+
+def drift(planner: Planner, wind: float, x: float = 0.0) -> tuple[list[float], Any]:
+    """Where a line leads whose wind nobody told the planner of."""
+    state, seen = None, [x]
+    for _ in range(8):
+        action, state = planner.predict(np.array([seen[-1]]), state)
+        seen.append(float(seen[-1] + np.asarray(action, dtype=np.float64)[0] + wind))
+        if abs(seen[-1] - 3.0) < 0.05:
+            break
+    return seen, state
+
+
+def test_what_it_was_off_by_once_is_expected_again() -> None:
+    seen, (thread,) = drift(Planner(Advised(), SEARCH, commit=6), -0.3)
+    assert thread.surprises == 1 and thread.error == pytest.approx([-0.3])
+    assert abs(seen[-1] - 3.0) < 0.3
+    _, (other,) = drift(Planner(Advised(), SEARCH, commit=6, adapts=False), -0.3)
+    assert other.surprises > 1 and other.error is None
+
+
+def test_an_error_that_is_over_is_forgotten() -> None:
+    planner = Planner(Advised(), SEARCH, commit=6)
+    _, (thread,) = play(planner, push=-1.0)
+    assert thread.error is None and thread.surprises == 2  # the push, and that it was one push only
+
+
+def test_where_no_outcome_is_known_it_plans_with_guesses() -> None:
+    seen, (thread,) = drift(Planner(Advised(), SEARCH), 0.0, x=-5.0)
+    assert abs(seen[-1] - 3.0) < 0.3 and thread.surprises == 0
+    lost, _ = drift(Planner(Advised(), SEARCH, safe=True), 0.0, x=-5.0)
+    assert lost[-1] < 2.0
 
 
 def test_batches_are_planned_one_by_one_and_forgotten_where_episodes_begin() -> None:

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from relgym import WorldModel
-from relgym.planning.review import learned_again, right
+from relgym.planning.review import learned_again, length, missed, mixed, right
 from relgym.scene.objects import Transition
 from relgym.wrappers.dyna.recorder import TransitionRecorder
 
@@ -44,3 +44,39 @@ def test_each_transition_is_told_from_the_others() -> None:
 def test_nothing_is_right_of_nothing() -> None:
     env, _ = cart_steps(1)
     assert right(WorldModel(env.schema), []).tolist() == []
+
+
+def test_the_steps_of_all_episodes_take_turns(rng: np.random.Generator) -> None:
+    episodes = np.array([0, 0, 0, 0, 1, 1, 2, 2, 2])
+    order = mixed(episodes, rng)
+    assert sorted(order) == list(range(9))
+    turns = [sorted(episodes[order[begin:end]].tolist()) for begin, end in ((0, 3), (3, 6), (6, 8), (8, 9))]
+    assert turns == [[0, 1, 2], [0, 1, 2], [0, 2], [0]]
+    assert mixed(episodes[:0], rng) == []
+
+
+def test_what_a_model_states_makes_its_length() -> None:
+    env, seen = cart_steps(60)
+    assert length(WorldModel(env.schema)) == 0.0
+    model = learned_again(WorldModel(env.schema), seen, rng=np.random.default_rng(0))
+    numbers = sum(
+        len({round(weight, 9) for role in mode.roles for _, weight in role.terms}) + (mode.intercept != 0.0)
+        for target in model.targets
+        for mode in model.modes(target.type, target.property)
+    )
+    assert numbers <= length(model) < numbers + 10
+
+
+def test_what_stays_the_same_in_an_episode_is_missed_once() -> None:
+    env, seen = cart_steps(60)
+    model = learned_again(WorldModel(env.schema), seen, rng=np.random.default_rng(0))
+    good = [seen[k] for k in np.flatnonzero(right(model, seen))[:6]]
+
+    def slower(told: Transition, by: float) -> Transition:
+        return replace(told, after=told.after.replace({("truck", "vx"): told.after["truck"]["vx"] - by}))
+
+    episodes = np.array([0, 0, 0, 1, 1, 1])
+    assert missed(model, good, episodes) == 0
+    assert missed(model, [slower(told, 0.5) for told in good], episodes) == 2
+    assert missed(model, [slower(told, 0.5 + 0.1 * k) for k, told in enumerate(good)], episodes) == 6
+    assert missed(model, good, episodes[::-1]) == 0

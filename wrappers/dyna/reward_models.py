@@ -277,6 +277,7 @@ class LearnedRewardModel(RewardFunctions):
         """Keep the latest; of those before, each is as likely to be kept as any other (Vitter 1985)."""
         if ended:
             self._ends.append(lesson)
+            self._reviewed = (0, ())  # which modes are right of ends is what changes most with one more
             return
         self._latest.append(lesson)
         if len(self._latest) <= _REMEMBERED:
@@ -291,16 +292,82 @@ class LearnedRewardModel(RewardFunctions):
 
     def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         """Rewards and ends as modes predict them; NaN where none does."""
+        rewards, ended, _ = self.outcomes(self.joined(layout, before, actions, after))
+        return TaskOutcome(rewards, ended, np.zeros(len(before), dtype=bool))
+
+    def joined(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float2D:
+        """State vectors of its own model, of n steps: what `outcomes` takes."""
         small = self.model.schema.layout()
         vectors = np.zeros((len(before), small.width))
         for k, name in enumerate(small.names):
             vectors[:, small.slice(k)] = self._part(name, layout, before, actions, after)
-        found = self.model.predict_batch(small, vectors)
-        task = small.index(TASK)
+        return vectors
+
+    def outcomes(self, vectors: Float2D) -> tuple[Float1D, NDArray[np.bool_], NDArray[np.int64]]:
+        """Rewards, ends, and by which modes of reward and of termination; of n steps.
+
+        Parameters
+        ----------
+        vectors
+            As `joined` makes them, shape ``(n, width)``; what they say of the task doesn't count.
+
+        Returns
+        -------
+        Shapes ``(n,)``, ``(n,)`` and ``(n, 2)``; rewards are NaN where nothing is known.
+        """
+        small = self.model.schema.layout()
+        found = self.model.predict_batch(small, self.unsaid(vectors))
         known = found.ok & self._ever_together(found)
-        rewards = np.where(known, found.vectors[:, small.column(task, "reward")], np.nan)
-        ended = found.vectors[:, small.column(task, "terminated")] > 0.5
-        return TaskOutcome(rewards, ended & known, np.zeros(len(before), dtype=bool))
+        reward, ended = (found.vectors[:, column] for column in self._told_columns())
+        modes = np.array(_pairs(found), dtype=np.int64).reshape(len(vectors), 2)
+        return np.where(known, reward, np.nan), (ended > 0.5) & known, modes
+
+    def claims(self, vectors: Float2D, ended: NDArray[np.bool_]) -> dict[int, Float1D]:
+        """What each mode of the reward says of n steps, whether it holds there or not.
+
+        Parameters
+        ----------
+        vectors
+            As for `outcomes`.
+        ended
+            Whether the step ends the episode, shape ``(n,)``.
+
+        Returns
+        -------
+        By the modes' ids, shape ``(n,)`` each.
+        """
+        small = self.model.schema.layout()
+        found: dict[int, Float1D] = {}
+        for mode in self.model.modes(TASK, "reward"):
+            said = np.full(len(vectors), mode.intercept)
+            for role in mode.roles:
+                for prop, weight in role.terms:
+                    if prop.endswith("'"):  # of its own targets: whether the step ends the episode
+                        said += weight * ended
+                    else:
+                        said += weight * vectors[:, small.column(small.index(role.type), prop)]
+            found[mode.id] = said
+        return found
+
+    def lessons(self) -> Float2D:
+        """The real steps that it remembers, as `joined` makes them, with their rewards and ends; ``(n, width)``."""
+        known = [*self._ends, *self._latest, *self._earlier]
+        return np.stack(known) if known else np.zeros((0, self.model.schema.layout().width))
+
+    def said(self, lessons: Float2D) -> tuple[Float1D, NDArray[np.bool_]]:
+        """Rewards and ends of `lessons`."""
+        reward, ended = (lessons[:, column] for column in self._told_columns())
+        return reward, ended > 0.5
+
+    def unsaid(self, lessons: Float2D) -> Float2D:
+        """`lessons` without their rewards and ends, as `joined` makes them."""
+        asked = lessons.copy()
+        asked[:, self._told_columns()] = 0.0
+        return asked
+
+    def _told_columns(self) -> list[int]:
+        small = self.model.schema.layout()
+        return [small.column(small.index(TASK), prop) for prop in _TOLD]
 
     def _ever_together(self, found: BatchPrediction) -> NDArray[np.bool_]:
         """Where reward and termination come from modes that were right of one and the same real step."""
@@ -312,15 +379,11 @@ class LearnedRewardModel(RewardFunctions):
 
     def _right_together(self) -> set[tuple[int, int]]:
         """Modes of reward and termination that are right of some remembered step."""
-        lessons = [*self._ends, *self._latest, *self._earlier]
-        if not lessons:
+        said = self.lessons()
+        if not len(said):
             return set()
-        small = self.model.schema.layout()
-        said = np.stack(lessons)
-        columns = [small.column(small.index(TASK), prop) for prop in _TOLD]
-        asked = said.copy()
-        asked[:, columns] = 0.0
-        found = self.model.predict_batch(small, asked)
+        columns = self._told_columns()
+        found = self.model.predict_batch(self.model.schema.layout(), self.unsaid(said))
         right = found.ok & (np.abs(found.vectors - said)[:, columns] <= _RIGHT).all(axis=1)
         return {pair for pair, good in zip(_pairs(found), right.tolist(), strict=True) if good}
 

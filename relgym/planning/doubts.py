@@ -1,0 +1,143 @@
+"""What steps are worth as far as the real ones bear it out: rewards of rules that few examples have shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from relgym.envs.tasks import RewardFunctions, TaskOutcome
+from relgym.numeric.version_space import VersionSpace
+from relgym.scene.objects import TASK, Float2D, SceneLayout
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel
+
+__all__ = ["DoubtedTask"]
+
+_RIGHT: Final = 1e-6
+"""How far a right verdict may be off."""
+
+_LIKELY: Final = 0.5
+"""What always ended the episode does so where at least this share of the rules holds."""
+
+_REVIEW: Final = 10
+"""Real steps after which the rules are drawn again at the latest, if no other mode was found and no episode ended."""
+
+
+class DoubtedTask(RewardFunctions):
+    """A learned reward model that says how much a step is worth in expectation over all short rules that fit.
+
+    A plan goes where a reward model promises most, so it goes where that is wrong: just beyond the threshold of a
+    bonus, which lies somewhere between what was seen to pay and what wasn't, or far outside of all that a rule was ever
+    right of. And of a bonus that was paid once or twice the model says nothing yet: a mode takes more examples.
+
+    Here each pair of modes of reward and end is compared with the rules (`VersionSpace`) that hold of all remembered
+    steps of which the pair was right and of none of which its claim is wrong. Where only a share of them holds the step
+    is worth that share of what the model says; the rest counts as if the worst of all known modes held. And what was
+    paid beyond the model's word is expected again by the share of the rules that tell these steps from all others,
+    which is why an agent returns to where it was rewarded, and stays near to it.
+
+    Parameters
+    ----------
+    model
+        The reward model; live.
+    seed
+        Of the rules.
+
+    Notes
+    -----
+    Cost: to draw the rules some tens of milliseconds for each pair of modes, when an episode has ended or another mode
+    was found; to evaluate, as much again as the model itself.
+    """
+
+    learned: Final = True
+
+    def __init__(self, model: LearnedRewardModel, *, seed: int = 0) -> None:
+        self.model = model
+        self._rng = np.random.default_rng([seed, 6])
+        self._state: tuple[Any, ...] = ()
+        self._seen = 0
+        self._groups: dict[tuple[int, int], _Group] = {}
+        self._beyond: _Beyond | None = None
+
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
+        """Expected rewards, and ends as the model says; NaN where it knows nothing."""
+        vectors = self.model.joined(layout, before, actions, after)
+        rewards, ended, modes = self.model.outcomes(vectors)
+        self._review()
+        known = np.isfinite(rewards)
+        worth = rewards.copy()
+        for pair, group in self._groups.items():
+            rows = np.flatnonzero(known & (modes[:, 0] == pair[0]) & (modes[:, 1] == pair[1]))
+            if not len(rows):
+                continue
+            share = group.rules.share(vectors[rows])
+            rows, share = rows[share < 1.0], share[share < 1.0]
+            if not len(rows):
+                continue
+            others = self.model.claims(vectors[rows], ended[rows])
+            worst = np.minimum.reduce([group.worst + np.zeros(len(rows)), *others.values()])
+            worth[rows] = share * rewards[rows] + (1.0 - share) * np.minimum(worst, rewards[rows])
+        if self._beyond is not None:
+            share = self._beyond.rules.share(vectors)
+            if self._beyond.ends:  # or it would be paid in one plan again and again
+                ended = ended | (share >= _LIKELY)
+                share = np.where(ended, share, 0.0)
+            worth += self._beyond.surplus * share
+        return TaskOutcome(worth, ended, np.zeros(len(before), dtype=bool))
+
+    def _review(self) -> None:
+        """Draw the rules again when there is something new to tell apart."""
+        own = self.model
+        if own.model.seen == self._seen:
+            return
+        self._seen = own.model.seen
+        lessons = own.lessons()
+        paid, over = own.said(lessons)
+        modes = tuple(mode.id for prop in ("reward", "terminated") for mode in own.model.modes(TASK, prop))
+        state = own.model.seen // _REVIEW, int(over.sum()), modes
+        if state == self._state:
+            return
+        self._state = state
+        rewards, ended, pairs = own.outcomes(lessons)
+        right = (np.abs(paid - rewards) <= _RIGHT) & (ended == over)
+        claims = own.claims(lessons, over)
+        # Where nothing is known: beyond the most that any mode would have said.
+        told = np.where(np.isfinite(rewards), rewards, np.max([*claims.values()], axis=0, initial=-np.inf))
+        surplus = np.where(np.isfinite(told), paid - told, 0.0)
+        features = own.unsaid(lessons)
+        self._groups = {}
+        for reward, end in sorted(set(map(tuple, pairs[right].tolist()))):
+            mine = (pairs[:, 0] == reward) & (pairs[:, 1] == end)
+            ends_so = bool(over[mine & right].all())
+            false = (np.abs(claims[reward] - paid) > _RIGHT) | (over != ends_so)
+            if not false.any():
+                continue
+            rules = VersionSpace(features[mine & right], features[false], rng=self._rng)
+            if rules.found:
+                worst = float(paid[mine & ~right].min(initial=np.inf))
+                self._groups[reward, end] = _Group(rules, worst)
+        self._beyond = None
+        if (most := float(surplus.max(initial=0.0))) > _RIGHT:
+            # What is paid in several places for several reasons isn't told apart from the rest by one rule.
+            more = surplus >= 0.5 * most
+            rules = VersionSpace(features[more], features[surplus <= _RIGHT], rng=self._rng)
+            if rules.found:
+                self._beyond = _Beyond(rules, float(surplus[more].mean()), bool(over[more].all()))
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """A pair of modes: rules that tell where it holds, and the least that was paid where it was wrong."""
+
+    rules: VersionSpace
+    worst: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Beyond:
+    """What was paid beyond the model's word: rules that tell where, how much, and whether it always ended episodes."""
+
+    rules: VersionSpace
+    surplus: float
+    ends: bool

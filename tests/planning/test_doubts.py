@@ -1,0 +1,78 @@
+"""A car that is paid for stopping near a mark: what it expects of places where it has hardly been."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relgym.planning.doubts import DoubtedTask
+from relgym.scene.objects import Float1D, Float2D, ObjectType, Target, Transition
+from relgym.scene.schema import SceneSchema
+from relgym.wrappers.dyna.reward_models import LearnedRewardModel
+
+CAR = ObjectType("car", ("x", "v"))
+SCHEMA = SceneSchema((CAR,), (("car", "car"),), targets=(Target("car", "x"), Target("car", "v")))
+
+
+def step(x: float, v: float, after: float) -> tuple[Transition, float, bool]:
+    """From x at speed v to x at speed `after`; it costs 0.02, a stop ends it, and one within 1 of the mark pays 2."""
+    moved = Transition(SCHEMA.scene({"car": [x - after, v]}), SCHEMA.scene({"car": [x, after]}))
+    return moved, -0.02 + 2.0 * (after == 0.0 and abs(x) <= 1.0), after == 0.0
+
+
+def taught(stops: list[float], rng: np.random.Generator) -> LearnedRewardModel:
+    """Has driven about, stopped far from the mark now and then, and at these places in the end."""
+    model = LearnedRewardModel(SCHEMA, {("car", "x"), ("car", "v")})
+    lessons = [
+        step(rng.uniform(-20.0, 20.0), rng.uniform(1.0, 5.0), rng.uniform(1.0, 5.0)) for _ in range(150)
+    ]
+    lessons += [
+        step(side * rng.uniform(3.0, 20.0), rng.uniform(1.0, 5.0), 0.0) for side in (-1, 1) for _ in range(8)
+    ]
+    for k in rng.permutation(len(lessons)):
+        model.learn_step(*lessons[k][:2], terminated=lessons[k][2])
+    for x in stops:
+        moved, paid, over = step(x, rng.uniform(1.0, 5.0), 0.0)
+        model.learn_step(moved, paid, terminated=over)
+    return model
+
+
+def expected(model: LearnedRewardModel | DoubtedTask, places: list[float], after: float = 0.0) -> Float1D:
+    """Of coming to these places at that speed."""
+    states: Float2D = np.array([[x, after] for x in places])
+    before = np.array([[x - after, 2.0] for x in places])
+    return model.evaluate(SCHEMA.layout(), before, np.zeros((len(places), 0)), states).rewards
+
+
+def test_what_was_paid_twice_is_expected_again_there_and_less_far_away(rng: np.random.Generator) -> None:
+    model = taught([0.4, -0.3], rng)
+    assert expected(model, [0.0])[0] == pytest.approx(-0.02)  # two examples are no mode yet
+    here, near, far, moving = (
+        *expected(DoubtedTask(model), [0.0, 1.5, 10.0]),
+        *expected(DoubtedTask(model), [0.0], 2.0),
+    )
+    assert here == pytest.approx(1.98)
+    assert here > near > far
+    assert far == pytest.approx(-0.02) and moving < 0.5
+
+
+def test_a_bonus_is_surest_where_it_was_paid(rng: np.random.Generator) -> None:
+    model = taught(rng.uniform(-0.6, 0.6, 14).tolist(), rng)
+    assert expected(model, [0.0]) == pytest.approx([1.98])
+    here, outside = expected(DoubtedTask(model), [0.0, 1.2])  # what is paid there nobody has seen
+    assert here == pytest.approx(1.98)
+    assert outside < 1.9
+
+
+def test_it_says_nothing_where_nothing_is_known() -> None:
+    assert np.isnan(expected(DoubtedTask(LearnedRewardModel(SCHEMA, {("car", "x")})), [0.0])).all()
+
+
+def test_it_learns_on_with_the_model(rng: np.random.Generator) -> None:
+    model = taught([], rng)
+    task = DoubtedTask(model)
+    assert expected(task, [0.0])[0] < 0.0
+    for x in (0.4, -0.3):
+        moved, paid, over = step(x, 2.0, 0.0)
+        model.learn_step(moved, paid, terminated=over)
+    assert expected(task, [0.0])[0] == pytest.approx(1.98)
