@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.mode import NOISE, Role
+from relgym.clustering.population import ClusterReport
 from relgym.scene.objects import SceneLayout
 from relgym.thesis.examples import Arrangement, Examples
 from relgym.thesis.modes import Cluster, roles_of
@@ -69,7 +70,7 @@ class Clusterer:
         return np.flatnonzero(self.labels == number)
 
     # ------------------------------------------------------------------ Figure 3.2
-    def learn_one(self, layout: SceneLayout, target: int, x: Floats, y: float) -> int:
+    def learn_one(self, layout: SceneLayout, target: int, x: Floats, y: float) -> ClusterReport:
         """Take up an example.
 
         Parameters
@@ -81,7 +82,7 @@ class Clusterer:
 
         Returns
         -------
-        The mode it belongs to.
+        The mode it belongs to, and what became of the modes.
         """
         group = self.examples.number_of(layout, target)
         number = self.examples.add(group, x, y)
@@ -89,7 +90,7 @@ class Clusterer:
         if number == len(self._labels):
             self._labels = np.concatenate([self._labels, np.zeros_like(self._labels)])
             self._errors = {k: np.concatenate([e, np.empty_like(e)]) for k, e in self._errors.items()}
-        errors = []
+        errors, known = [], [cluster.number for cluster in self.clusters]
         for cluster in self.clusters:
             errors.append(cluster.error(arrangement, row, y))
             self._errors[cluster.number][number] = errors[-1]
@@ -99,7 +100,13 @@ class Clusterer:
             for _ in range(self.settings.em_iterations):
                 if not self._discover():
                     break
-        return int(self._labels[number])
+        now = [cluster.number for cluster in self.clusters]
+        return ClusterReport(
+            int(self._labels[number]),
+            tuple(k for k in now if self._errors[k][number] <= self._tolerance),
+            tuple(k for k in now if k not in known),
+            tuple(k for k in known if k not in now),
+        )
 
     def _nearest_one(self, errors: list[float]) -> int:
         if not errors:
