@@ -117,13 +117,14 @@ class Clusterer:
         if len(self._noise) < self._wait:
             return False
         noise = np.array(sorted(self._noise), dtype=np.intp)
+        # Samples are drawn by chance: one search may miss what the next one finds. But where nothing fits, as with too
+        # small a σ, a search for every example would take hours: noise grows by a T-th part between them.
+        self._wait = len(self._noise) + max(1, len(self._noise) // self.settings.min_examples)
         found = self._constant(noise) if self.settings.constants else None
-        largest = 0
+        found = found or self._line(noise)
         if found is None:
-            found, largest = self._line(noise)
-        if found is None:
-            self._wait = len(self._noise) + max(1, self.settings.min_examples - largest)
             return False
+        waited = self._wait
         self._wait = self.settings.min_examples
         cluster, members = found
         known = {c.number for c in self.clusters}
@@ -137,7 +138,7 @@ class Clusterer:
             self._refit(cluster)
         self._converge()
         if {c.number for c in self.clusters} <= known:  # EM gave its examples away: more of them may keep it
-            self._wait = len(self._noise) + 1
+            self._wait = waited
             return False
         return True
 
@@ -153,20 +154,18 @@ class Clusterer:
         members = noise[self.examples.y[noise] == values[best]]
         return Cluster(self._next, (own,), float(values[best])), members
 
-    def _line(self, noise: Rows) -> tuple[tuple[Cluster, Rows] | None, int]:
-        """A line through at least T examples of an arrangement, or the size of the largest set that lies on one."""
-        largest = 0
+    def _line(self, noise: Rows) -> tuple[Cluster, Rows] | None:
+        """A line through at least T examples of an arrangement."""
         for group, arrangement in enumerate(self.examples.arrangements):
             rows = noise[self.examples.groups[noise] == group]
             if len(rows) < self.settings.min_examples:
                 continue
             x, y = self.examples.x(group, rows), self.examples.y[rows]
             found = search(x, y, self.settings, self._rng)
-            largest = max(largest, found.size)
             if found.line is not None and found.size >= self.settings.min_examples:
                 roles = roles_of(found.line, arrangement)
-                return (Cluster(self._next, roles, found.line.intercept), rows[found.inliers]), largest
-        return None, largest
+                return Cluster(self._next, roles, found.line.intercept), rows[found.inliers]
+        return None
 
     # ------------------------------------------------------------------ §3.2.5
     def _unified(self, new: Cluster, members: Rows) -> Cluster | None:

@@ -199,8 +199,8 @@ DEVIATIONS: Final = (
         "both",
         "§3.2.2",
         "RANSAC whenever there is enough noise",
-        "after a search whose best line has k inliers, again when there are T - k more examples of noise",
-        "fewer can't complete a mode; it is the program's rule, and only saves time",
+        "again when there is a T-th part more noise, one example at least",
+        "it only saves time; the program waited for T - k more, if the best line had k inliers, and missed modes by it",
     ),
     Deviation(
         "both",
