@@ -24,7 +24,7 @@ import numpy as np
 
 from relgym.envs.ball_rooms import CLEARANCE
 
-__all__ = ["TOLD_APART", "ThesisScenes"]
+__all__ = ["SCENES", "TOLD_APART", "ThesisScenes"]
 
 Span = tuple[float, float]
 
@@ -128,6 +128,14 @@ class ThesisScenes:
             "ball_speed": speeds[0 if lies else 1],
         }
         return {**found, **case}
+
+
+SCENES: Final[Mapping[int, ThesisScenes]] = {
+    1: ThesisScenes(),
+    2: ThesisScenes(),
+    3: ThesisScenes(),
+}
+"""Of experiments 1, 2 and 3. Experiment 2 changes "some other simulation parameters", too (§4.4)."""
 
 
 def _stands(case: Mapping[str, Any]) -> str:
