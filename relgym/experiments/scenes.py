@@ -131,7 +131,22 @@ class ThesisScenes:
 
 
 SCENES: Final[Mapping[int, ThesisScenes]] = {
-    1: ThesisScenes(),
+    1: ThesisScenes(
+        radius=(0.016, 0.026),
+        box_width=(1.0, 1.8),
+        box_height=(0.2, 0.5),
+        ramp_base=(1.4, 2.0),
+        gap=(32.0, 50.0),
+        sink=(0.0001, 0.0012),
+        floor_speed=(2.8, 4.4),
+        air_speed=(0.7, 2.6),
+        over_box=(0.03, 0.08),
+        over_ramp=(0.02, 0.1),
+        over_both=(0.03, 0.08),
+        over_gap=(0.03, 0.08),
+        on_floor=0.1,
+        on_box=0.0,
+    ),
     2: ThesisScenes(),
     3: ThesisScenes(),
 }
