@@ -4,10 +4,11 @@ What is known (§4.1, §4.2): a room with a floor, a ceiling and two walls; a bo
 places for the ball, two directions; 200 steps of a frictionless or a rough world; sizes and places vary with the seed,
 and everything is shifted at random. Of the engine: what the tables' coefficients tell (`relgym.envs.physics`).
 
-What is fitted, to the counts of tables 4.2 and 4.9, on seeds that are used nowhere else: all numbers of `SCENES`. Those of
-experiment 1 differ from the others': 334 bounces on level surfaces among 9,169 examples of flight are one in 27 steps, so
-balls fall from less than their diameters' tenfold; and clauses tell most of these bounces from sliding by how deep they
-go (Table 4.5), a twentieth of the diameter, so balls are small.
+What is fitted, to the counts of tables 4.2 and 4.9, on seeds that are used nowhere else: all numbers of `SCENES`. Those
+of experiment 1 differ from the others': of 9,169 examples of flight 334 end on a level surface, one in 27, so balls fall
+from low; and most of these bounces are told from sliding by how deep they go (Table 4.5), which is a twentieth of the
+diameter, so balls are small.
+
 The tables also tell where a ball begins: two of five balls lie on the floor (two in five examples slide), and those
 above a box often lie on it (clauses that mention boxes cover 772 examples of sliding and bouncing in experiment 2).
 

@@ -312,7 +312,10 @@ class _Lowering:
         """What an answer by modes says besides."""
         ids = model.classifier.modes
         if model.lost or not ids:
-            return {"state": "lost" if model.lost else "none"}
+            latest = [model.latest] if model.latest in ids else []  # it may be asked all the same
+            bound = [m for m in latest if not _open(bind(model.mode(m), situation.signature))]
+            found = tuple(self._mode(model, number, situation, one, body) for number in bound)
+            return {"state": "lost" if model.lost else "none", "modes": found}
         signature = situation.signature
         found = tuple(self._mode(model, number, situation, one, body) for number in ids)
         registers = {mode.id: mode.register for mode in found}
@@ -597,6 +600,10 @@ def _bound_sum(
         return None
     terms = [(ir.CONSTANT, float(binding.intercept))]
     return ir.Sum((*terms, *((column(c), float(w)) for c, w in binding.fixed)))
+
+
+def _open(binding: Binding | None) -> bool:
+    return binding is None or bool(binding.open)
 
 
 def _piece(piece: Piece, where: Mapping[str, int]) -> ir.Sum:

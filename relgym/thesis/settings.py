@@ -244,8 +244,8 @@ DEVIATIONS: Final = (
         "§3.2.5",
         "a new mode is unified with one existing mode",
         "and the unified one, which is new, with the next",
-        "of three flights at three speeds any two would do for a function of whatever differs between two scenes; where "
-        "a function is found for all, the others are to be discarded, too",
+        "of three flights at three speeds any two would do for a function of whatever differs between two scenes; "
+        "where a function is found for all, the others are to be discarded, too",
     ),
     Deviation(
         "both",
