@@ -5,7 +5,7 @@ places for the ball, two directions; 200 steps of a frictionless or a rough worl
 and everything is shifted at random. Of the engine: what the tables' coefficients tell (`relgym.envs.physics`).
 
 What is fitted, to the counts of tables 4.2 and 4.9, on seeds that are used nowhere else: all numbers of `SCENES`. Those
-of experiment 1 differ from the others': of 9,169 examples of flight 334 end on a level surface, one in 27, so balls fall
+of experiment 1 differ from the others': of 9,169 examples of flight 334 end on a level surface, so balls fall
 from low; and most of these bounces are told from sliding by how deep they go (Table 4.5), which is a twentieth of the
 diameter, so balls are small.
 
