@@ -21,6 +21,9 @@ Rows = NDArray[np.intp]
 
 _FIRST = 256
 
+_GROWTH = 20
+"""Noise grows by such a part between two searches: some 120 of them until there are 16,000 examples of it."""
+
 
 class Clusterer:
     """Modes of one target, and which of them each example belongs to.
@@ -118,8 +121,8 @@ class Clusterer:
             return False
         noise = np.array(sorted(self._noise), dtype=np.intp)
         # Samples are drawn by chance: one search may miss what the next one finds. But where nothing fits, as with too
-        # small a σ, a search for every example would take hours: noise grows by a T-th part between them.
-        self._wait = len(self._noise) + max(1, len(self._noise) // self.settings.min_examples)
+        # small a σ, a search for every example would take hours.
+        self._wait = len(self._noise) + max(1, len(self._noise) // _GROWTH)
         found = self._constant(noise) if self.settings.constants else None
         found = found or self._line(noise)
         if found is None:

@@ -91,6 +91,7 @@ def search(
     shown = x[:, varying]
     tolerance = settings.inlier_stds * settings.noise_variance**0.5
     best, draws, done = none, settings.draws, 0
+    verified: dict[tuple[tuple[int, ...], bytes], bool] = {}
     while done < draws:
         count = min(_AT_ONCE, draws - done)
         done += count
@@ -103,7 +104,11 @@ def search(
             found = Consensus(line, fits[:, k])
             if found.size <= best.size:
                 continue
-            if not _verified(x, found):
+            # Of few scenes many samples say the same: looking at what varies takes longer than the fit.
+            known = line.columns, found.inliers.tobytes()
+            if known not in verified:
+                verified[known] = _verified(x, found)
+            if not verified[known]:
                 continue
             if wanted is None and settings.cross_check and not _holds(x, y, found, settings):
                 continue

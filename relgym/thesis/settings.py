@@ -199,7 +199,7 @@ DEVIATIONS: Final = (
         "both",
         "§3.2.2",
         "RANSAC whenever there is enough noise",
-        "again when there is a T-th part more noise, one example at least",
+        "again when there is a twentieth part more noise",
         "it only saves time; the program waited for T - k more, if the best line had k inliers, and missed modes by it",
     ),
     Deviation(
