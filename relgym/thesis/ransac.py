@@ -91,7 +91,7 @@ def search(
     shown = x[:, varying]
     tolerance = settings.inlier_stds * settings.noise_variance**0.5
     best, draws, done = none, settings.draws, 0
-    verified: dict[tuple[tuple[int, ...], bytes], bool] = {}
+    verified = _Verifier(x)
     while done < draws:
         count = min(_AT_ONCE, draws - done)
         done += count
@@ -104,11 +104,7 @@ def search(
             found = Consensus(line, fits[:, k])
             if found.size <= best.size:
                 continue
-            # Of few scenes many samples say the same: looking at what varies takes longer than the fit.
-            known = line.columns, found.inliers.tobytes()
-            if known not in verified:
-                verified[known] = _verified(x, found)
-            if not verified[known]:
+            if not verified(found):
                 continue
             if wanted is None and settings.cross_check and not _holds(x, y, found, settings):
                 continue
@@ -212,14 +208,27 @@ def _spread(x: Floats, width: int, count: int, rng: np.random.Generator) -> Rows
     return chosen
 
 
-def _verified(x: Floats, found: Consensus) -> bool:
-    """Whether columns that seldom change took more values together than their weights alone could fit."""
-    assert found.line is not None, "only lines are tested"
-    rows = x[found.inliers][:, list(found.line.columns)]
-    seldom = [k for k in range(rows.shape[1]) if len(np.unique(rows[:, k])) < len(rows) / 2]
-    if not seldom:
-        return True
-    return len(np.unique(rows[:, seldom], axis=0)) >= len(seldom) + 1 + _VERIFYING
+class _Verifier:
+    """Whether columns that seldom change took more values together than their weights alone could fit.
+
+    Of few scenes many samples say the same, and counting values takes longer than the fit: answers are remembered.
+    """
+
+    def __init__(self, x: Floats) -> None:
+        self._x = x
+        self._known: dict[tuple[tuple[int, ...], bytes], bool] = {}
+
+    def __call__(self, found: Consensus) -> bool:
+        assert found.line is not None, "only lines are tested"
+        key = found.line.columns, found.inliers.tobytes()
+        if key not in self._known:
+            self._known[key] = self._holds(found.line.columns, found.inliers)
+        return self._known[key]
+
+    def _holds(self, columns: tuple[int, ...], inliers: NDArray[np.bool_]) -> bool:
+        rows = self._x[inliers][:, list(columns)]
+        seldom = [k for k in range(rows.shape[1]) if len(np.unique(rows[:, k])) < len(rows) / 2]
+        return not seldom or len(np.unique(rows[:, seldom], axis=0)) >= len(seldom) + 1 + _VERIFYING
 
 
 def _holds(x: Floats, y: Floats, found: Consensus, settings: ThesisSettings) -> bool:
