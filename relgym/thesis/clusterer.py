@@ -10,7 +10,7 @@ from relgym.clustering.population import ClusterReport
 from relgym.scene.objects import SceneLayout
 from relgym.thesis.examples import Arrangement, Examples
 from relgym.thesis.modes import Cluster, roles_of
-from relgym.thesis.ransac import search
+from relgym.thesis.ransac import search, varied
 from relgym.thesis.regression import fit
 from relgym.thesis.settings import ThesisSettings
 
@@ -242,7 +242,7 @@ class Clusterer:
         """M-step: fit the function to all its examples, each under its best casting; whether it changed.
 
         Forward-stepwise regression may miss the function that the examples lie on: one that explains fewer of them than
-        the present one isn't taken, so that likelihood never falls.
+        the present one isn't taken, so that likelihood never falls; nor one of what merely differs between two scenes.
         """
         members = self.members(cluster.number)
         if len(members) < self.settings.sample:
@@ -262,7 +262,10 @@ class Clusterer:
                     parts_y.append(y[here])
                     first = first or (arrangement, columns)
         assert first is not None, "a mode with examples has castings"
-        line = fit(np.concatenate(parts_x), np.concatenate(parts_y), self.settings.noise_variance)
+        x = np.concatenate(parts_x)
+        line = fit(x, np.concatenate(parts_y), self.settings.noise_variance)
+        if not varied(x[:, list(line.columns)]):
+            return False
         old, errors = (cluster.roles, cluster.intercept), self._errors[cluster.number]
         if not cluster.become(roles_of(line, first[0], first[1]), line.intercept):
             return False

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.thesis.regression import Line, fit, fit_samples
 from relgym.thesis.settings import ThesisSettings
 
-__all__ = ["Consensus", "search"]
+__all__ = ["Consensus", "search", "varied"]
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -208,8 +208,26 @@ def _spread(x: Floats, width: int, count: int, rng: np.random.Generator) -> Rows
     return chosen
 
 
-class _Verifier:
+def varied(rows: Floats) -> bool:
     """Whether columns that seldom change took more values together than their weights alone could fit.
+
+    Parameters
+    ----------
+    rows
+        Examples that lie on a line, the line's columns alone, shape ``(n, columns)``.
+    """
+    values = [len(np.unique(column)) for column in rows.T]
+    seldom = [k for k, count in enumerate(values) if count < len(rows) / 2]
+    # Together, and each by itself: beside a speed of many values a size of two tells one scene from another.
+    if not seldom:
+        return True
+    if min(values[k] for k in seldom) < 2 + _VERIFYING:
+        return False
+    return len(np.unique(rows[:, seldom], axis=0)) >= len(seldom) + 1 + _VERIFYING
+
+
+class _Verifier:
+    """`varied` of lines' inliers.
 
     Of few scenes many samples say the same, and counting values takes longer than the fit: answers are remembered.
     """
@@ -222,13 +240,8 @@ class _Verifier:
         assert found.line is not None, "only lines are tested"
         key = found.line.columns, found.inliers.tobytes()
         if key not in self._known:
-            self._known[key] = self._holds(found.line.columns, found.inliers)
+            self._known[key] = varied(self._x[found.inliers][:, list(found.line.columns)])
         return self._known[key]
-
-    def _holds(self, columns: tuple[int, ...], inliers: NDArray[np.bool_]) -> bool:
-        rows = self._x[inliers][:, list(columns)]
-        seldom = [k for k in range(rows.shape[1]) if len(np.unique(rows[:, k])) < len(rows) / 2]
-        return not seldom or len(np.unique(rows[:, seldom], axis=0)) >= len(seldom) + 1 + _VERIFYING
 
 
 def _holds(x: Floats, y: Floats, found: Consensus, settings: ThesisSettings) -> bool:

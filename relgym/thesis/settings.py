@@ -206,7 +206,7 @@ DEVIATIONS: Final = (
         "both",
         "§3.2.2",
         "any line with T inliers",
-        "columns that seldom change must take two more values together than there are weights on them",
+        "columns that seldom change must take four values each, and together two more than there are weights on them",
         "six rows from two scenes fit exactly through whatever differs between the scenes, a size or a place",
     ),
     Deviation(
