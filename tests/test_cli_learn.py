@@ -222,11 +222,11 @@ def test_advice_is_shown_as_a_command() -> None:
 def test_features_and_parameters_reach_the_model() -> None:
     run(
         *("learn", "test/Slider-v1", "--steps", 30, "--out", "s.json", "--features", "trig(x0),squares"),
-        *("--config", "seed=7", "-c", "clustering.draws=200", "-c", "classification.votes=hard"),
+        *("--config", "seed=7", "-c", "clustering.draws=200", "-c", "classification.context=all"),
     )
     config = WorldModel.load("s.json").config
     assert config.features == ("trig(x0)", "squares")
-    assert (config.seed, config.clustering.draws, config.classification.votes) == (7, 200, "hard")
+    assert (config.seed, config.clustering.draws, config.classification.context) == (7, 200, "all")
 
 
 def test_names_and_views() -> None:

@@ -24,6 +24,7 @@ from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError, RelgymError
 from relgym.hypotheses import register_hypothesis, registered
 from relgym.model.prequential import Outcomes, Prequential, compared
+from relgym.model.protocol import SceneLearner
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.scene.schema import SceneSchema
@@ -35,7 +36,7 @@ Bundle: TypeAlias = tuple[Names, Names, NDArray[np.float64], NDArray[np.float64]
 """Objects before and after, and one row of numbers before and after for each transition of a run of equal ones: an
 array by itself takes longer to send than all its numbers."""
 
-Answer: TypeAlias = tuple[int, WorldModel, Prequential | None] | Exception | None
+Answer: TypeAlias = tuple[int, SceneLearner, Prequential | None] | Exception | None
 """What was learned, with the number of the question; or what made it fail; ``None``: the process has ended."""
 
 WATCH = 1.0
@@ -83,10 +84,10 @@ class Background:
     """
 
     def __init__(
-        self, model: WorldModel, prequential: Prequential | None, *, queue: int, precision: float = 0.0
+        self, model: SceneLearner, prequential: Prequential | None, *, queue: int, precision: float = 0.0
     ) -> None:
         length = checked_count("background", queue, 1, 10**7)
-        functions = _sendable(model.config)
+        functions = _sendable(model.config if isinstance(model, WorldModel) else ModelConfig())
         if multiprocessing.current_process().daemon:
             raise ConfigError(
                 f"background={queue}: this is a daemonic worker process, which may have no children; learn in the "

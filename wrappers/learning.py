@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 from relgym.arguments import refusing
 from relgym.envs.model_files import EnvRecord
@@ -39,8 +39,11 @@ class Learning:
 
     @property
     def model(self) -> WorldModel:
-        """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``."""
-        return self._observer.study.model
+        """What was learned; through other wrappers: ``env.get_wrapper_attr("model")``.
+
+        A learner of another kind that was given as `model` is what it is, whatever the annotation says.
+        """
+        return cast("WorldModel", self._observer.study.model)
 
     @refusing(ObservationError)
     def predict(
@@ -96,7 +99,7 @@ class Learning:
 
     def catch_up(self) -> WorldModel:
         """Wait until the background process has learned all it was sent; the model as it then is."""
-        return self._observer.study.catch_up()
+        return cast("WorldModel", self._observer.study.catch_up())
 
     # ------------------------------------------------------------------ files
     @property

@@ -12,7 +12,7 @@ from gymnasium.utils import RecordConstructorArgs
 from relgym.arguments import refusing
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
-from relgym.model.world_model import WorldModel
+from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.learning import Learning
@@ -61,7 +61,8 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
         counted in `dropped`. Default ``None``: learn in `step`.
     model
         What to go on from, instead of an empty model: a `WorldModel`, which then learns here itself (with `background`
-        a copy does), or the path of a model file. It keeps its targets and config.
+        a copy does), or the path of a model file. It keeps its targets and config. Or any other learner of scenes
+        (`relgym.model.protocol.SceneLearner`), such as the thesis' own system (`relgym.thesis.model.ThesisModel`).
     window
         How many steps count as the latest in `prequential`.
 
@@ -102,7 +103,7 @@ class ModelLearner(Learning, gym.Wrapper[Any, Any, Any, Any], RecordConstructorA
         learn_termination: bool = False,
         bad_observations: BadObservations = "raise",
         background: int | None = None,
-        model: WorldModel | str | os.PathLike[str] | None = None,
+        model: SceneLearner | str | os.PathLike[str] | None = None,
         window: int = 1000,
     ) -> None:
         _refuse_vector_env(env)

@@ -18,7 +18,7 @@ from relgym.errors import ConfigError, ObservationError, RelgymError
 from relgym.model.files.storage import target_to_json
 from relgym.model.prediction import ScenePrediction
 from relgym.model.prequential import StepReport
-from relgym.model.world_model import WorldModel
+from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations, Follower, Look
 from relgym.wrappers.settings import PlainTarget, check_model, model_of, target_of
@@ -95,7 +95,7 @@ class Observer:
         envs: int = 1,
         targets: Sequence[PlainTarget] | None = None,
         config: ModelConfig | Mapping[str, Any] | None = None,
-        model: WorldModel | str | os.PathLike[str] | None = None,
+        model: SceneLearner | str | os.PathLike[str] | None = None,
         learn: bool = True,
         predict: bool = True,
         window: int = 1000,
@@ -333,7 +333,7 @@ class Observer:
         return self.record.to_json() | {"view": self.view.to_json()}
 
     def note(self) -> None:
-        """Tell the model of its env, so that `WorldModel.save`, too, writes a file to dream from.
+        """Tell the model of its env, so that its own `save`, too, writes a file to dream from.
 
         Of a space of somebody's own, which no file can hold, nothing is told.
         """
@@ -342,7 +342,7 @@ class Observer:
 
     def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
         """Write model, spaces, view and some first scenes to one file, atomically."""
-        model: WorldModel = self.study.catch_up()
+        model = self.study.catch_up()
         model.extra = self.extra()
         model.save(path, history=history)
 

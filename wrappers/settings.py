@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.model.files.storage import target_from_json
+from relgym.model.protocol import SceneLearner
 from relgym.model.scenes import mismatch
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Target
@@ -39,8 +40,8 @@ def model_of(
     *,
     config: ModelConfig | None,
     targets: Sequence[Target] | None,
-    given: WorldModel | str | os.PathLike[str] | None,
-) -> WorldModel:
+    given: SceneLearner | str | os.PathLike[str] | None,
+) -> SceneLearner:
     """An empty model, the one that was given, or the one in a file.
 
     Raises
@@ -53,7 +54,12 @@ def model_of(
     if config is not None or targets is not None:
         raise ConfigError("a model keeps its targets and config: pass either model or those")
     check_model(given)
-    model, what = (given, "model") if isinstance(given, WorldModel) else (WorldModel.load(given), given)
+    model: SceneLearner
+    what: str | os.PathLike[str]
+    if isinstance(given, (str, os.PathLike)):
+        model, what = WorldModel.load(given), given
+    else:
+        model, what = given, "model"
     if replace(model.schema, precision=schema.precision) != schema:  # it keeps its own
         raise ConfigError(_another_world(what, schema, model.schema))
     return model
@@ -61,7 +67,7 @@ def model_of(
 
 def check_model(given: Any) -> None:
     """Raise `ConfigError` unless it is a model, the path of one, or None."""
-    if given is not None and not isinstance(given, (WorldModel, str, os.PathLike)):
+    if given is not None and not isinstance(given, (SceneLearner, str, os.PathLike)):
         raise ConfigError(
             f"model={given!r}: expected a WorldModel or the path of a model file, got {type(given).__name__}"
         )

@@ -12,7 +12,7 @@ from relgym.errors import ConfigError
 from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import ScenePrediction
 from relgym.model.prequential import Outcomes, Prequential, StepReport
-from relgym.model.world_model import WorldModel
+from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers.background import Background
 
@@ -40,7 +40,7 @@ class Study:
 
     Attributes
     ----------
-    model : WorldModel
+    model : SceneLearner
         What was learned; with a background process as of the last `catch_up`.
     prequential : Prequential
         Errors of predictions made before their outcome was learned; as of the last `catch_up`, too.
@@ -48,7 +48,7 @@ class Study:
 
     def __init__(
         self,
-        model: WorldModel,
+        model: SceneLearner,
         *,
         learn: bool = True,
         predict: bool = True,
@@ -114,7 +114,7 @@ class Study:
             self.prequential.count(report.residuals, report.wrong, outcomes)
         return report
 
-    def catch_up(self) -> WorldModel:
+    def catch_up(self) -> SceneLearner:
         """Wait until all that is queued was learned; the model as it then is."""
         if self._background is not None:
             extra = self.model.extra

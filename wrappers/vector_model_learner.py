@@ -16,7 +16,7 @@ from relgym.arguments import refusing
 from relgym.config import ModelConfig
 from relgym.envs.model_files import made_how
 from relgym.errors import ConfigError
-from relgym.model.world_model import WorldModel
+from relgym.model.protocol import SceneLearner
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.learning import Learning
 from relgym.wrappers.observer import First, Observer, Step
@@ -73,7 +73,7 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
         learn_termination: bool = False,
         bad_observations: BadObservations = "raise",
         background: int | None = None,
-        model: WorldModel | str | os.PathLike[str] | None = None,
+        model: SceneLearner | str | os.PathLike[str] | None = None,
         window: int = 1000,
     ) -> None:
         if not isinstance(env, gym.vector.VectorEnv):

@@ -15,6 +15,7 @@ from relgym.envs.arguments import checked_action, checked_function
 from relgym.envs.model_files import made_how
 from relgym.envs.views import AgentsView, NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
+from relgym.model.protocol import SceneLearner
 from relgym.model.world_model import WorldModel
 from relgym.scene.schema import SceneSchema
 
@@ -151,7 +152,7 @@ def upheld(view: View, observation: Any) -> View:
     return view.upheld(observation) if isinstance(view, (NumbersView, TaskView)) else view
 
 
-def remembered(view: View, model: WorldModel | str | os.PathLike[str]) -> View:
+def remembered(view: View, model: SceneLearner | str | os.PathLike[str]) -> View:
     """The view that a model or its file holds, where it differs from an open one in its angles at most.
 
     What was guessed of these when the model was learned stands, and so does what was taken back.
@@ -165,7 +166,10 @@ def remembered(view: View, model: WorldModel | str | os.PathLike[str]) -> View:
     """
     if not is_open(view):
         return view
-    extra = model.extra if isinstance(model, WorldModel) else WorldModel.load_with_extra(model)[1]
+    if isinstance(model, (str, os.PathLike)):
+        extra = WorldModel.load_with_extra(model)[1]
+    else:
+        extra = model.extra
     held = extra.get("view")
     return view_from_json(held) if held and _but_angles(held) == _but_angles(view.to_json()) else view
 

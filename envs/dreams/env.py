@@ -33,7 +33,7 @@ from relgym.envs.dreams.starts import Start
 from relgym.envs.views import View
 from relgym.errors import ConfigError
 from relgym.model.prediction import ScenePrediction
-from relgym.model.world_model import WorldModel
+from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import TASK, Scene
 from relgym.scene.schema import SceneSchema
 
@@ -89,7 +89,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
     Arguments
     ---------
     model
-        A `WorldModel`, or the path of the file of one that a `ModelLearner` taught.
+        A `WorldModel` or another learner of scenes, or the path of the file of one that a `ModelLearner` taught.
     like
         A real env whose scenes consist of types that the model knows: gives the spaces, first scenes, and its task
         if it has one. Numbers and names of objects may differ from those that the model was trained on. Wrappers
@@ -138,7 +138,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
     @refusing(ConfigError)
     def __init__(
         self,
-        model: WorldModel | str | os.PathLike[str],
+        model: SceneLearner | str | os.PathLike[str],
         like: gym.Env[Any, Any] | Scene | None = None,
         *,
         view: View | None = None,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relgym.envs.arguments import takes
 from relgym.envs.tasks import RewardFunctions
 from relgym.errors import ConfigError, QueryError
-from relgym.model.world_model import WorldModel
+from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import TASK, Float1D, Float2D, Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
 
@@ -66,7 +66,7 @@ class TaskFunctions(Protocol):
 
 
 def check_reward_functions(
-    reward: Any, terminated: Any, task: Any, model: WorldModel, *, batched: bool, at_once: bool
+    reward: Any, terminated: Any, task: Any, model: SceneLearner, *, batched: bool, at_once: bool
 ) -> None:
     """Check functions and tasks before any dream begins.
 
@@ -112,14 +112,14 @@ def _check_arguments(prop: str, function: Any, *, batched: bool) -> None:
         raise ConfigError(f"{prop}: expected a function of {told}, got {function!r}")
 
 
-def _has_learned(model: WorldModel, prop: str) -> bool:
+def _has_learned(model: SceneLearner, prop: str) -> bool:
     if TASK not in model.schema.order:
         return False
     own = model.schema.type_of(TASK).name
     return any((t.type, t.property) == (own, prop) for t in model.targets)
 
 
-def _check_learned(model: WorldModel, prop: str) -> None:
+def _check_learned(model: SceneLearner, prop: str) -> None:
     if not _has_learned(model, prop):
         raise QueryError(
             f"the model has not learned {TASK}.{prop}, it has the targets {[str(t) for t in model.targets]}: teach it "
@@ -127,7 +127,7 @@ def _check_learned(model: WorldModel, prop: str) -> None:
         )
 
 
-def _chosen(given: Any, own: Any, model: WorldModel, prop: str) -> Any:
+def _chosen(given: Any, own: Any, model: SceneLearner, prop: str) -> Any:
     """A function, `LEARNED`, or None."""
     given = own if given is None else given
     if given is None:
@@ -182,7 +182,7 @@ class StepEvaluator:
         reward: SceneFunction | Literal["learned"] | None,
         terminated: SceneFunction | Literal["learned"] | None,
         task: TaskFunctions | None,
-        model: WorldModel,
+        model: SceneLearner,
     ) -> StepEvaluator:
         """Settle whose rewards count: those given, else the task's, else what the model has learned by now, else none.
 
@@ -256,7 +256,7 @@ class BatchStepEvaluator:
         reward: BatchSceneFunction | Literal["learned"] | None,
         terminated: BatchSceneFunction | Literal["learned"] | None,
         task: TaskFunctions | None,
-        model: WorldModel,
+        model: SceneLearner,
         layout: SceneLayout,
     ) -> BatchStepEvaluator:
         """As `StepEvaluator.of`."""

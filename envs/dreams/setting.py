@@ -21,6 +21,7 @@ from relgym.envs.flat import FlatSpec
 from relgym.envs.model_files import EnvRecord, copied, schema_like, world_like
 from relgym.envs.views import REWARD, TERMINATED, TaskView, View, view_from_json
 from relgym.errors import ConfigError, ObservationError, QueryError
+from relgym.model.protocol import SceneLearner
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
@@ -52,7 +53,7 @@ class Setting:
         Pictures per second.
     """
 
-    model: WorldModel
+    model: SceneLearner
     schema: SceneSchema
     observation_space: spaces.Space[Any]
     action_space: spaces.Space[Any]
@@ -65,7 +66,7 @@ class Setting:
     @classmethod
     def of(
         cls,
-        model: WorldModel | str | os.PathLike[str],
+        model: SceneLearner | str | os.PathLike[str],
         like: gym.Env[Any, Any] | Scene | None,
         view: View | None,
         *,
@@ -111,7 +112,7 @@ class Setting:
         return cls._made(model, schema, record, shown, None, world)
 
     @classmethod
-    def _viewed(cls, model: WorldModel, like: gym.Env[Any, Any] | Scene | None, view: View) -> Setting:
+    def _viewed(cls, model: SceneLearner, like: gym.Env[Any, Any] | Scene | None, view: View) -> Setting:
         """The setting of a model that was learned through a view."""
         schema_like(view.schema, model.schema, "the view's scenes")
         if isinstance(like, Scene):
@@ -133,7 +134,7 @@ class Setting:
     @classmethod
     def _made(
         cls,
-        model: WorldModel,
+        model: SceneLearner,
         schema: SceneSchema,
         record: EnvRecord,
         shown: Shown,
@@ -253,7 +254,7 @@ class Setting:
         return np.array([self.vector_of(scene) for scene in self.pool])
 
 
-def check_knowledge(model: WorldModel) -> None:
+def check_knowledge(model: SceneLearner) -> None:
     """Raise `QueryError` for a model that knows none of its targets: every dream would end at once, or stand still."""
     if not any(model.governs(t) or model.modes(t.type, t.property) for t in model.targets):
         targets = [str(t) for t in model.targets]
@@ -263,7 +264,7 @@ def check_knowledge(model: WorldModel) -> None:
         )
 
 
-def recorded(model: WorldModel) -> EnvRecord:
+def recorded(model: SceneLearner) -> EnvRecord:
     """What the model's file says of its env."""
     if not model.extra:
         raise ConfigError(
@@ -272,9 +273,9 @@ def recorded(model: WorldModel) -> EnvRecord:
     return EnvRecord.from_json(model.extra, model.schema)
 
 
-def _model(given: Any, *, snapshot: bool) -> WorldModel:
+def _model(given: Any, *, snapshot: bool) -> SceneLearner:
     """The model, a copy of it, or the one in a file."""
-    if isinstance(given, WorldModel):
+    if isinstance(given, SceneLearner):
         return copy.deepcopy(given) if snapshot else given
     if not isinstance(given, (str, os.PathLike)):
         raise ConfigError(
@@ -317,7 +318,7 @@ def _present(scene: Scene) -> SceneSchema:
     return replace(scene.schema, objects=tuple(pair for pair in scene.schema.objects if pair[0] in names))
 
 
-def _of_scene(scene: Scene, model: WorldModel, schema: SceneSchema) -> EnvRecord:
+def _of_scene(scene: Scene, model: SceneLearner, schema: SceneSchema) -> EnvRecord:
     """Spaces for a scene's objects: each has the bounds of the recorded objects of its type."""
     record = recorded(model)
     known = checked_boxes(record.observation_space, model.schema)

@@ -37,7 +37,7 @@ from relgym.envs.dreams.step import DreamStep, Stepped
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
 from relgym.model.prediction import BatchPrediction
-from relgym.model.world_model import WorldModel
+from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import Float1D, Float2D, Scene
 from relgym.scene.schema import SceneSchema
 
@@ -120,7 +120,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     @refusing(ConfigError)
     def __init__(
         self,
-        model: WorldModel | str | os.PathLike[str],
+        model: SceneLearner | str | os.PathLike[str],
         num_envs: int = 1,
         like: gym.Env[Any, Any] | Scene | None = None,
         *,

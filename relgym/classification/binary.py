@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,13 +162,13 @@ class BinaryClassifier:
         self.__dict__.pop("for_i", None)
         return float(weights[np.array(self.for_i)[outcome] != is_i].sum())
 
-    def votes(self, how: Literal["soft", "hard"]) -> list[tuple[int, int]]:
+    @property
+    def votes(self) -> list[tuple[int, int]]:
         """What each outcome gives to mode `i` and to mode `j`, in `VOTE_UNIT` (§3.4.3).
 
-        Soft votes are the logarithms of Laplace's (n_i + 1) / (n_i + n_j + 2) and of its complement.
+        The logarithms of Laplace's (n_i + 1) / (n_i + n_j + 2) and of its complement, so that one unsure pair decides
+        nothing; the thesis gave one vote each.
         """
-        if how == "hard":
-            return [(VOTE_UNIT, 0) if yes else (0, VOTE_UNIT) for yes in self.for_i]
         return [_log_votes(n_i, n_j) for n_i, n_j in self.counts]
 
     def describe(self) -> list[tuple[str, float, float, bool]]:

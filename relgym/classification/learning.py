@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from relgym.classification.binary import BinaryClassifier, majority, tree_columns, tree_features
 from relgym.classification.examples import Bools, Floats
-from relgym.classification.exemplars import dyadic
 from relgym.classification.views import CONTEXTS, Context, Scope, View
 from relgym.config import ClassificationConfig
 from relgym.logic.clause import Clause, Definition
 from relgym.logic.csp import matches
-from relgym.logic.foil import FoilConfig, learn, learn_both
+from relgym.logic.foil import FoilConfig, learn_both
 from relgym.numeric.tree import DecisionTree, learn_tree
 from relgym.scheduling.work import CALL, Steps, resumable
 
@@ -57,15 +56,6 @@ class Lesson:
         """Weight of the first and of the second mode's examples."""
         return float(self.weights[self.is_i].sum()), float(self.weights[~self.is_i].sum())
 
-    def balanced(self, exponent: float) -> Lesson:
-        """The same lesson, classes weighted by their share to the power of ``-exponent``, total unchanged."""
-        total = sum(self.counts)
-        if not exponent or not all(self.counts):
-            return self
-        factors = [(count / total) ** -exponent for count in self.counts]
-        weights = self.weights * np.where(self.is_i, *factors)
-        return Lesson(self.view, self.rows, self.is_i, dyadic(weights * (total / weights.sum())))
-
 
 def foil_config(config: ClassificationConfig) -> FoilConfig:
     """FOIL's settings."""
@@ -74,10 +64,6 @@ def foil_config(config: ClassificationConfig) -> FoilConfig:
         max_clauses=config.max_clauses,
         max_new_variables=config.max_new_variables,
         beam=config.beam,
-        numeric=config.numeric_literals,
-        choice=config.literal_choice,
-        min_precision=config.min_precision,
-        mdl=config.mdl,
     )
 
 
@@ -91,16 +77,15 @@ def learn_pair(
     """
     if not all(lesson.counts):
         return majority(i, j, scope, lesson.counts)
-    taught = lesson.balanced(config.class_balance)
     definitions: dict[Context, Definition] = {}
     for context in _contexts(lesson) if config.context == "auto" else [config.context]:
-        found = definitions[context] = yield from _define(taught, context, scope, config)
+        found = definitions[context] = yield from _define(lesson, context, scope, config)
         if _settles(found, context):
             break
     # as between polarities, errors count first; the narrowest context wins ties
     best = min(definitions.items(), key=lambda each: each[1].rank)
     work = sum(each.work for each in definitions.values())
-    classifier = yield from _with_trees(BinaryClassifier(i, j, scope, *best, work=work), taught, config)
+    classifier = yield from _with_trees(BinaryClassifier(i, j, scope, *best, work=work), lesson, config)
     classifier.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
     return classifier
 
@@ -129,9 +114,8 @@ def _define(
 ) -> Steps[Definition]:
     facts = lesson.view.facts(context, scope)
     tuples, is_i, weights = lesson.view.tuples(lesson.rows), lesson.is_i, lesson.weights
-    method = learn_both if config.both_polarities else learn
     yield CALL
-    found: Definition = yield from method.steps(
+    found: Definition = yield from learn_both.steps(
         facts,
         tuples[is_i],
         tuples[~is_i],
@@ -155,7 +139,7 @@ def _with_trees(
         here = open_[hit]
         wrong = here[~positive[here]]
         tree = None
-        if _rate(lesson, wrong, here, ~positive, config) > config.clause_tree_threshold:
+        if _rate(lesson, wrong, here, ~positive) > config.clause_tree_threshold:
             tree = yield from _tree(found, clause, lesson, here, positive, config)
         if tree is not None:
             features = tree_features(view, found.scope, found.context, clause, lesson.rows[here])
@@ -163,22 +147,21 @@ def _with_trees(
         trees.append(tree)
         open_ = np.setdiff1d(open_, here)
     last = None
-    if _rate(lesson, open_[positive[open_]], open_, positive, config) > config.fall_through_tree_threshold:
+    if _rate(lesson, open_[positive[open_]], open_, positive) > config.fall_through_tree_threshold:
         last = yield from _tree(found, None, lesson, open_, positive, config)
     return BinaryClassifier(
         found.i, found.j, found.scope, found.context, found.definition, tuple(trees), last, work=found.work
     )
 
 
-def _rate(lesson: Lesson, wrong: _Rows, here: _Rows, suffering: Bools, config: ClassificationConfig) -> float:
+def _rate(lesson: Lesson, wrong: _Rows, here: _Rows, suffering: Bools) -> float:
     """Share of errors among the examples decided here, or in the class that suffers them if larger.
 
     The second makes rare modes count: 20 among 16,000 are no share to speak of, but may be all there are.
     """
     w = lesson.weights
     errors = float(w[wrong].sum())
-    by_stage, by_class = (errors / max(float(w[part].sum()), 1e-300) for part in (here, suffering))
-    return by_stage if config.tree_errors == "stage" else max(by_stage, by_class)
+    return max(errors / max(float(w[part].sum()), 1e-300) for part in (here, suffering))
 
 
 def _tree(

@@ -289,12 +289,12 @@ class ModeClassifier:
 
     def _count(self, example: Example, owner: int, fits: Bools, values: Floats) -> int:
         outcomes = self._voting.outcomes(example, np.asarray(values).tolist())
-        keep, wrong = self.config.ambiguous == "keep", 0
+        wrong = 0
         explained = dict(zip(self.modes, np.asarray(fits).tolist(), strict=True))
         for at, ((i, j), pair) in enumerate(self._pairs.items()):
             for_i, for_j = (owner == m or self._covers(m, owner, explained) for m in (i, j))
             other = j if for_i else i
-            if for_i == for_j or (explained[other] and not keep):
+            if for_i == for_j or explained[other]:
                 continue
             wrong += pair.observe(outcomes[at], for_i, self.config.relearn_growth)
             self._voting.recount(at)
@@ -306,8 +306,6 @@ class ModeClassifier:
 
     def _owner(self, example: Example, assigned: int, fits: Bools) -> int:
         """The mode that a new example belongs to."""
-        if self.config.ambiguous == "keep":
-            return assigned
         explaining = [m for m, ok in zip(self.modes, np.asarray(fits).tolist(), strict=True) if ok]
         self._owners.count(assigned, example.key, explaining)
         return self._owners.owner(assigned, example.key, explaining)
@@ -335,8 +333,6 @@ class ModeClassifier:
     def _labels(self, pairs: Iterable[tuple[int, int]]) -> dict[tuple[int, int], NDArray[np.int8]]:
         """Which exemplars teach each pair, and for which of its modes they are examples: see `pair_labels`."""
         assigned, fits, modes = self.exemplars.assigned, self.exemplars.columns["fits"], self.modes
-        if self.config.ambiguous == "keep":  # the thesis' arbitrary labels
-            return {(i, j): (assigned == i).astype(np.int8) - (assigned == j) for i, j in pairs}
         owners = self._owners.owners(self.exemplars)
         return {pair: pair_labels(assigned, owners, fits, modes, *pair) for pair in pairs}
 
@@ -358,8 +354,7 @@ class ModeClassifier:
         self._pairs = pairs
 
     def _reset_caches(self) -> None:
-        votes, runoff = self.config.votes, self.config.runoff
-        self._voting = Voting(self.vocabulary, self.modes, votes, runoff=runoff)
+        self._voting = Voting(self.vocabulary, self.modes)
         self._pairs_changed()
 
     def _remember(self, seen: Iterable[int], owners: Owners) -> None:
@@ -375,10 +370,9 @@ class ModeClassifier:
     def _covering(self) -> set[tuple[int, int]]:
         """Pairs (k, m) of modes of which m covers k."""
         assigned, fits = self.exemplars.assigned, self.exemplars.columns["fits"]
-        useful = len(assigned) and self.config.ambiguous != "keep"
         return {
             (k, m)
-            for at, m in enumerate(self.modes if useful else ())
+            for at, m in enumerate(self.modes if len(assigned) else ())
             for k in covered_by(assigned, fits[:, at] | (assigned == m))
         }
 

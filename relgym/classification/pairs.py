@@ -101,7 +101,7 @@ class PairState:
         """Mend the classifier or learn it anew as far as a budget goes; the work spent. Not `stale`: done."""
         if self.draft is None:
             grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
-            mendable = config.repair and not grown and all(lesson.counts)
+            mendable = not grown and all(lesson.counts)
             mended = mend(self.classifier, lesson, self.errors, config) if mendable else None
             work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + GROUP // LITERAL
             if mended is not None:

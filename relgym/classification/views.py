@@ -69,11 +69,10 @@ class Scope:
             return tuple((name, column) for column, name in enumerate(names) if name not in hidden)
 
         v = vocabulary
-        shown = tuple(modes) if config.mode_function_features else ()
         follows = tuple((name, v.own.index(name), k) for name, k in v.follows)
         present = tuple((name, v.own.index(name)) for name in (v.present,) if name)
         facts = (offered(v.relations), offered(v.unary), offered(v.pair), offered(v.own))
-        return cls(*facts, shown, follows, present)
+        return cls(*facts, tuple(modes), follows, present)
 
     @property
     def scalars(self) -> tuple[str, ...]:

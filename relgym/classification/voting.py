@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,23 +42,10 @@ class Voting:
         Names of what examples hold.
     modes
         Mode ids in the order of the values that come with an example.
-    how
-        Soft or hard votes.
-    runoff
-        Whether the mode with fewest votes drops out and the rest is counted again, until one is left.
     """
 
-    def __init__(
-        self,
-        vocabulary: Vocabulary,
-        modes: tuple[int, ...],
-        how: Literal["soft", "hard"],
-        *,
-        runoff: bool = False,
-    ) -> None:
+    def __init__(self, vocabulary: Vocabulary, modes: tuple[int, ...]) -> None:
         self.modes = modes
-        self.how: Literal["soft", "hard"] = how
-        self.runoff = runoff
         self._planner = Planner(vocabulary, modes)
         self.set_pairs(())
 
@@ -67,12 +53,12 @@ class Voting:
         """Set the classifiers, in order."""
         self._classifiers = tuple(classifiers)
         self._places = [(self.modes.index(c.i), self.modes.index(c.j)) for c in classifiers]
-        self._votes = [c.votes(self.how) for c in classifiers]
+        self._votes = [c.votes for c in classifiers]
         self._planner.set_pairs(self._classifiers)
 
     def recount(self, pair: int) -> None:
         """Read one classifier's counts again."""
-        self._votes[pair] = self._classifiers[pair].votes(self.how)
+        self._votes[pair] = self._classifiers[pair].votes
 
     def outcomes(self, example: Example, values: Sequence[float]) -> list[int]:
         """Number of the outcome of every pair."""
@@ -95,12 +81,7 @@ class Voting:
         for (a, b), (for_a, for_b) in zip(self._places, cast, strict=True):
             scores[a] += for_a
             scores[b] += for_b
-        by_tie = self._by_tie(counts)
-        if self.runoff:
-            order, margin = self._run_off(cast, by_tie)
-        else:
-            order = sorted(by_tie, key=lambda m: -scores[m])
-            margin = scores[order[0]] - scores[order[1]] if len(order) > 1 else None
+        order, margin = self._run_off(cast, self._by_tie(counts))
         seen = known.is_seen(example, plan.key)
         return Ranking(
             modes=tuple([modes[m] for m in order]),
@@ -126,12 +107,7 @@ class Voting:
         n, m = len(view), len(self.modes)
         cast, spoken = self._cast(view)
         scores = cast.sum(axis=2)
-        by_tie = self._by_tie(counts)
-        if self.runoff:
-            order, lead = run_off_batch(cast - cast.transpose(0, 2, 1), by_tie)
-        else:
-            order = np.array(by_tie)[np.argsort(-scores[:, by_tie], axis=1, kind="stable")]
-            lead = -np.diff(np.take_along_axis(scores, order[:, :2], axis=1), axis=1).reshape(n, -1)
+        order, lead = run_off_batch(cast - cast.transpose(0, 2, 1), self._by_tie(counts))
         margin = lead.reshape(n) / VOTE_UNIT if m > 1 else np.full(n, math.inf)
         seen = known.is_seen_batch(view)
         familiar = seen | spoken[np.arange(n), order[:, 0]]

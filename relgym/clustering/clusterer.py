@@ -300,8 +300,7 @@ class ModeClusterer:
     # ------------------------------------------------------------------ the last resort
     def _hopeless(self, table: ExampleTable) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""
-        allowed = self.config.approximate and self.config.noise_std == "auto"
-        if not allowed or not timely(self.population, table, again=self.approximate):
+        if self.config.noise_std != "auto" or not timely(self.population, table, again=self.approximate):
             return False
         # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
         return 2 * self.noise_examples > self.seen or self._spread > 0.0

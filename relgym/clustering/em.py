@@ -19,7 +19,6 @@ from relgym.clustering.discovery import Scale
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode
 from relgym.clustering.roles import Binding, bind
-from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["Cluster", "preferred", "refit", "role_matrix"]
@@ -91,13 +90,12 @@ def preferred(
     errors: dict[int, float],
     clusters: dict[int, Cluster],
     scale: Scale,
-    config: ClusteringConfig,
 ) -> int:
     """The mode an example is assigned to, among those that explain it (E-step)."""
 
     def key(i: int) -> tuple[float, int, int, int]:
         cluster = clusters[i]
-        surprise = 0.0 if config.stickiness == "simple" and errors[i] <= 2.0 * scale.sigma else errors[i]
+        surprise = 0.0 if errors[i] <= 2.0 * scale.sigma else errors[i]
         return (surprise, cluster.mode.parameters, -(cluster.fitted + cluster.unfitted), i)
 
     return min(fitting, key=key)

@@ -254,7 +254,7 @@ class ModeSearch:
         # In a world of one state all examples are where they are; there noise that depends on the action would give
         # its quiet actions a mode of their own, and leave the loud ones without any (LunarLander's engine).
         states = table.strata[population.rows]
-        population.chancy = population.config.review and by_chance and bool((states != states[0]).any())
+        population.chancy = by_chance and bool((states != states[0]).any())
         if not population.chancy:
             return False
         ids = table.signature_ids[population.rows]

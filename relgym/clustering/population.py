@@ -169,7 +169,7 @@ class Population:
         if not fitting:
             return NOISE
         if not self.chancy or len(fitting) == 1:
-            return preferred(fitting, errors, self.clusters, self.scale, self.config)
+            return preferred(fitting, errors, self.clusters, self.scale)
         labels = self.labels[-LATEST:]
         labels = labels[table.strata[self.rows[-LATEST:]] == table.strata[self.rows[example]]]
         ids = np.array(sorted(fitting))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 from relgym.arguments import refusing_fields
 from relgym.config.checks import at_least, at_most, one_of, plain, unit
@@ -19,13 +19,6 @@ class ClassificationConfig:
 
     Parameters
     ----------
-    votes
-        How binary classifiers are combined (§3.4.3). ``"hard"``: one vote each, as in the thesis. ``"soft"``
-        (default): log-probabilities of the clause that fired, so that one unsure pair decides nothing.
-    runoff
-        Whether the mode with fewest votes drops out and the others' votes are counted again, until one is left.
-        Default true: a pair says nothing sensible of examples of a third mode. False: the most votes win, as in
-        the thesis.
     context
         Which objects clauses of mode classifiers may mention. ``"approached"``: the target and what it approaches
         fastest (a contact fact). ``"touching"``: the target and all that touch it, or else the nearest one.
@@ -36,21 +29,6 @@ class ClassificationConfig:
         Whether relations and features that the vocabulary marks as contact facts are offered (approach
         velocity, normal, slip). Default true; the thesis had none, hence its confusion of bouncing and
         leaving (§4.8).
-    numeric_literals
-        Whether clauses may hold numeric thresholds. Default true; the thesis kept numbers to trees (§3.4.4).
-    mode_function_features
-        Whether the two modes' predictions and their difference are offered as numbers. Default true.
-        Boundaries of friction and halting become one threshold.
-    ambiguous
-        What to do with an example that several modes explain. ``"drop"`` (default): it teaches nothing to a
-        pair of them. Against all others it counts for the mode it was assigned to, the simplest; or for another
-        one of them, if only that one was seen beyond doubt in the same relations
-        (`relgym.classification.owners`). ``"keep"``: it counts for the mode it was assigned to, as in the thesis.
-    both_polarities
-        Whether either mode of a pair may be the positive class (§3.4.5). Default true.
-    literal_choice
-        What ChooseLiteral maximises (Algorithm 2): ``"gain"`` (default): FOIL's information gain, as in the
-        original system; ``"negatives"``: the negatives filtered out, as printed.
     max_literals
         Longest clause, in literals. Default 5 (as the original), range 1 to 64. Raising it admits finer
         distinctions at a cost that grows linearly.
@@ -62,31 +40,17 @@ class ClassificationConfig:
     beam
         Clauses grown at the same time. Default 4, range 1 to 256; 1 is the greedy search of Algorithm 2. Raising
         it finds conjunctions whose first literal gains nothing alone, at proportional cost.
-    mdl
-        Whether a clause must pay for its bits in exceptions explained. Default true.
-    min_precision
-        Least share of positives among the examples that a clause covers, weighted. Default 0.5, range
-        [0.5, 1] (the original: 0.9 on a held-out quarter). Raising it leaves more to the tree of the
-        fall-through.
     clause_tree_threshold
         A clause whose false-positive rate exceeds this gets a decision tree (§3.4.4). Default 0.01, range [0,
         1] (thesis-like: 0.05). Raising it gives fewer trees, that overfit less and separate less.
     fall_through_tree_threshold
         The same for the false-negative rate of the whole disjunction. Default 0.02, range [0, 1]
         (thesis-like: 0.2).
-    tree_errors
-        Of what the two rates above are shares. ``"class"`` (default): of the examples decided at that stage or of
-        the class that suffers, whichever share is larger, so that a rare mode's errors count. ``"stage"``: of the
-        examples decided there, as in the original; 99 bounces taken for slides among 5,223 call for no tree then.
     tree_min_leaf
         Fewest examples on either side of a split. Default 3, range 1 to a million (the original: no split of
         3 or fewer).
     tree_max_depth
         Deepest tree, in splits. Default 6, range 1 to 64.
-    class_balance
-        Exponent in [0, 1] by which classes are balanced: each is weighted by (its share) ** -class_balance.
-        Default 0: description length gives a rare class' examples weight already; 1 gives both classes equal
-        say, which makes frequent modes suffer where the data are noisy.
     exemplars_per_state
         Examples kept per mode and relational state, those that contradicted a classifier first. Default 10,
         range 1 to 10,000,000. Raising it makes early thresholds sharper and costs time and memory in proportion; on the
@@ -106,48 +70,31 @@ class ClassificationConfig:
         Memory that they may take, for each target, in MB. Relations are told of all pairs of bodies, so an example of
         40 bodies takes 21 kB and one of 200 takes 0.5 MB. Default 128, which is 6000 examples of 40 bodies, as many
         as large scenes are taken apart into; range 1 to 1,000,000. At least 100 examples are kept whatever they take.
-    repair
-        Whether a contradicted definition is first mended (a threshold moved, a clause dropped or added) and
-        only learned anew where that isn't enough (§5.1). Default true.
     relearn_growth
         An imperfect or mended pair is learned anew when its rarer mode's examples have grown by this factor.
         Default 1.5, range > 1. Raising it saves time and lets definitions age.
     """
 
-    votes: Literal["soft", "hard"] = "soft"
-    runoff: bool = True
     context: Literal["auto", "approached", "touching", "all"] = "auto"
     contact_facts: bool = True
-    numeric_literals: bool = True
-    mode_function_features: bool = True
-    ambiguous: Literal["drop", "keep"] = "drop"
-    both_polarities: bool = True
-    literal_choice: Literal["gain", "negatives"] = "gain"
     max_literals: int = 5
     max_clauses: int = 8
     max_new_variables: int = 2
     beam: int = 4
-    mdl: bool = True
-    min_precision: float = 0.5
     clause_tree_threshold: float = 0.01
     fall_through_tree_threshold: float = 0.02
-    tree_errors: Literal["class", "stage"] = "class"
     tree_min_leaf: int = 3
     tree_max_depth: int = 6
-    class_balance: float = 0.0
     exemplars_per_state: int = 10
     exemplars_alone: int = 3000
     noise_per_state: int = 200
     max_exemplars: int = 6000
     exemplar_memory: int = 128
-    repair: bool = True
     relearn_growth: float = 1.5
 
     def __post_init__(self) -> None:
         plain(self)
-        one_of(self, votes=("soft", "hard"), context=("auto", "approached", "touching", "all"))
-        one_of(self, ambiguous=("drop", "keep"), literal_choice=("gain", "negatives"))
-        one_of(self, tree_errors=("class", "stage"))
+        one_of(self, context=("auto", "approached", "touching", "all"))
         at_least(self, 1, "max_literals", "max_clauses", "beam", "tree_min_leaf", "tree_max_depth")
         at_least(self, 1, "exemplars_per_state", "exemplars_alone", "noise_per_state")
         at_least(self, 0, "max_new_variables")
@@ -159,40 +106,6 @@ class ClassificationConfig:
             self, **dict.fromkeys(("exemplars_per_state", "exemplars_alone", "noise_per_state"), 10_000_000)
         )
         at_most(self, max_exemplars=10_000_000, exemplar_memory=1_000_000, tree_min_leaf=1_000_000)
-        unit(self, "min_precision", "clause_tree_threshold", "fall_through_tree_threshold", "class_balance")
-        at_least(self, 0.5, "min_precision")
+        unit(self, "clause_tree_threshold", "fall_through_tree_threshold")
         if not self.relearn_growth > 1:
             raise ConfigError(f"relearn_growth must be greater than 1, got {self.relearn_growth}")
-
-    @classmethod
-    def thesis(cls, **changes: Any) -> ClassificationConfig:
-        """§3.4 as published: hard votes, only relations, greedy search, few trees, arbitrary labels.
-
-        Mended where it can't work as printed: the inner loop of Algorithm 2 stops at a clause that describes
-        more than it explains and never gives up all positives; a rejected clause doesn't end learning; errors
-        are counted on all examples.
-        """
-        return replace(_THESIS, **changes)
-
-    @classmethod
-    def original(cls, **changes: Any) -> ClassificationConfig:
-        """The constants of the thesis' own system: FOIL gain, 90 % precision, trees where 25 % of a stage are wrong."""
-        trees: dict[str, Any] = {"clause_tree_threshold": 0.25, "fall_through_tree_threshold": 0.25}
-        trees["tree_errors"] = "stage"
-        return replace(_THESIS, literal_choice="gain", mdl=False, min_precision=0.9, **(trees | changes))
-
-
-_THESIS = ClassificationConfig(
-    votes="hard",
-    runoff=False,
-    context="touching",
-    contact_facts=False,
-    numeric_literals=False,
-    mode_function_features=False,
-    ambiguous="keep",
-    literal_choice="negatives",
-    beam=1,
-    clause_tree_threshold=0.05,
-    fall_through_tree_threshold=0.2,
-    repair=False,
-)

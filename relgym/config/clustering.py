@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from relgym.arguments import refusing_fields
-from relgym.config.checks import GREATEST_NOISE, LEAST_NOISE, at_least, at_most, one_of, plain
+from relgym.config.checks import GREATEST_NOISE, LEAST_NOISE, at_least, at_most, plain
 from relgym.errors import ConfigError
 
 __all__ = ["ClusteringConfig"]
@@ -24,7 +24,7 @@ class ClusteringConfig:
         estimates it per target from the data and their precision; a number in [1e-100, 1e100] overrides the estimate.
         Too large folds behaviours into one mode, too small learns none (§4.6).
     inlier_stds
-        An example fits a function when its residual is at most this many σ. Default 4 (thesis 2, original 3), range
+        An example fits a function when its residual is at most this many σ. Default 4 (thesis 2, its program 3), range
         [1e-6, 1e6]. Raising it admits more of a noisy mode's tail.
     tail_stds
         Noise within this many σ of a known mode never seeds another. Default 6, range [1e-6, 1e6]: an estimated σ may
@@ -50,18 +50,6 @@ class ClusteringConfig:
         determine isn't learned. Default 3, range 1 to a million.
     refit_growth
         A mode is refitted when its examples have grown by this factor. Default 2.
-    approximate
-        Whether, where no exact law explains most examples, the best sparse function is taken that leaves at most a
-        tenth of the change, with its residuals as noise. Default true; the thesis has no such thing.
-    stickiness
-        Whether, of the modes that explain an example equally well, those with fewest parameters win
-        ("simple", default) or, as in the original program, whichever is nearest ("nearest").
-    review
-        Whether, where noise is so large that modes explain each other's examples by chance (an example verifies a
-        function by 12 bits at most), all are assigned anew as they become more, by their errors and by what each mode
-        has in their relational state; and modes are sought among those that are explained badly
-        (`relgym.clustering.suspects`). Default true; the thesis knew noise as what no mode explains. Needs more than
-        one relational state, so bodies: without them it does nothing.
     """
 
     noise_std: float | Literal["auto"] = "auto"
@@ -74,13 +62,9 @@ class ClusteringConfig:
     unify_ratio: float = 0.9
     support: int = 3
     refit_growth: float = 2.0
-    approximate: bool = True
-    stickiness: Literal["simple", "nearest"] = "simple"
-    review: bool = True
 
     def __post_init__(self) -> None:
         plain(self)
-        one_of(self, stickiness=("simple", "nearest"))
         at_least(self, 1, "draws", "support")
         at_least(self, 0, "max_terms")
         at_most(self, draws=100_000, support=1_000_000, max_terms=64)

@@ -1,4 +1,4 @@
-"""All parameters of a model in one record, with the thesis' published and its program's settings as presets."""
+"""All parameters of a model in one record."""
 
 from __future__ import annotations
 
@@ -167,57 +167,6 @@ class ModelConfig:
         """`classification`, with no more examples of a mode than a short history has room for: a twentieth of it."""
         most = max(self.classification.exemplars_per_state, self.history // 20)
         return replace(self.classification, exemplars_alone=min(self.classification.exemplars_alone, most))
-
-    @classmethod
-    def thesis(cls, **changes: Any) -> ModelConfig:
-        """Relgym's learner with chapter III's constants: T=40, N=2000, 2σ, R_unify=0.9, hard votes, no contact facts.
-
-        Chapter III itself is `relgym.thesis`, with `ThesisSettings.thesis`: rules of its own, not settings of these.
-        This one shares relgym's searches for modes and clauses, and always answers.
-
-        Mends, each because the text doesn't work as printed: the noise variance in Mallows's Cp is the given one, not
-        the full model's (0/0 on exact data); a chosen regressor leaves the candidates; a removed mode's examples
-        return to the noise; FOIL stops at clauses that describe more than they explain, and a rejected clause doesn't
-        end learning; errors are counted on all examples; residuals within the noise are ties, won by the simpler mode;
-        roles are assigned jointly.
-
-        Differences that serve bounded memory and time: FOIL sees at most `exemplars_per_state` examples of a mode in a
-        relational state, weighted; σ is estimated unless it is given.
-        """
-        clustering = ClusteringConfig(
-            min_examples=40, draws=2000, inlier_stds=2.0, unify_ratio=0.9, approximate=False, review=False
-        )
-        return cls._world(clustering, ClassificationConfig.thesis(), **changes)
-
-    @classmethod
-    def original(cls, **changes: Any) -> ModelConfig:
-        """Relgym's learner with the constants of the thesis' program: 3σ, σ² = 1e-15, N=1000, T=40, trees above 25 %.
-
-        The program's own rules are `relgym.thesis`, with `ThesisSettings.original`.
-
-        Not copied are its defects: errors of clauses counted on a quarter of the negatives only, examples of deleted
-        modes lost, unification samples that hold no new example, variables leaking between roles. Nor is its test of
-        decision trees on held-out examples, which kept trees from modes of fewer than 60: here they pay in description
-        length. Ties of votes go to the mode with more examples, not to the younger one.
-        """
-        clustering = ClusteringConfig(
-            noise_std=3.1622776601683795e-08,
-            min_examples=40,
-            draws=1000,
-            inlier_stds=3.0,
-            unify_ratio=0.9,
-            approximate=False,
-            stickiness="nearest",
-            review=False,
-        )
-        return cls._world(clustering, ClassificationConfig.original(), **changes)
-
-    @classmethod
-    def _world(
-        cls, clustering: ClusteringConfig, classification: ClassificationConfig, **changes: Any
-    ) -> ModelConfig:
-        """A preset of the thesis' learner, which knows the world's axes only, and always answers."""
-        return replace(cls(clustering, classification, abstain=False, frames="world"), **changes)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""

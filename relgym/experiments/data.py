@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations, product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from relgym.experiments.analytic import (
     truck_modes,
 )
 from relgym.experiments.episodes import Episode, Truth
-from relgym.experiments.scenes import ThesisScenes
+from relgym.experiments.scenes import SCENES, ThesisScenes
 from relgym.scene.objects import Float1D, Float2D, SceneLayout
 from relgym.scene.schema import SceneSchema
 
@@ -60,8 +60,8 @@ class BallExperiment:
     objects
         Kinds that stand in the room.
     scenes
-        From where sizes, places and speeds are drawn: as in the env (``"env"``), or so that modes are as frequent as in
-        the thesis' tables (``"thesis"``, `relgym.experiments.scenes`).
+        From where sizes, places and speeds are drawn; none: as in the env. Those of `THESIS_EXPERIMENTS` make modes as
+        frequent as in the thesis' tables (`relgym.experiments.scenes`).
     """
 
     incline: float
@@ -70,7 +70,7 @@ class BallExperiment:
     episodes: int
     type_names: str = "shape"
     objects: tuple[str, ...] = ("box", "ramp")
-    scenes: Literal["env", "thesis"] = "env"
+    scenes: ThesisScenes | None = None
 
     def modes(self) -> AnalyticModes:
         """The analytic modes of its rooms."""
@@ -85,7 +85,7 @@ BALL_EXPERIMENTS: Mapping[int, BallExperiment] = {
 """The thesis' three experiments, in the env's scenes: 16,000, 32,000 and 96,000 examples."""
 
 THESIS_EXPERIMENTS: Mapping[int, BallExperiment] = {
-    number: replace(setting, scenes="thesis") for number, setting in BALL_EXPERIMENTS.items()
+    number: replace(setting, scenes=SCENES[number]) for number, setting in BALL_EXPERIMENTS.items()
 }
 """The same in scenes with the thesis' frequencies."""
 
@@ -224,14 +224,14 @@ def _begun(
     env: BallBoxRampEnv, case: Mapping[str, Any], seed: int, setting: BallExperiment
 ) -> dict[str, Any]:
     """Reset the env to a scene of a case; what it says of it."""
-    if setting.scenes == "env":
+    if setting.scenes is None:
         _, info = env.reset(seed=seed, options=dict(case))
         return info
     rng = np.random.default_rng(seed)
     names = set(env.reset_options)
     alone = {"only": setting.objects[0]} if len(setting.objects) == 1 else {}
     for _ in range(_ATTEMPTS):
-        options = ThesisScenes().options({**case, **alone}, setting.incline, rng)
+        options = setting.scenes.options({**case, **alone}, setting.incline, rng)
         try:
             _, info = env.reset(seed=seed, options={k: v for k, v in options.items() if k in names})
         except ConfigError:

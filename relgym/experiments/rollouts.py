@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.experiments.episodes import Episode
+from relgym.model.protocol import SceneLearner
 from relgym.model.reports.text import Cell, table
-from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
 
 __all__ = ["STRAY", "RolloutErrors", "imagined", "largest_errors", "outside", "rollouts"]
@@ -59,7 +59,7 @@ class RolloutErrors:
         )
 
 
-def rollouts(model: WorldModel, episodes: Sequence[Episode]) -> RolloutErrors:
+def rollouts(model: SceneLearner, episodes: Sequence[Episode]) -> RolloutErrors:
     """Predict every episode from its first scene alone and compare with what happened (§4.8).
 
     Actions and exogenous properties come from the episode; everything else from the model's own predictions.
@@ -92,7 +92,7 @@ def rollouts(model: WorldModel, episodes: Sequence[Episode]) -> RolloutErrors:
     )
 
 
-def largest_errors(model: WorldModel, episodes: Sequence[Episode]) -> NDArray[np.float64]:
+def largest_errors(model: SceneLearner, episodes: Sequence[Episode]) -> NDArray[np.float64]:
     """Largest position error of each episode's roll-out, in units; infinite where it stopped early."""
     errors = []
     for _, group in groupby(episodes, key=lambda episode: episode.layout.names):
@@ -102,7 +102,7 @@ def largest_errors(model: WorldModel, episodes: Sequence[Episode]) -> NDArray[np
     return np.concatenate(errors)
 
 
-def imagined(model: WorldModel, vectors: Float2D, layout: SceneLayout) -> tuple[Float2D, int]:
+def imagined(model: SceneLearner, vectors: Float2D, layout: SceneLayout) -> tuple[Float2D, int]:
     """A roll-out from the first of some state vectors, of the same shape, and how many steps were predicted.
 
     What comes from outside the world (actions, exogenous properties) is taken from `vectors`; rows beyond the
@@ -120,7 +120,7 @@ def imagined(model: WorldModel, vectors: Float2D, layout: SceneLayout) -> tuple[
 
 
 def _roll(
-    model: WorldModel, truth: NDArray[np.float64], layout: SceneLayout
+    model: SceneLearner, truth: NDArray[np.float64], layout: SceneLayout
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Largest position error of each trial, and whether it stopped early.
 

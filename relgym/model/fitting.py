@@ -18,6 +18,7 @@ from relgym.scene.schema import SceneSchema
 
 if TYPE_CHECKING:
     from relgym.model.prediction import ScenePrediction
+    from relgym.model.protocol import SceneLearner
     from relgym.model.world_model import WorldModel
 
 __all__ = ["Progress", "as_transitions", "compare_and_learn", "ends_of", "progressive", "transitions_of"]
@@ -43,7 +44,7 @@ class Progress:
 
 
 def compare_and_learn(
-    model: WorldModel,
+    model: SceneLearner,
     transition: Transition,
     prediction: ScenePrediction | None,
     *,

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.mode import NOISE, Role
+from relgym.clustering.population import ClusterReport
 from relgym.scene.objects import SceneLayout
 from relgym.thesis.examples import Arrangement, Examples
 from relgym.thesis.modes import Cluster, roles_of
-from relgym.thesis.ransac import search
+from relgym.thesis.ransac import search, varied
 from relgym.thesis.regression import fit
 from relgym.thesis.settings import ThesisSettings
 
@@ -18,10 +19,10 @@ __all__ = ["Clusterer"]
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-_TIE = 1e-3
-"""The program's: errors that differ by a smaller share are equal."""
-
 _FIRST = 256
+
+_GROWTH = 20
+"""Noise grows by such a part between two searches: some 120 of them until there are 16,000 examples of it."""
 
 
 class Clusterer:
@@ -69,7 +70,7 @@ class Clusterer:
         return np.flatnonzero(self.labels == number)
 
     # ------------------------------------------------------------------ Figure 3.2
-    def learn_one(self, layout: SceneLayout, target: int, x: Floats, y: float) -> int:
+    def learn_one(self, layout: SceneLayout, target: int, x: Floats, y: float) -> ClusterReport:
         """Take up an example.
 
         Parameters
@@ -81,7 +82,7 @@ class Clusterer:
 
         Returns
         -------
-        The mode it belongs to.
+        The mode it belongs to, and what became of the modes.
         """
         group = self.examples.number_of(layout, target)
         number = self.examples.add(group, x, y)
@@ -89,7 +90,7 @@ class Clusterer:
         if number == len(self._labels):
             self._labels = np.concatenate([self._labels, np.zeros_like(self._labels)])
             self._errors = {k: np.concatenate([e, np.empty_like(e)]) for k, e in self._errors.items()}
-        errors = []
+        errors, known = [], [cluster.number for cluster in self.clusters]
         for cluster in self.clusters:
             errors.append(cluster.error(arrangement, row, y))
             self._errors[cluster.number][number] = errors[-1]
@@ -99,18 +100,19 @@ class Clusterer:
             for _ in range(self.settings.em_iterations):
                 if not self._discover():
                     break
-        return int(self._labels[number])
+        now = [cluster.number for cluster in self.clusters]
+        return ClusterReport(
+            int(self._labels[number]),
+            tuple(k for k in now if self._errors[k][number] <= self._tolerance),
+            tuple(k for k in now if k not in known),
+            tuple(k for k in known if k not in now),
+        )
 
     def _nearest_one(self, errors: list[float]) -> int:
         if not errors:
             return NOISE
         best = min(errors)
-        if best > self._tolerance:
-            return NOISE
-        if not self.settings.sparse_ties:
-            return self.clusters[errors.index(best)].number
-        tied = [c for c, e in zip(self.clusters, errors, strict=True) if e - best <= _TIE * best]
-        return min(tied, key=lambda c: c.weights).number
+        return self.clusters[errors.index(best)].number if best <= self._tolerance else NOISE
 
     # ------------------------------------------------------------------ §3.2.2
     def _discover(self) -> bool:
@@ -118,20 +120,29 @@ class Clusterer:
         if len(self._noise) < self._wait:
             return False
         noise = np.array(sorted(self._noise), dtype=np.intp)
+        # Samples are drawn by chance: one search may miss what the next one finds. But where nothing fits, as with too
+        # small a σ, a search for every example would take hours.
+        self._wait = len(self._noise) + max(1, len(self._noise) // _GROWTH)
         found = self._constant(noise) if self.settings.constants else None
-        largest = 0
+        found = found or self._line(noise)
         if found is None:
-            found, largest = self._line(noise)
-        if found is None:
-            self._wait = len(self._noise) + max(1, self.settings.min_examples - largest)
             return False
+        waited = self._wait
         self._wait = self.settings.min_examples
         cluster, members = found
-        if not self._unify(cluster, members):
+        known = {c.number for c in self.clusters}
+        # A unified mode is a new one, so that it is unified with what is left: of three flights at three speeds any two
+        # are too few for one function.
+        while (unified := self._unified(cluster, members)) is not None:
+            cluster, members = unified, self.members(unified.number)
+        if cluster not in self.clusters:
             self._add(cluster)
             self._move(members, cluster.number)
             self._refit(cluster)
         self._converge()
+        if {c.number for c in self.clusters} <= known:  # EM gave its examples away: more of them may keep it
+            self._wait = waited
+            return False
         return True
 
     def _constant(self, noise: Rows) -> tuple[Cluster, Rows] | None:
@@ -146,42 +157,37 @@ class Clusterer:
         members = noise[self.examples.y[noise] == values[best]]
         return Cluster(self._next, (own,), float(values[best])), members
 
-    def _line(self, noise: Rows) -> tuple[tuple[Cluster, Rows] | None, int]:
-        """A line through at least T examples of an arrangement, or the size of the largest set that lies on one."""
-        largest = 0
+    def _line(self, noise: Rows) -> tuple[Cluster, Rows] | None:
+        """A line through at least T examples of an arrangement."""
         for group, arrangement in enumerate(self.examples.arrangements):
             rows = noise[self.examples.groups[noise] == group]
             if len(rows) < self.settings.min_examples:
                 continue
             x, y = self.examples.x(group, rows), self.examples.y[rows]
             found = search(x, y, self.settings, self._rng)
-            largest = max(largest, found.size)
             if found.line is not None and found.size >= self.settings.min_examples:
                 roles = roles_of(found.line, arrangement)
-                return (Cluster(self._next, roles, found.line.intercept), rows[found.inliers]), largest
-        return None, largest
+                return Cluster(self._next, roles, found.line.intercept), rows[found.inliers]
+        return None
 
     # ------------------------------------------------------------------ §3.2.5
-    def _unify(self, new: Cluster, members: Rows) -> bool:
-        """Look for one function for the new mode's examples and those of an existing one, which it replaces."""
-        best: tuple[int, Cluster, Cluster] | None = None
+    def _unified(self, new: Cluster, members: Rows) -> Cluster | None:
+        """Replace a mode and another one by one function for the examples of both; none if there is no such."""
         for old in self.clusters:
-            general = self._general(self.members(old.number), members)
+            general = None if old is new else self._general(self.members(old.number), members)
             if general is None or not _occam(general, old, new):
                 continue
-            if best is None or general.weights < best[0]:
-                best = general.weights, old, general
-                if not self.settings.sparse_ties:
-                    break
-        if best is None:
-            return False
-        _, old, general = best
-        both = np.concatenate([self.members(old.number), members])
-        self._drop(old)
-        self._add(general)
-        self._move(both, general.number)
-        self._refit(general)
-        return True
+            both = np.concatenate([self.members(old.number), members])
+            for each in (old, new):
+                if each in self.clusters:
+                    self._drop(each)
+            self._add(general)
+            fits = self._errors[general.number][both] <= self._tolerance
+            self._move(both[fits], general.number)
+            self._move(both[~fits], NOISE)
+            self._refit(general)
+            return general
+        return None
 
     def _general(self, old: Rows, new: Rows) -> Cluster | None:
         """A function for most of both, of the target and of objects that are alone of their type."""
@@ -195,8 +201,7 @@ class Clusterer:
             flat = [c for part in columns for c in part]
             x[here] = self.examples.x(group, rows[here])[:, flat]
         ratio = self.settings.unify_ratio
-        least_old = len(old) if self.settings.sparse_ties else int(np.ceil(ratio * len(old)))
-        wanted = (least_old, int(np.ceil(ratio * len(new))))
+        wanted = (int(np.ceil(ratio * len(old))), int(np.ceil(ratio * len(new))))
         found = search(x, self.examples.y[rows], self.settings, self._rng, wanted=wanted, old=len(old))
         if found.line is None:
             return None
@@ -225,22 +230,8 @@ class Clusterer:
             return set(), set()
         errors = np.stack([self._errors[c.number][:n] for c in self.clusters], axis=1)
         best = errors.min(axis=1)
-        if self.settings.sparse_ties:
-            weights = np.array([c.weights for c in self.clusters])
-            order = np.argsort(weights, kind="stable")
-            tied = errors[:, order] - best[:, None] <= _TIE * best[:, None]
-            choice = order[tied.argmax(axis=1)]
-            # The program decides an example again only where its own mode got worse or another one better.
-            own = np.full(n, np.inf)
-            for k, cluster in enumerate(self.clusters):
-                mine = self.labels == cluster.number
-                own[mine] = errors[mine, k]
-            keep = (own <= self._tolerance) & (own <= best * (1.0 + _TIE))
-        else:
-            choice, keep = errors.argmin(axis=1), np.zeros(n, dtype=np.bool_)
         numbers = np.array([c.number for c in self.clusters])
-        after = np.where(best <= self._tolerance, numbers[choice], NOISE)
-        after = np.where(keep, self.labels, after)
+        after = np.where(best <= self._tolerance, numbers[errors.argmin(axis=1)], NOISE)
         moved = np.flatnonzero(after != self.labels)
         lost = set(self.labels[moved].tolist()) - {NOISE}
         for number in np.unique(after[moved]).tolist():
@@ -248,7 +239,11 @@ class Clusterer:
         return lost, set()
 
     def _refit(self, cluster: Cluster) -> bool:
-        """M-step: fit the function to all its examples, each under its best casting; whether it changed."""
+        """M-step: fit the function to all its examples, each under its best casting; whether it changed.
+
+        Forward-stepwise regression may miss the function that the examples lie on: one that explains fewer of them than
+        the present one isn't taken, so that likelihood never falls; nor one of what merely differs between two scenes.
+        """
         members = self.members(cluster.number)
         if len(members) < self.settings.sample:
             return False
@@ -267,11 +262,21 @@ class Clusterer:
                     parts_y.append(y[here])
                     first = first or (arrangement, columns)
         assert first is not None, "a mode with examples has castings"
-        line = fit(np.concatenate(parts_x), np.concatenate(parts_y), self.settings.noise_variance)
+        x = np.concatenate(parts_x)
+        line = fit(x, np.concatenate(parts_y), self.settings.noise_variance)
+        if not varied(x[:, list(line.columns)]):
+            return False
+        old, errors = (cluster.roles, cluster.intercept), self._errors[cluster.number]
         if not cluster.become(roles_of(line, first[0], first[1]), line.intercept):
             return False
+        fitted = int((errors[members] <= self._tolerance).sum())
+        self._errors[cluster.number] = np.empty_like(errors)
         self._measure(cluster)
-        return True
+        if int((self._errors[cluster.number][members] <= self._tolerance).sum()) >= fitted:
+            return True
+        cluster.become(*old)
+        self._errors[cluster.number] = errors
+        return False
 
     # ------------------------------------------------------------------ bookkeeping
     def _add(self, cluster: Cluster) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -116,6 +116,14 @@ class Examples:
         """Numbers and state vectors of an arrangement's examples."""
         rows = self._rows[group]
         return rows.numbers[: rows.count], rows.x[: rows.count]
+
+    def stream(self) -> Iterator[tuple[SceneLayout, int, Floats, float]]:
+        """All examples as they came: layout, target object, state vector, next value."""
+        for group, row, y in zip(
+            self.groups.tolist(), self._row[: self.count].tolist(), self.y.tolist(), strict=True
+        ):
+            arrangement = self.arrangements[group]
+            yield arrangement.layout, arrangement.target, self._rows[group].x[row], y
 
     def x(self, group: int, numbers: NDArray[np.intp] | Sequence[int]) -> Floats:
         """State vectors of some examples of one arrangement."""

@@ -147,7 +147,7 @@ def _candidates(facts: Facts, variables: int, settings: ThesisSettings) -> Itera
             if places == 1:
                 for v in bound:
                     yield Literal(name, (v,), positive)
-                if settings.free_literals and (may or not positive):
+                if may or not positive:
                     yield Literal(name, (new,), positive)
                 continue
             for a in bound:

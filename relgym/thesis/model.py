@@ -1,16 +1,23 @@
-"""The thesis' system as a whole (Figures 1.4 and 1.5): one learner for each target, and prediction (§3.6)."""
+"""The thesis' system as a whole (Figures 1.4 and 1.5): one learner for each target, and prediction (§3.6).
+
+It is asked as a `relgym.model.world_model.WorldModel` is (`relgym.model.protocol.SceneLearner`): wrappers teach it, and
+dreams and roll-outs are made of its predictions.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.mode import Mode
 from relgym.errors import QueryError, SchemaError
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome
+from relgym.model.learning import LearnReport
+from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.reports.tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
 from relgym.scene.objects import POSE, Scene, SceneLayout, Target, Transition
 from relgym.scene.relations import Extractor
@@ -19,6 +26,7 @@ from relgym.thesis.classifier import Pair, Sample, learn_pair, ranking
 from relgym.thesis.clusterer import Clusterer
 from relgym.thesis.examples import Arrangement
 from relgym.thesis.facts import Facts, Observer, joined
+from relgym.thesis.files import StoredExamples, read_examples, write_examples
 from relgym.thesis.modes import Casting, Cluster
 from relgym.thesis.roles import RoleRule, assign, learn_role
 from relgym.thesis.settings import ThesisSettings
@@ -65,19 +73,29 @@ class ThesisModel:
     Parameters
     ----------
     schema
-        Of the scenes; its targets must be declared.
+        Of the scenes.
     settings
-        `ThesisSettings.thesis` or `ThesisSettings.original`.
+        `ThesisSettings.thesis` (default) or `ThesisSettings.original`.
+    targets
+        What to learn; default: those that the schema declares. The thesis' system finds none by itself.
+
+    Attributes
+    ----------
+    extra : dict
+        Plain data of the caller's, kept in files.
+    seen : int
+        Number of transitions learned from.
 
     Raises
     ------
     SchemaError
-        The schema declares no targets.
+        There are no targets, neither given nor declared.
 
     Notes
     -----
-    It keeps all examples: a few hundred bytes each. Classifiers are learned anew by `finish` and wherever something is
-    asked after further learning.
+    It keeps all examples: a few hundred bytes each. A transition takes some 0.1 ms to learn. Classifiers are learned
+    anew from all examples, which takes up to seconds, by `finish` and wherever something is asked after further
+    learning: let a `ModelLearner` teach it with ``predict=False``.
 
     Examples
     --------
@@ -92,22 +110,54 @@ class ThesisModel:
     ["vy' = 0", "vy' = vy - 0.00098"]
     """
 
-    def __init__(self, schema: SceneSchema, settings: ThesisSettings | None = None) -> None:
-        if not schema.targets:
-            raise SchemaError("the thesis' system learns declared targets: give the schema `targets`")
-        self.schema = schema
+    def __init__(
+        self,
+        schema: SceneSchema,
+        settings: ThesisSettings | None = None,
+        *,
+        targets: Sequence[Target] | None = None,
+    ) -> None:
+        chosen = tuple(schema.targets or ()) if targets is None else tuple(targets)
+        if not chosen:
+            raise SchemaError(
+                "the thesis' system learns declared targets: pass targets=, or give the schema some"
+            )
+        self._schema, self._targets = schema, chosen
         self.settings = settings or ThesisSettings.thesis()
-        self.targets = schema.targets
-        self.seen = 0
+        self.seen, self.frozen = 0, False
+        self.extra: dict[str, Any] = {}
         self._models = {
             (t.type, t.property): TargetModel(
                 t, Clusterer(replace(self.settings, seed=self.settings.seed + k))
             )
-            for k, t in enumerate(schema.targets)
+            for k, t in enumerate(chosen)
         }
         self._extractor = Extractor(schema)
         self._close = Observer(self._extractor, close=self.settings.context == "close")
         self._whole = Observer(self._extractor, close=False)
+
+    def __repr__(self) -> str:
+        known = ", ".join(f"{t}: {len(self.modes(t.type, t.property))} modes" for t in self.targets)
+        return f"ThesisModel({known}; {self.seen} transitions)"
+
+    @property
+    def schema(self) -> SceneSchema:
+        """Of the scenes."""
+        return self._schema
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """What it learns."""
+        return self._targets
+
+    @property
+    def discovers(self) -> bool:
+        """Whether it finds targets by itself: never."""
+        return False
+
+    def governs(self, target: Target) -> bool:
+        """Whether laws of motion predict a target: never, modes do."""
+        return False
 
     def model_of(self, type_name: str, prop: str) -> TargetModel:
         """What is known of a target; `QueryError` if there is no such one."""
@@ -125,14 +175,29 @@ class ThesisModel:
         return self.model_of(type_name, prop).clusterer.noise
 
     # ------------------------------------------------------------------ learning
-    def learn_one(self, transition: Transition) -> None:
-        """Take up a transition: an example for each target of each object."""
+    def learn_one(self, transition: Transition) -> LearnReport:
+        """Take up a transition: an example for each target of each object that is still there afterwards."""
         before, after = transition.before, transition.after
         self.seen += 1
+        found = {}
         for part in self._models.values():
             for index in before.layout.of_type(part.target.type):
-                value = after[before.layout.names[index]][part.target.property]
-                part.clusterer.learn_one(before.layout, index, before.vector, value)
+                name, prop = before.layout.names[index], part.target.property
+                if name in after:
+                    found[name, prop] = part.clusterer.learn_one(
+                        before.layout, index, before.vector, after[name][prop]
+                    )
+        return LearnReport(found, 0)
+
+    def take_up(
+        self,
+        transition: Transition,
+        prediction: ScenePrediction,
+        residuals: Mapping[tuple[str, str], float],
+        precision: float = 0.0,
+    ) -> LearnReport:
+        """`learn_one`: the thesis' system learns nothing from how its predictions came out."""
+        return self.learn_one(transition)
 
     def finish(self) -> None:
         """Learn classifiers of modes and roles from all examples."""
@@ -241,10 +306,17 @@ class ThesisModel:
             ("world",) * len(parts),
         )
 
-    def predict_one(self, scene: Scene) -> Scene:
-        """The next scene; what can't be predicted keeps its value."""
+    def predict_one(self, scene: Scene) -> ScenePrediction:
+        """Predict the next scene; what can't be predicted keeps its value."""
         found = self.predict_batch(scene.layout, scene.vector[None])
-        return Scene(self.schema, scene.layout, found.vectors[0])
+        after = Scene(self.schema, scene.layout, found.vectors[0])
+        parts = tuple(
+            Prediction(name, prop, float(after[name][prop]), OUTCOMES[outcome], int(mode), (name,))
+            for (name, prop), outcome, mode in zip(
+                found.parts, found.outcomes[0].tolist(), found.modes[0].tolist(), strict=True
+            )
+        )
+        return ScenePrediction(after, parts)
 
     def mode_values(self, type_name: str, prop: str, layout: SceneLayout, vectors: Floats) -> Floats:
         """What each mode would predict, shape ``(n, modes)``; NaN where other objects' roles are open."""
@@ -318,6 +390,49 @@ class ThesisModel:
     def describe(self) -> str:
         """The tables as text."""
         return str(self.report())
+
+    # ------------------------------------------------------------------ files
+    def save(self, path: str | os.PathLike[str], *, history: bool = True) -> None:
+        """Write the examples to one file, atomically: the same examples teach the same model (`load`).
+
+        Parameters
+        ----------
+        path
+            Where to write.
+        history
+            Without effect: the examples are all that is written, and what further learning needs.
+        """
+        stored = StoredExamples(
+            self.schema,
+            self.targets,
+            self.settings,
+            self.seen,
+            self.extra,
+            [self.model_of(t.type, t.property).clusterer.examples.stream() for t in self.targets],
+        )
+        write_examples(path, stored)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> ThesisModel:
+        """Read what `save` wrote, and learn it again: as long as it took to learn.
+
+        Raises
+        ------
+        ModelFileError
+            Truncated, edited, foreign, of another version, or inconsistent.
+        """
+        return _restored(read_examples(path))
+
+
+def _restored(found: StoredExamples) -> ThesisModel:
+    """What the examples of a file teach."""
+    model = ThesisModel(found.schema, found.settings, targets=found.targets)
+    for target, examples in zip(found.targets, found.examples, strict=True):
+        clusterer = model.model_of(target.type, target.property).clusterer
+        for layout, index, x, y in examples:
+            clusterer.learn_one(layout, index, x, y)
+    model.seen, model.extra = found.seen, found.extra
+    return model
 
 
 def _nothing(observer: Observer) -> Facts:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.thesis.regression import Line, fit, fit_samples
 from relgym.thesis.settings import ThesisSettings
 
-__all__ = ["Consensus", "search"]
+__all__ = ["Consensus", "search", "varied"]
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -91,6 +91,7 @@ def search(
     shown = x[:, varying]
     tolerance = settings.inlier_stds * settings.noise_variance**0.5
     best, draws, done = none, settings.draws, 0
+    verified = _Verifier(x)
     while done < draws:
         count = min(_AT_ONCE, draws - done)
         done += count
@@ -103,7 +104,7 @@ def search(
             found = Consensus(line, fits[:, k])
             if found.size <= best.size:
                 continue
-            if not _verified(x, found):
+            if not verified(found):
                 continue
             if wanted is None and settings.cross_check and not _holds(x, y, found, settings):
                 continue
@@ -207,14 +208,40 @@ def _spread(x: Floats, width: int, count: int, rng: np.random.Generator) -> Rows
     return chosen
 
 
-def _verified(x: Floats, found: Consensus) -> bool:
-    """Whether columns that seldom change took more values together than their weights alone could fit."""
-    assert found.line is not None, "only lines are tested"
-    rows = x[found.inliers][:, list(found.line.columns)]
-    seldom = [k for k in range(rows.shape[1]) if len(np.unique(rows[:, k])) < len(rows) / 2]
+def varied(rows: Floats) -> bool:
+    """Whether columns that seldom change took more values together than their weights alone could fit.
+
+    Parameters
+    ----------
+    rows
+        Examples that lie on a line, the line's columns alone, shape ``(n, columns)``.
+    """
+    values = [len(np.unique(column)) for column in rows.T]
+    seldom = [k for k, count in enumerate(values) if count < len(rows) / 2]
+    # Together, and each by itself: beside a speed of many values a size of two tells one scene from another.
     if not seldom:
         return True
+    if min(values[k] for k in seldom) < 2 + _VERIFYING:
+        return False
     return len(np.unique(rows[:, seldom], axis=0)) >= len(seldom) + 1 + _VERIFYING
+
+
+class _Verifier:
+    """`varied` of lines' inliers.
+
+    Of few scenes many samples say the same, and counting values takes longer than the fit: answers are remembered.
+    """
+
+    def __init__(self, x: Floats) -> None:
+        self._x = x
+        self._known: dict[tuple[tuple[int, ...], bytes], bool] = {}
+
+    def __call__(self, found: Consensus) -> bool:
+        assert found.line is not None, "only lines are tested"
+        key = found.line.columns, found.inliers.tobytes()
+        if key not in self._known:
+            self._known[key] = varied(self._x[found.inliers][:, list(found.line.columns)])
+        return self._known[key]
 
 
 def _holds(x: Floats, y: Floats, found: Consensus, settings: ThesisSettings) -> bool:

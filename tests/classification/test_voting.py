@@ -30,8 +30,8 @@ def _pair(i: int, j: int, counts: list[list[float]], fires: bool) -> BinaryClass
     return BinaryClassifier(i, j, scope, "touching", Definition((clause,)), counts=counts)
 
 
-def _voting(how: str, *, runoff: bool = False) -> Voting:
-    voting = Voting(BALL_VOCABULARY, (1, 2, 3), how, runoff=runoff)  # type: ignore[arg-type]
+def _voting() -> Voting:
+    voting = Voting(BALL_VOCABULARY, (1, 2, 3))
     # 1 beats 2 for sure; 3 narrowly beats 1; 2 narrowly beats 3.
     pairs = [
         _pair(1, 2, [[98.0, 0.0], [0.0, 98.0]], fires=True),
@@ -42,35 +42,14 @@ def _voting(how: str, *, runoff: bool = False) -> Voting:
     return voting
 
 
-def test_hard_votes_tie_and_the_more_frequent_mode_wins() -> None:
-    ranking = _voting("hard").rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
-    assert ranking.modes == (2, 3, 1)
-    assert ranking.scores == (1.0, 1.0, 1.0)
-    assert ranking.margin == 0.0
-
-
-def test_soft_votes_let_the_sure_pair_decide() -> None:
-    ranking = _voting("soft").rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
-    expected = {
-        1: math.log(99 / 100) + math.log(5 / 11),
-        2: math.log(1 / 100) + math.log(6 / 11),
-        3: math.log(6 / 11) + math.log(5 / 11),
-    }
-    assert ranking.modes == (1, 3, 2)
-    assert ranking.scores == pytest.approx([expected[mode] for mode in ranking.modes], abs=1e-9)
-    assert ranking.margin == pytest.approx(expected[1] - expected[3], abs=1e-9)
-
-
 def test_in_a_run_off_the_pairs_of_modes_that_dropped_out_are_not_heard() -> None:
-    ranking = _voting("soft", runoff=True).rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
+    ranking = _voting().rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
     assert ranking.modes == (3, 1, 2)  # 2 loses most by far; without it, 3 beats 1
     assert ranking.margin == pytest.approx(math.log(6 / 5), abs=1e-9)
 
 
-@pytest.mark.parametrize("runoff", [False, True])
-@pytest.mark.parametrize("how", ["soft", "hard"])
-def test_a_batch_is_ranked_as_each_of_its_examples(how: str, runoff: bool) -> None:
-    voting = _voting(how, runoff=runoff)
+def test_a_batch_is_ranked_as_each_of_its_examples() -> None:
+    voting = _voting()
     one = voting.rank(_ITEM.example, [0.0] * 3, _COUNTS, _EVERYTHING_SEEN)
     batch = voting.rank_batch(ExampleBatch.of(_ITEM.example), np.zeros((1, 3)), _COUNTS, _EVERYTHING_SEEN)
     assert batch[0] == one
@@ -89,13 +68,13 @@ def test_a_mode_that_wins_all_its_pairs_wins_the_run_off(modes: int, seed: int) 
 
 
 def test_votes_are_whole_units() -> None:
-    for pair in _voting("soft")._classifiers:
-        for votes in pair.votes("soft"):
+    for pair in _voting()._classifiers:
+        for votes in pair.votes:
             assert all(isinstance(vote, int) and -10 * VOTE_UNIT < vote < 0 for vote in votes)
 
 
 def test_familiar_is_what_was_seen_or_what_a_clause_speaks_for() -> None:
-    voting = _voting("soft")
+    voting = _voting()
     values = [0.0] * 3
     assert voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN).familiar  # a clause spoke for mode 1
     assert not voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN).seen
@@ -108,7 +87,7 @@ def test_familiar_is_what_was_seen_or_what_a_clause_speaks_for() -> None:
 
 
 def test_no_modes_no_winner() -> None:
-    voting = Voting(BALL_VOCABULARY, (), "soft")
+    voting = Voting(BALL_VOCABULARY, ())
     assert voting.rank(_ITEM.example, [], {}, _NOTHING_SEEN).modes == ()
     batch = voting.rank_batch(ExampleBatch.of(_ITEM.example), np.empty((1, 0)), {}, _NOTHING_SEEN)
     assert batch.modes.shape == (1, 0)
@@ -116,7 +95,7 @@ def test_no_modes_no_winner() -> None:
 
 
 def test_verdicts_give_clause_counts_and_probability() -> None:
-    voting = _voting("soft")
+    voting = _voting()
     first, second = voting.verdicts(_ITEM.example, [0.0] * 3, (1, 2, 3))
     assert (first.winner, first.runner_up, str(first.clause)) == (1, 2, "vx <= 9")
     assert (first.correct, first.incorrect, first.probability) == (98.0, 0.0, 99 / 100)

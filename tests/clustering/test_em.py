@@ -10,7 +10,6 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.discovery import Scale
 from relgym.clustering.em import Cluster, preferred, refit
 from relgym.clustering.mode import Role
-from relgym.config import ClusteringConfig
 from relgym.scene.objects import ObjectType
 from relgym.scene.shapes import Box
 
@@ -27,7 +26,7 @@ def filled(signature: SlotSignature, rows: np.ndarray) -> tuple[Stream, np.ndarr
 
 def test_of_two_exact_explanations_the_one_with_fewer_parameters_wins() -> None:
     clusters = {1: Cluster(mode_of(("v", 1.0)), fitted=1000), 2: Cluster(mode_of(id=2), fitted=10)}
-    assert preferred([1, 2], {1: 0.0, 2: 1e-14}, clusters, SCALE, ClusteringConfig()) == 2
+    assert preferred([1, 2], {1: 0.0, 2: 1e-14}, clusters, SCALE) == 2
 
 
 def test_among_equals_the_more_frequent_then_the_older_wins() -> None:
@@ -37,13 +36,7 @@ def test_among_equals_the_more_frequent_then_the_older_wins() -> None:
         3: Cluster(mode_of(("w", 2.0), id=3), fitted=11),
     }
     errors = {1: 0.0, 2: 0.0, 3: 0.0}
-    assert preferred([1, 2, 3], errors, clusters, SCALE, ClusteringConfig()) == 2
-
-
-def test_the_original_program_takes_the_nearest() -> None:
-    clusters = {1: Cluster(mode_of(("v", 1.0))), 2: Cluster(mode_of(id=2))}
-    config = ClusteringConfig(stickiness="nearest")
-    assert preferred([1, 2], {1: 1e-15, 2: 1e-14}, clusters, SCALE, config) == 1
+    assert preferred([1, 2, 3], errors, clusters, SCALE) == 2
 
 
 def test_refitting_sharpens_the_weights(rng: np.random.Generator) -> None:

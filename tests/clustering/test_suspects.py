@@ -12,7 +12,7 @@ from streams import Stream
 
 from relgym.clustering.discovery import Scale
 from relgym.clustering.suspects import FIRST, MOST, Evidence, likeliest, review_due, suspects
-from relgym.config import ClusteringConfig, ModelConfig
+from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
 
 SIGMA = 0.1
@@ -136,10 +136,6 @@ def test_reviews_say_that_examples_were_assigned_anew(rng: np.random.Generator) 
     assert reviews(ClusteringConfig(noise_std=4e-3), rng) == [512, 640]
 
 
-def test_a_review_can_be_switched_off(rng: np.random.Generator) -> None:
-    assert reviews(ClusteringConfig(noise_std=4e-3, review=False), rng) == []
-
-
 def test_a_world_of_one_state_is_not_reviewed(rng: np.random.Generator) -> None:
     assert reviews(ClusteringConfig(noise_std=4e-3), rng, apart=False) == []
 
@@ -152,11 +148,6 @@ def reviews(config: ClusteringConfig, rng: np.random.Generator, *, apart: bool =
         (report,) = stream.feed([row], [value], b"ramp" if bounces and apart else b"air")
         found += [k + 1] if report.reassigned else []
     return found
-
-
-@pytest.mark.parametrize("preset", [ModelConfig.thesis(), ModelConfig.original()])
-def test_the_thesis_knew_no_reviews(preset: ModelConfig) -> None:
-    assert not preset.clustering.review
 
 
 def test_exact_data_are_never_reviewed(rng: np.random.Generator) -> None:

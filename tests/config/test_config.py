@@ -1,4 +1,4 @@
-"""Parameters: what they refuse, the presets of the thesis, and files that give them back."""
+"""Parameters: what they refuse, and files that give them back."""
 
 from __future__ import annotations
 
@@ -18,22 +18,21 @@ from relgym.errors import ConfigError
 @pytest.mark.parametrize(
     ("record", "wrong", "message"),
     [
-        (ClassificationConfig, {"votes": "loud"}, r"votes must be one of \('soft', 'hard'\), got 'loud'"),
         (ClassificationConfig, {"context": "near"}, "context must be one of .*'approached'.*, got 'near'"),
-        (ClassificationConfig, {"ambiguous": "toss"}, "ambiguous must be one of"),
-        (ClassificationConfig, {"literal_choice": "luck"}, "literal_choice must be one of"),
-        (ClassificationConfig, {"tree_errors": "all"}, "tree_errors must be one of"),
         (ClassificationConfig, {"beam": 0}, "beam must be at least 1, got 0"),
         (ClassificationConfig, {"exemplars_alone": 0}, "exemplars_alone must be at least 1, got 0"),
         (ClassificationConfig, {"max_new_variables": -1}, "max_new_variables must be at least 0, got -1"),
         (ClassificationConfig, {"max_exemplars": 99}, "max_exemplars must be at least 100, got 99"),
-        (ClassificationConfig, {"class_balance": 1.5}, r"class_balance must lie in \[0, 1\], got 1.5"),
         (
             ClassificationConfig,
-            {"class_balance": float("nan")},
-            "class_balance must be finite, got nan",
+            {"clause_tree_threshold": 1.5},
+            r"clause_tree_threshold must lie in \[0, 1\], got 1.5",
         ),
-        (ClassificationConfig, {"min_precision": 0.4}, "min_precision must be at least 0.5, got 0.4"),
+        (
+            ClassificationConfig,
+            {"fall_through_tree_threshold": float("nan")},
+            "fall_through_tree_threshold must be finite, got nan",
+        ),
         (ClassificationConfig, {"relearn_growth": 1.0}, "relearn_growth must be greater than 1, got 1.0"),
         (ClusteringConfig, {"noise_std": 0.0}, "noise_std must be 'auto' or a positive float, got 0.0"),
         (
@@ -45,7 +44,6 @@ from relgym.errors import ConfigError
         (ClusteringConfig, {"draws": 0}, "draws must be at least 1, got 0"),
         (ClusteringConfig, {"unify_ratio": 0.4}, r"unify_ratio must lie in \[0.5, 1\], got 0.4"),
         (ClusteringConfig, {"refit_growth": 1.0}, "refit_growth must be greater than 1, got 1.0"),
-        (ClusteringConfig, {"stickiness": "glue"}, "stickiness must be one of"),
         (ModelConfig, {"geometry": "bullet"}, "geometry must be one of"),
         (ModelConfig, {"frames": "own"}, "frames must be one of"),
         (ClusteringConfig, {"inlier_stds": 0}, "inlier_stds must be at least 1e-06, got 0"),
@@ -94,32 +92,13 @@ def test_nobody_changes_them_under_a_model() -> None:
         config.seed = 1
 
 
-def test_the_thesis_as_published() -> None:
-    config = ModelConfig.thesis()
-    clustering = config.clustering
-    assert (clustering.min_examples, clustering.draws, clustering.unify_ratio) == (40, 2000, 0.9)  # §4.2
-    assert clustering.inlier_stds == 2.0
-    assert (config.classification.votes, config.classification.runoff) == ("hard", False)
-    assert not config.classification.contact_facts
-    assert (config.frames, config.abstain) == ("world", False)
-    assert ModelConfig.thesis(seed=3) == replace(config, seed=3)
-
-
-def test_the_program_of_the_thesis() -> None:
-    config = ModelConfig.original()
-    assert config.clustering.noise_std == pytest.approx(1e-15**0.5)
-    assert (config.clustering.min_examples, config.clustering.draws) == (40, 1000)
-    assert (config.classification.literal_choice, config.classification.min_precision) == ("gain", 0.9)
-    assert ClassificationConfig.original(tree_errors="class").tree_errors == "class"
-
-
 @pytest.mark.parametrize(("history", "examples"), [(200_000, 3_000), (60_000, 3_000), (1_000, 50), (100, 10)])
 def test_a_short_history_bounds_what_is_remembered(history: int, examples: int) -> None:
     assert ModelConfig(history=history).classifying.exemplars_alone == examples
 
 
 @given(
-    st.sampled_from([ModelConfig(), ModelConfig.thesis(), ModelConfig.original()]),
+    st.sampled_from([ModelConfig(), ModelConfig(frames="world", abstain=False)]),
     st.integers(0, 2**31),
     st.lists(st.sampled_from(["trig", "cart:products", "squares"]), unique=True).map(tuple),
 )

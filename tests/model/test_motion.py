@@ -82,7 +82,6 @@ def test_modes_alone_when_asked_for() -> None:
     episodes = list(ball_episodes(1, seed=0, episodes=2))
     model = train(episodes, ModelConfig(frames="world"))
     assert (model.laws, model.governed) == (None, frozenset())
-    assert ModelConfig.thesis().frames == ModelConfig.original().frames == "world"
     with pytest.raises(ConfigError, match="frames must be one of"):
         ModelConfig(frames="contact")  # type: ignore[arg-type]
 

@@ -328,7 +328,7 @@ def test_an_equal_schema_is_the_same_schema() -> None:
     assert model.predict_one(twin.scene({"cart": [2.0], "action": [0.0]})).ok
 
 
-# ---------------------------------------------------------------------- noise and presets
+# ---------------------------------------------------------------------- noise, seeds and budgets
 def test_noisy_worlds_are_learned_to_the_noise() -> None:
     rng = np.random.default_rng(0)
     model = WorldModel(CART, targets=[X])
@@ -338,13 +338,6 @@ def test_noisy_worlds_are_learned_to_the_noise() -> None:
     (mode,) = model.modes("cart", "x")
     assert mode.formula(2) == "x' = 0.9 x + action.u"
     assert mode.sigma == pytest.approx(1e-4, rel=0.2)
-
-
-@pytest.mark.parametrize("config", [ModelConfig.thesis(), ModelConfig.original()])
-def test_the_presets_learn_the_room(config: ModelConfig, room_steps: list[RawStep]) -> None:
-    model = learned(schema_of(room_steps, ROOM_TARGETS), room_steps, config=config)
-    for target in ROOM_TARGETS:
-        assert formulas(model, target) == ROOM_MODES[target.property]
 
 
 def test_the_seed_decides_the_draws_and_nothing_else(room_steps: list[RawStep]) -> None:

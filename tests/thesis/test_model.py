@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
-from relgym.errors import ConfigError, QueryError, SchemaError
+from relgym.errors import ConfigError, ModelFileError, QueryError, SchemaError
 from relgym.experiments.data import THESIS_EXPERIMENTS, ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
+from relgym.experiments.rollouts import rollouts
+from relgym.model.protocol import SceneLearner
+from relgym.model.world_model import WorldModel
 from relgym.thesis.model import ThesisModel
 from relgym.thesis.settings import DEVIATIONS, ThesisSettings
+from relgym.wrappers import ModelLearner
 
 SEED = 901
 
@@ -115,6 +121,69 @@ def test_nothing_is_predicted_before_anything_is_learned(one: list[Episode]) -> 
         model.modes("ball", "px")
     with pytest.raises(SchemaError, match="learns declared targets"):
         ThesisModel(replace(one[0].schema, targets=None))
+
+
+# ------------------------------------------------------------------ asked as any model is
+def test_the_wrapper_teaches_it_and_dreams_are_made_of_it(tmp_path: Path) -> None:
+    env = gym.make("relgym/BallBoxRamp-v0")
+    given = ThesisModel(env.unwrapped.schema, ThesisSettings.original())  # type: ignore[attr-defined]
+    assert isinstance(given, SceneLearner)
+    learner = ModelLearner(env, model=given, predict=False)
+    learner.reset(seed=0)
+    for _ in range(400):
+        _, _, terminated, truncated, info = learner.step(learner.action_space.sample())
+        if terminated or truncated:
+            learner.reset()
+    assert learner.model is given and given.seen == 400  # type: ignore[comparison-overlap]
+    assert set(info["relgym"].learned.parts) == {("ball", "vx"), ("ball", "vy")}
+    assert "vx' = vx" in given.describe()
+    observation, action = learner.reset(seed=1)[0], learner.action_space.sample()
+    said = learner.predict(observation, action)
+    assert said.ok and said["ball", "vx"].mode > 0
+    dream = gym.make("relgym/LearnedModel-v0", model=given, disable_env_checker=True)
+    dream.reset(seed=0)
+    dream.step(dream.action_space.sample())
+    learner.save(tmp_path / "thesis.json")
+    again = ThesisModel.load(tmp_path / "thesis.json")
+    assert (again.describe(), again.extra) == (given.describe(), given.extra)
+
+
+def test_a_file_goes_on_where_it_was(one: list[Episode], tmp_path: Path) -> None:
+    transitions = [t for episode in one[:4] for t in episode.transitions()]
+    model = ThesisModel(one[0].schema)
+    for transition in transitions[:500]:
+        model.learn_one(transition)
+    model.save(tmp_path / "half")
+    again = ThesisModel.load(tmp_path / "half")
+    for each in (model, again):
+        for transition in transitions[500:]:
+            each.learn_one(transition)
+    assert again.describe() == model.describe()
+    assert repr(again) == repr(model)
+
+
+def test_files_of_either_kind_are_told_apart(one: list[Episode], tmp_path: Path) -> None:
+    model, other = ThesisModel(one[0].schema), WorldModel(one[0].schema)
+    for each, name in ((model, "thesis"), (other, "relgym")):
+        for transition in one[0].transitions():
+            each.learn_one(transition)
+        each.save(tmp_path / name)
+    with pytest.raises(ModelFileError, match="expected a file of the thesis' system"):
+        ThesisModel.load(tmp_path / "relgym")
+    with pytest.raises(ModelFileError):
+        WorldModel.load(tmp_path / "thesis")
+
+
+def test_roll_outs_take_it(models: dict[str, ThesisModel]) -> None:
+    tests = list(ball_episodes(THESIS_EXPERIMENTS[1], seed=SEED + 1, episodes=4, test=True))
+    found = rollouts(models["thesis"], tests)
+    assert (found.trials, found.steps, found.stopped) == (4, 200, 0)
+
+
+def test_targets_may_be_given(one: list[Episode]) -> None:
+    bare = replace(one[0].schema, targets=None)
+    (target, _) = one[0].schema.targets or ()
+    assert ThesisModel(bare, targets=[target]).targets == (target,)
 
 
 def test_settings_say_what_is_out_of_range() -> None:

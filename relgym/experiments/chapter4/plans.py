@@ -95,13 +95,12 @@ def _lesson(
 
 
 def rollouts(protocol: Protocol) -> Plan:
-    """Roll-outs of one model of experiment 1 per learner (§4.8)."""
-    run = protocol.runs(1)[0]
+    """Roll-outs of one model of experiment 1 per learner: of all batches the most accurate one (§4.8)."""
     arguments = {
         "experiment": 1,
-        "seed": run.seed,
-        "order": run.order,
+        "batches": [[run.seed, run.order] for run in protocol.runs()],
         "episodes": protocol.after(1)[-1],
+        "chosen_on": {"seeds": list(TEST_SEEDS[2:]), "episodes": protocol.test_episodes // len(TEST_SEEDS)},
         "tests": list(TEST_SEEDS[:2]),
         "trials": protocol.trials,
     }

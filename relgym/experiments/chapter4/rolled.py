@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.experiments.chapter4.learners import Learner, settings_of, taught
+from relgym.experiments.chapter4.lesson import fresh_episodes
+from relgym.experiments.chapter4.testing import scores_of
 from relgym.experiments.data import THESIS_EXPERIMENTS, ball_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.rollouts import STRAY
@@ -48,14 +50,27 @@ _RECENT: Final = 3
 
 
 def imagine(
-    *, learner: str, experiment: int, seed: int, order: int, episodes: int, tests: Sequence[int], trials: int
+    *,
+    learner: str,
+    experiment: int,
+    batches: Sequence[Sequence[int]],
+    episodes: int,
+    chosen_on: Mapping[str, Any],
+    tests: Sequence[int],
+    trials: int,
 ) -> dict[str, Any]:
-    """Train on one batch, then imagine whole episodes from their first scenes.
+    """Train on some batches, then let the most accurate model imagine whole episodes from their first scenes.
+
+    The thesis took "the most accurate and most common models obtained in the 50 training batches" (§4.8).
 
     Parameters
     ----------
-    learner, experiment, seed, order, episodes
+    learner, experiment, episodes
         The training (`relgym.experiments.chapter4.lesson`).
+    batches
+        Seed and order of each.
+    chosen_on
+        Examples by whose classification errors the model is chosen, as the tests of a lesson; not those of the trials.
     tests
         Seeds of the scenes, each shown in all 40 configurations as long as there are trials left.
     trials
@@ -63,17 +78,41 @@ def imagine(
 
     Returns
     -------
-    Plain data: errors of both coordinates by trial and step, paths, cause of every failure, counts of the bounces.
+    Plain data: errors of both coordinates by trial and step, paths, cause of every failure, counts of the bounces, and
+    which batch was chosen.
     """
-    setting = THESIS_EXPERIMENTS[experiment]
-    model = taught(ball_episodes(setting, seed=seed, order=order, episodes=episodes), settings_of(learner))
+    model, chosen = _most_accurate(learner, experiment, batches, episodes, chosen_on)
     real = trial_episodes(experiment, tests, trials)
     dreamed, steps = _dreams(model, real)
     bounces = Counter[str]()
     for episode in real:
         bounces.update(_surfaces(episode, experiment))
     tried = [_trial(*each, experiment) for each in zip(real, dreamed, steps, strict=True)]
-    return {"trials": tried, "bounces": dict(sorted(bounces.items()))}
+    return {"trials": tried, "bounces": dict(sorted(bounces.items())), "batch": chosen}
+
+
+def _most_accurate(
+    learner: str,
+    experiment: int,
+    batches: Sequence[Sequence[int]],
+    episodes: int,
+    chosen_on: Mapping[str, Any],
+) -> tuple[Learner, list[int]]:
+    """The model of the batch with fewest classification errors, of both velocities together; and that batch."""
+    setting = THESIS_EXPERIMENTS[experiment]
+    fresh, laws = fresh_episodes(experiment, chosen_on), setting.modes()
+    best: tuple[float, Learner, list[int]] | None = None
+    for seed, order in batches:
+        shown = ball_episodes(setting, seed=seed, order=order, episodes=episodes)
+        model = taught(shown, settings_of(learner))
+        if len(batches) == 1:
+            return model, [seed, order]
+        scores = scores_of(model, fresh, laws).values()
+        wrong = float(sum(score["counted"]["strict"] for score in scores))
+        if best is None or wrong < best[0]:
+            best = wrong, model, [seed, order]
+    assert best is not None, "there is at least one batch"
+    return best[1], best[2]
 
 
 def trial_episodes(experiment: int, tests: Sequence[int], trials: int) -> list[Episode]:

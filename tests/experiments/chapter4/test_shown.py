@@ -29,7 +29,13 @@ def stand_ins() -> Mapping[str, Any]:
     }
     found["pushing"] = pushing.lesson(learner="thesis", seed=100, repeats=1)
     found["imagine"] = rolled.imagine(
-        learner="world", experiment=1, **BATCH, episodes=2, tests=[10, 11], trials=6
+        learner="world",
+        experiment=1,
+        batches=[[100, 0]],
+        episodes=2,
+        chosen_on=TESTS,
+        tests=[10, 11],
+        trials=6,
     )
     found["noise"] = noisy.lesson(expected=1e-10, true=1e-10, **BATCH, episodes=2, tests=TESTS)
     found |= {"count/1": {"x": [1] * 4, "y": [1] * 5}, "count/2": {"x": [1] * 7, "y": [1] * 7}}

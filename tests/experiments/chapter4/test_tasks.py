@@ -125,8 +125,15 @@ def test_classifiers_are_right_where_the_mode_explains() -> None:
 
 
 def test_roll_outs_and_why_they_fail() -> None:
-    found = rolled.imagine(learner="world", **BATCH, episodes=3, tests=[110], trials=4)
+    trained = {"learner": "thesis", "experiment": 1, "episodes": 3, "chosen_on": TESTS}
+    found = rolled.imagine(**trained, batches=[[100, 0], [101, 1]], tests=[110], trials=4)
     assert len(found["trials"]) == 4
+    alone = {
+        batch[0]: rolled.imagine(**trained, batches=[batch], tests=[110], trials=4)
+        for batch in ([100, 0], [101, 1])
+    }
+    assert found["batch"] in ([100, 0], [101, 1])
+    assert found["trials"] == alone[found["batch"][0]]["trials"]
     for trial in found["trials"]:
         errors = np.array([[np.inf if e is None else e for e in axis] for axis in trial["errors"]])
         assert errors.shape == (2, 201) and not errors[:, 0].any()
