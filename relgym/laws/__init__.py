@@ -46,6 +46,6 @@ to have been over-specific, all that rests on it is derived again.
 
 *Laws or modes?* The model weighs both by description length, each unexplained number once, and lets laws govern a
 type where they are shorter: laws that leave all bounces open may win, and then say nothing of bounces. Without
-contacts there is no law of pairs, and nothing changes. While laws govern and are never wrong, the type's modes rest;
-the first wrong prediction wakes them. ``frames="world"`` is the learner of the thesis.
+contacts there is no law of pairs, and nothing changes. While laws govern and are hardly ever wrong, the type's modes
+rest; wrong predictions in more than 2 % wake them. ``frames="world"`` is the learner of the thesis.
 """

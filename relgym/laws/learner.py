@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ROUNDINGS, STDS
+from relgym.config.constants import LEFT_OPEN, ROUNDINGS, STDS
 from relgym.laws.book import LawBook, Motion
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
@@ -106,7 +106,7 @@ class LawLearner:
         return self._ledger.seen(type_name)
 
     def settled(self, type_name: str) -> bool:
-        """Whether the laws have long been as they are, and never wrong since."""
+        """Whether the laws have long been as they are, and hardly ever wrong since."""
         return self._ledger.settled(type_name)
 
     def bits(self, type_name: str) -> float:
@@ -369,7 +369,7 @@ class LawLearner:
         law = learner.law
         if not drift.noisy():
             return False
-        if law is not None and law.unexplained <= 0.02 * law.examples:
+        if law is not None and law.unexplained <= LEFT_OPEN * law.examples:
             return False
         spread = learner.spread()
         if STDS * spread <= self.book.tolerance:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from relgym.config.constants import LEFT_OPEN
+
 __all__ = ["SETTLED", "Ledger"]
 
 SETTLED = 500
-"""Transitions without a surprise after which laws count as settled."""
+"""Transitions, with hardly a surprise, after which laws count as settled."""
 
 
 @dataclass(slots=True)
@@ -65,9 +67,9 @@ class Ledger:
         return self._tallies[type_name].unlearned
 
     def settled(self, type_name: str) -> bool:
-        """Whether the laws have long been as they are, and never wrong since."""
+        """Whether the laws have long been as they are, and wrong no more often since than laws may be (`LEFT_OPEN`)."""
         tally = self._tallies[type_name]
-        return tally.wrong == 0 and tally.since >= SETTLED
+        return tally.since >= SETTLED and tally.wrong <= LEFT_OPEN * tally.since
 
     def to_json(self) -> list[list[str | int]]:
         """Plain data that `restore` reads back."""

@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from relgym.clustering.mode import sum_text
-from relgym.config.constants import DIGITS
+from relgym.config.constants import DIGITS, LEFT_OPEN
 from relgym.scene.geometry.vectors import FloatArray
 
 __all__ = ["ONE", "ZERO", "AxisLaw", "FreeLaw", "Kind", "Operator", "PairLaw", "Piece", "Share"]
@@ -112,7 +112,7 @@ class AxisLaw:
 
     def trusted(self) -> bool:
         """Whether it explains nearly all of its own examples: what it doesn't, it must not claim."""
-        return self.unexplained <= 0.02 * self.examples
+        return self.unexplained <= LEFT_OPEN * self.examples
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""

@@ -75,7 +75,7 @@ class Laws:
     def suffice(self, type_name: str, targets: Sequence[Target]) -> bool:
         """Whether the laws predict all targets of a type and have long been right: its modes may rest.
 
-        Modes rest until the laws are wrong for the first time, and go on learning then.
+        Modes rest until the laws are wrong more often than laws may be, and go on learning then.
         """
         own = [t for t in targets if t.type == type_name]
         return all(self.governs(t) for t in own) and self.learner.settled(type_name)
@@ -104,7 +104,7 @@ class Laws:
         changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
         self._last = None  # what the laws say may have changed
         if changed or self._seen % WEIGH_EVERY == 0:
-            self.governed = frozenset(name for name in self.learner.types if self._shorter(name, models))
+            self.governed = frozenset(name for name in self.learner.types if self._prevail(name, models))
 
     def _confirmed(
         self,
@@ -143,6 +143,11 @@ class Laws:
         vector = percept.vectors[0]
         return self.learner.confirm(cast, vector, following, touched, off, lambda: self._contacts(percept))
 
+    def _prevail(self, type_name: str, models: Mapping[Target, PropertyModel]) -> bool:
+        """Whether laws predict a type from now on. What modes would say is not known while they rest."""
+        rests = type_name in self.governed and self.suffice(type_name, tuple(models))
+        return rests or self._shorter(type_name, models)
+
     def _shorter(self, type_name: str, models: Mapping[Target, PropertyModel]) -> bool:
         """Whether a type's motion takes fewer bits by laws than by modes of every component."""
         if not self.learner.ready(type_name):
@@ -151,7 +156,8 @@ class Laws:
         parts = [part for t, part in models.items() if t.type == type_name and t.property in governed]
         if len(parts) < len(governed):
             return False
-        return self.learner.bits(type_name) < sum(mode_bits(part, self._columns) for part in parts)
+        seen = self.learner.seen(type_name)
+        return self.learner.bits(type_name) < sum(mode_bits(part, self._columns, seen) for part in parts)
 
     # ------------------------------------------------------------------ prediction
     def speak(self, percept: Percept) -> Motion | None:
@@ -225,7 +231,7 @@ class Laws:
         self._seen = int(data["seen"])
 
 
-def mode_bits(part: PropertyModel, columns: int) -> float:
+def mode_bits(part: PropertyModel, columns: int, seen: int) -> float:
     """Description length of a target's examples by modes: functions, which mode holds when, and noise.
 
     Parameters
@@ -234,6 +240,8 @@ def mode_bits(part: PropertyModel, columns: int) -> float:
         The target's model.
     columns
         Number of columns that a function may use.
+    seen
+        Number of the type's examples. Those that came while modes rested they would describe as they do others.
     """
     noise = part.clusterer.noise_examples
     counts = [mode.examples for mode in part.modes]
@@ -245,7 +253,8 @@ def mode_bits(part: PropertyModel, columns: int) -> float:
         stated += 1.0 + len(weights) * math.log2(columns)
         stated += constant * (sum(abs(w) != 1.0 for w in weights) + (mode.intercept != 0.0))
     labels = sum(-c * math.log2(c / n) for c in (*counts, noise) if c)
-    return stated + labels + EXCEPTION_BITS * noise
+    missed = max(1.0, seen / max(1, part.clusterer.seen))
+    return stated + missed * (labels + EXCEPTION_BITS * noise)
 
 
 def possible_targets(schema: SceneSchema) -> tuple[Target, ...]:
