@@ -17,7 +17,7 @@ from relgym.laws.impulses import Solved, solve
 from relgym.laws.inertia import Inertia
 from relgym.laws.joints import Joints
 from relgym.laws.points import Points
-from relgym.laws.records import ONE, FreeLaw, Kind, PairLaw, Share
+from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
 from relgym.laws.shares import EXTENT, share_values
 from relgym.laws.text import law_rows
 from relgym.laws.touching import Cast, Contacts, Group
@@ -222,9 +222,8 @@ class LawBook:
             for t in self.schema.types
             if t.parent == parent and (law := self.free.get(t.name)) is not None
         ]
-        stated = {tuple(piece.formula(9) for piece in law.components) for law in kin}
-        read = {name for law in kin for piece in law.components for name, _ in piece.terms if name != ONE}
-        known = read <= set(self.sources[type_name].names)
+        stated = {law.says() for law in kin}
+        known = all(law.reads() <= set(self.sources[type_name].names) for law in kin)
         return kin[0] if parent is not None and len(stated) == 1 and known else None
 
     def on(self, schema: SceneSchema, targets: tuple[Target, ...]) -> LawBook:

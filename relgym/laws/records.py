@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relgym.clustering.mode import sum_text
 from relgym.config.constants import DIGITS, LEFT_OPEN
 from relgym.scene.geometry.vectors import FloatArray
 
-__all__ = ["ONE", "ZERO", "AxisLaw", "FreeLaw", "Kind", "Operator", "PairLaw", "Piece", "Share"]
+__all__ = [
+    "ONE",
+    "ZERO",
+    "AxisLaw",
+    "Bound",
+    "FreeLaw",
+    "Kind",
+    "Operator",
+    "PairLaw",
+    "Piece",
+    "Region",
+    "Share",
+]
 
 _KEY = "rivals"  # of alternatives in files
 ONE = "1"
@@ -240,14 +253,100 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True)
+class Bound:
+    """A test of one component of a position. Between `low` and `high` nothing was seen, and nothing is known.
+
+    Attributes
+    ----------
+    name
+        The component.
+    above
+        Whether it holds from `high` on, or else up to `low`.
+    low, high
+        The last number seen on the one side, and the first one on the other.
+    """
+
+    name: str
+    above: bool
+    low: float
+    high: float
+
+    def text(self, digits: int = DIGITS) -> str:
+        """Such as ``px >= 0.003 (else px <= -0.001)``."""
+        low, high = (
+            f"{self.name} {sign} {value:.{digits}g}" for sign, value in (("<=", self.low), (">=", self.high))
+        )
+        return f"{high} (else {low})" if self.above else f"{low} (else {high})"
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Where another free law holds: where all bounds do."""
+
+    bounds: tuple[Bound, ...]
+    components: tuple[Piece, ...]
+
+    def text(self, digits: int = DIGITS) -> str:
+        """Such as ``px >= 0.003 (else px <= -0.001)``, its bounds joined by ``and``."""
+        return " and ".join(bound.text(digits) for bound in self.bounds)
+
+    def where(self, columns: Mapping[str, FloatArray]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether bodies are surely inside, and surely outside."""
+        inside, outside = np.bool_(True), np.bool_(False)
+        for bound in self.bounds:
+            value = columns[bound.name]
+            below, beyond = value <= bound.low, value >= bound.high
+            inside = inside & (beyond if bound.above else below)
+            outside = outside | (below if bound.above else beyond)
+        return np.asarray(inside), np.asarray(outside)
+
+
+@dataclass(frozen=True, slots=True)
 class FreeLaw:
-    """The next velocity of an object that touches nothing, along each world axis."""
+    """The next velocity of an object that touches nothing, along each world axis.
+
+    Attributes
+    ----------
+    type
+        The type of the objects.
+    components
+        A function for each component of the velocity, and for the spin if it is known.
+    examples, unexplained, bits
+        Examples that it was learned from, those that it doesn't explain, and description length.
+    regions
+        Where others hold; the first one counts.
+    """
 
     type: str
     components: tuple[Piece, ...]
     examples: int = 0
     unexplained: int = 0
     bits: float = 0.0
+    regions: tuple[Region, ...] = ()
+
+    def first(self, count: int) -> FreeLaw:
+        """The law of the first components alone."""
+        regions = tuple(replace(region, components=region.components[:count]) for region in self.regions)
+        return replace(self, components=self.components[:count], regions=regions)
+
+    def at(self, columns: Mapping[str, FloatArray]) -> tuple[Piece, ...]:
+        """The functions that hold for a single body; those that hold elsewhere where that isn't known."""
+        there = (region.components for region in self.regions if region.where(columns)[0].all())
+        return next(there, self.components)
+
+    def says(self) -> tuple[Any, ...]:
+        """What is stated, up to rounding and to where exactly regions end."""
+        regions = tuple(
+            (tuple((b.name, b.above) for b in region.bounds), _formulas(region.components))
+            for region in self.regions
+        )
+        return _formulas(self.components), regions
+
+    def reads(self) -> frozenset[str]:
+        """Names of all columns that it reads."""
+        pieces = [*self.components, *(piece for region in self.regions for piece in region.components)]
+        bounds = (bound.name for region in self.regions for bound in region.bounds)
+        return frozenset({name for piece in pieces for name, _ in piece.terms if name != ONE}.union(bounds))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
@@ -257,13 +356,28 @@ class FreeLaw:
             "examples": self.examples,
             "unexplained": self.unexplained,
             "bits": self.bits,
-        }
+        } | ({"regions": [_region_to_json(region) for region in self.regions]} if self.regions else {})
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> FreeLaw:
         """Read what `to_json` wrote."""
         numbers = (int(data["examples"]), int(data["unexplained"]), float(data["bits"]))
-        return cls(str(data["type"]), _pieces_from_json(data["components"]), *numbers)
+        regions = tuple(_region_from_json(region) for region in data.get("regions", ()))
+        return cls(str(data["type"]), _pieces_from_json(data["components"]), *numbers, regions)
+
+
+def _formulas(pieces: tuple[Piece, ...]) -> tuple[str, ...]:
+    return tuple(piece.formula(9) for piece in pieces)
+
+
+def _region_to_json(region: Region) -> dict[str, Any]:
+    bounds = [[b.name, b.above, b.low, b.high] for b in region.bounds]
+    return {"bounds": bounds, "components": _pieces_to_json(region.components)}
+
+
+def _region_from_json(data: Mapping[str, Any]) -> Region:
+    bounds = tuple(Bound(str(n), bool(a), float(low), float(high)) for n, a, low, high in data["bounds"])
+    return Region(bounds, _pieces_from_json(data["components"]))
 
 
 def _pieces_to_json(pieces: tuple[Piece, ...]) -> list[Any]:

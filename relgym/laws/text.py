@@ -117,9 +117,11 @@ def _grips(law: PairLaw) -> dict[float, str]:
 def _free_rows(book: LawBook, name: str, digits: int) -> Iterator[LawRow]:
     if (law := book.free.get(name)) is None:
         return
-    pairs = zip(book.components(name), law.components, strict=False)
-    statement = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
-    yield LawRow(f"{name} touching nothing", statement, "world", law.examples, law.unexplained)
+    for where, components in (("", law.components), *((r.text(digits), r.components) for r in law.regions)):
+        pairs = zip(book.components(name), components, strict=False)
+        statement = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
+        subject = f"{name} touching nothing" + (f", where {where}" if where else "")
+        yield LawRow(subject, statement, "world", law.examples, law.unexplained)
 
 
 def _names(kinds: tuple[Kind, ...]) -> str:

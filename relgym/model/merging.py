@@ -58,6 +58,7 @@ def merge(parts: Parts, other: Parts, *, follow_laws: bool) -> None:
         forget(table, [m for t, m in parts.models.items() if t.type == name], parts.config.history)
     if follow_laws and parts.laws is not None:
         parts.laws = copy.deepcopy(other.laws)
+        parts.laws.mark(parts.models)
 
 
 def _check(parts: Parts, other: Parts) -> None:

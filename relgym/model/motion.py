@@ -72,6 +72,22 @@ class Laws:
         known = target.type in self.governed and (target.type, target.property) in self._components
         return known and target.property in self.learner.book.components(target.type)
 
+    def beyond_modes(self, target: Target) -> bool:
+        """Whether a target is for laws alone to claim, and they don't govern it.
+
+        What contacts do to bodies that turn depends on where they are touched: that is no function of properties along
+        the world's axes, and no clause tells when there is a point of contact. Modes may guess what comes next; how
+        right they are changes with every contact.
+        """
+        book = self.learner.book
+        own = book.sources.get(target.type)
+        return book.turning and own is not None and target.property in own.moving and not self.governs(target)
+
+    def mark(self, models: Mapping[Target, PropertyModel]) -> None:
+        """Say which models' predictions are not to be claimed (`beyond_modes`)."""
+        for target, part in models.items():
+            part.surmise = self.beyond_modes(target)
+
     def suffice(self, type_name: str, targets: Sequence[Target]) -> bool:
         """Whether the laws predict all targets of a type and have long been right: its modes may rest.
 
@@ -105,6 +121,7 @@ class Laws:
         self._last = None  # what the laws say may have changed
         if changed or self._seen % WEIGH_EVERY == 0:
             self.governed = frozenset(name for name in self.learner.types if self._prevail(name, models))
+            self.mark(models)
 
     def _confirmed(
         self,
@@ -209,7 +226,11 @@ class Laws:
         free = book.free.get(name)
         if free is None:
             return ()
-        pairs = zip(book.components(name), free.components, strict=False)
+        body = layout.bodies.index(index)
+        sources, places = book.cast(layout).sources[body]
+        state = book.cast(layout).padded(percept.vectors)[places]
+        inside = free.at(dict(zip(sources.names, state, strict=True)))
+        pairs = zip(book.components(name), inside, strict=False)
         first = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
         contacts = Contacts.of(book.cast(layout), percept.relations, percept.vectors)
         told = [

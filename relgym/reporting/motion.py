@@ -14,7 +14,18 @@ from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
 from relgym.laws.frames import FRAMES, POINT
 from relgym.laws.inertia import AREA, NOTHING, SQUARE, By, Gyration, Inertia, Mass
-from relgym.laws.records import ONE, AxisLaw, FreeLaw, Kind, Operator, PairLaw, Piece, Share
+from relgym.laws.records import (
+    ONE,
+    AxisLaw,
+    Bound,
+    FreeLaw,
+    Kind,
+    Operator,
+    PairLaw,
+    Piece,
+    Region,
+    Share,
+)
 from relgym.laws.text import DIRECTIONS
 from relgym.reporting.functions import number_of, parse_sum, whole_of
 from relgym.scene.objects import Target
@@ -65,9 +76,14 @@ class MotionRules:
         rows: list[tuple[str, str, str]] = []
         for law in self.free:
             count = self._stats(law.examples, law.unexplained)
-            for number, (name, piece) in enumerate(zip(names[law.type], law.components, strict=False)):
-                head = f"{law.type} touching nothing:" if not number else ""
-                rows.append((head, f"{name}' = {piece.formula(digits)}", count if not number else ""))
+            for where, components in (
+                ("", law.components),
+                *((f", where {r.text(digits)}", r.components) for r in law.regions),
+            ):
+                for number, (name, piece) in enumerate(zip(names[law.type], components, strict=False)):
+                    head = f"{law.type} touching nothing{where}:" if not number else ""
+                    stats = count if not number and not where else ""
+                    rows.append((head, f"{name}' = {piece.formula(digits)}", stats))
         for letter, laws in zip(self.letters, self.pair.axes if self.pair else (), strict=False):
             for each in laws:
                 rows += self._axis(letter, each, digits, alone=len(laws) == 1)
@@ -163,7 +179,10 @@ def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
 
 # ------------------------------------------------------------------ from text
 _STATS = r"(?: {2,}(?P<n>[\d,]+) steps?(?:, (?P<bad>[\d,]+) unexplained)?  ± (?P<tol>\S+))?"
-_FREE = re.compile(rf"  (?:(?P<type>\S+) touching nothing:)? +(?P<name>[^\s']+)' = (?P<piece>.*?){_STATS}")
+_FREE = re.compile(
+    rf"  (?:(?P<type>\S+) touching nothing(?:, where (?P<where>[^:]+))?:)? +(?P<name>[^\s']+)' = (?P<piece>.*?){_STATS}"
+)
+_BOUND = re.compile(r"(?P<name>\S+) (?P<sign><=|>=) (?P<here>\S+) \(else \S+ (?:<=|>=) (?P<there>\S+)\)")
 _AXIS = re.compile(
     rf"  touching(?: \((?P<kinds>.*?)\))?, (?P<where>.*?)(?: \(of the points that touch\))?:{_STATS}"
 )
@@ -186,6 +205,7 @@ class _Draft:
     """Laws as far as they were read."""
 
     free: dict[str, list[tuple[str, Piece]]] = field(default_factory=dict)
+    regions: dict[str, list[tuple[tuple[Bound, ...], list[Piece]]]] = field(default_factory=dict)
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)
     axes: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     shares: list[tuple[Kind, Share]] = field(default_factory=list)
@@ -246,7 +266,13 @@ class _Draft:
     def _of_free(self, line: str) -> bool:
         if match := _FREE.fullmatch(line):
             self.kind = match["type"] or self.kind
-            self.free.setdefault(self.kind, []).append((match["name"], _piece(match["piece"])))
+            if match["where"]:
+                bounds = tuple(map(_bound, match["where"].split(" and ")))
+                self.regions.setdefault(self.kind, []).append((bounds, [_piece(match["piece"])]))
+            elif self.kind in self.regions and not match["type"]:
+                self.regions[self.kind][-1][1].append(_piece(match["piece"]))
+            else:
+                self.free.setdefault(self.kind, []).append((match["name"], _piece(match["piece"])))
             if match["n"]:
                 self.counts[self.kind] = whole_of(match["n"] or "0"), whole_of(match["bad"] or "0")
                 self.tolerance = number_of(match["tol"])
@@ -267,7 +293,15 @@ def parse_motion(lines: list[str]) -> MotionRules:
         pair = PairLaw(draft.frame, laws, 0.0, tuple(draft.grips))
     free = draft.free.items()
     return MotionRules(
-        tuple(FreeLaw(t, tuple(p for _, p in found), *draft.counts.get(t, (0, 0))) for t, found in free),
+        tuple(
+            FreeLaw(
+                t,
+                tuple(p for _, p in found),
+                *draft.counts.get(t, (0, 0)),
+                regions=tuple(Region(bounds, tuple(pieces)) for bounds, pieces in draft.regions.get(t, ())),
+            )
+            for t, found in free
+        ),
         tuple((t, tuple(name for name, _ in found)) for t, found in free),
         pair,
         "".join(draft.axes),
@@ -302,6 +336,17 @@ def _piece(text: str) -> Piece:
     found = parse_sum(text)
     constant = ((ONE, found.constant),) if found.constant != 0.0 else ()
     return Piece((*((name, weight) for weight, name in found.terms), *constant))
+
+
+def _bound(text: str) -> Bound:
+    match = _BOUND.fullmatch(text)
+    if match is None:
+        raise ConfigError(
+            f"laws of motion: expected a bound, such as 'px >= 0.1 (else px <= 0)', got {text!r}"
+        )
+    here, there = number_of(match["here"]), number_of(match["there"])
+    above = match["sign"] == ">="
+    return Bound(match["name"], above, there if above else here, here if above else there)
 
 
 def _share(text: str) -> Share:

@@ -539,7 +539,20 @@ def _check_laws(record: LawsRecord, learner: LawLearner, arrays: _Arrays | None)
             f"expected {sorted(counts)} components of {law.type!r}",
         )
         for terms in law.components:
-            _check_terms(terms, {*own.names, ONE}, "laws.free")
+            _check_terms(terms, {*own.readable, ONE}, "laws.free")
+        for region in law.regions:
+            _require(
+                len(region.components) == len(law.components),
+                "laws.free",
+                "expected as many components everywhere",
+            )
+            for terms in region.components:
+                _check_terms(terms, {*own.readable, ONE}, "laws.free")
+            _require(
+                all(name in own.where and low <= high for name, _, low, high in region.bounds),
+                "laws.free",
+                f"expected bounds of {list(own.where)}, low before high",
+            )
     _distinct(record.governed, "laws.governed")
     ready = set(free) if laws.pair is not None or learner.book.turning else set()
     _require(ready.issuperset(record.governed), "laws.governed", f"expected some of {sorted(ready)}")

@@ -483,14 +483,22 @@ _KEY = "rivals"
 Pieces: TypeAlias = Annotated[list[Terms], Meta(min_length=1, max_length=16)]
 
 
+class RegionRecord(Record):
+    """Where other functions hold: bounds of positions (name, whether above, last number below, first one above)."""
+
+    bounds: Annotated[list[tuple[Name, bool, Finite, Finite]], Meta(min_length=1, max_length=16)]
+    components: Annotated[list[Terms], Meta(min_length=1, max_length=4)]
+
+
 class FreeLawRecord(Record):
-    """How objects of a type move that touch nothing: a function for each component of the velocity."""
+    """How objects of a type move that touch nothing: a function for each component of the velocity; elsewhere others."""
 
     type: Name
     components: Annotated[list[Terms], Meta(min_length=1, max_length=4)]
     examples: Count
     unexplained: Count
     bits: Spread
+    regions: Annotated[list[RegionRecord], Meta(max_length=64)] = []
 
 
 class AxisLawRecord(Record):
