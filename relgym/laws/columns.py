@@ -57,7 +57,9 @@ class Sources:
         Name of the property that is the angular velocity (`spin_of`), if there is one.
     names
         Names of all columns: velocity and spin first, then the type's other properties (the pose left out: laws
-        hold everywhere), then those of bodiless objects, as ``type.property``; `where` last.
+        hold everywhere), then those of bodiless objects, as ``type.property``; `drag` and `where` last.
+    drag
+        Names of the velocity's components times its magnitude: resistance of the air goes with them. As `where`.
     where
         Names of the position's components, by which laws of free motion may differ from region to region. Only where
         bodies turn: of others modes know regions by their clauses.
@@ -67,6 +69,7 @@ class Sources:
     velocity: tuple[str, ...]
     spin: str | None
     names: tuple[str, ...]
+    drag: tuple[str, ...] = ()
     where: tuple[str, ...] = ()
 
     @classmethod
@@ -79,11 +82,13 @@ class Sources:
         others = [p for p in t.properties if p not in posed and p not in moving]
         single = [b for b in schema.types if not b.has_body and _count(schema, b) == 1]
         outside = [f"{b.name}.{p}" for b in sorted(single, key=_by_name) for p in b.properties]
+        drag: tuple[str, ...] = ()
         where: tuple[str, ...] = ()
         if any(_turns(o, spin_of(schema, o, targets)) for o in vector_types(schema, targets)):
             columns = t.pose_columns()
             where = tuple(t.properties[columns[axis]] for axis in Axes.of(schema).used if columns[axis] >= 0)
-        return cls(t, velocity, spin, (*moving, *others, *outside, *where), where)
+            drag = tuple(f"|v|*{name}" for name in velocity)
+        return cls(t, velocity, spin, (*moving, *others, *outside, *drag, *where), drag, where)
 
     @property
     def turns(self) -> bool:
@@ -100,10 +105,13 @@ class Sources:
         """What laws of motion predict: the velocity's components, then the spin if there is one."""
         return self.velocity if self.spin is None else (*self.velocity, self.spin)
 
-    def places(self, layout: SceneLayout, index: int) -> NDArray[np.intp]:
-        """Where the columns of an object lie in a state vector with NaN appended."""
+    def places(self, layout: SceneLayout, index: int, drag: int = 0) -> NDArray[np.intp]:
+        """Where the columns of an object lie in a state vector with NaN appended, those of `drag` from a place on."""
         places = []
         for name in self.names:
+            if name in self.drag:
+                places.append(drag + self.drag.index(name))
+                continue
             owner, _, prop = name.rpartition(".")
             if not owner:
                 places.append(layout.column(index, name))

@@ -127,7 +127,8 @@ class FreeLearner:
         # A spin that follows no law is no reason to have none of the velocity.
         for count in dict.fromkeys((self._d, len(self.sources.velocity))):
             law = self._law(components[:count], (), x, y[:, :count], tolerance)
-            if self.sources.where and law.unexplained > LEFT_OPEN * len(rows):
+            # What few constants say of a region, many may say of the bodies that happened to be there.
+            if self.sources.where and law.bits > EXCEPTION_BITS * _FEW:
                 law = min(law, self._regional(x, y[:, :count], tolerance) or law, key=_law_bits)
             if law.unexplained <= (1.0 - EXPLAINS) * len(rows):
                 return law
@@ -157,12 +158,20 @@ class FreeLearner:
         columns = dict(zip(self.sources.names, x.T, strict=True))
         count = y.shape[1]
 
-        def fit(rows: NDArray[np.intp]) -> tuple[Piece, ...]:
-            return tuple(self._component(x[rows], y[rows, k], k, tolerance) for k in range(count))
+        def fit(rows: NDArray[np.intp]) -> tuple[Piece, ...] | None:
+            pieces = []
+            own = {name: values[rows] for name, values in columns.items()}
+            for k in range(count):
+                piece = self._component(x[rows], y[rows, k], k, tolerance, mixed=False)
+                off = np.abs(piece.values(own, y[rows, k]) - y[rows, k])
+                if (off > tolerance).mean() > LEFT_OPEN:
+                    return None
+                pieces.append(piece)
+            return tuple(pieces)
 
         def obeys(pieces: tuple[Piece, ...]) -> NDArray[np.bool_]:
             values = np.stack([piece.values(columns, y[:, 0]) for piece in pieces], axis=1)
-            right: NDArray[np.bool_] = (np.abs(values - y) <= tolerance).all(axis=1)
+            right = np.asarray((np.abs(values - y) <= tolerance).all(axis=1))
             return right
 
         place = x[:, len(self.sources.readable) :]
@@ -177,8 +186,12 @@ class FreeLearner:
                 return found
         return None
 
-    def _component(self, x: NDArray[np.float64], y: NDArray[np.float64], k: int, tolerance: float) -> Piece:
+    def _component(
+        self, x: NDArray[np.float64], y: NDArray[np.float64], k: int, tolerance: float, *, mixed: bool = True
+    ) -> Piece:
         """One component's law: the shortest description among a few forms, the plainest first.
+
+        If examples may be mixed with others, they are told from those.
 
         A body that keeps its velocity, or changes it steadily, is described so as long as that holds; else
         whatever happened to be constant so far (a velocity, say) would stand in for the constant term.
@@ -194,7 +207,7 @@ class FreeLearner:
         least = min(_bits(piece, names, columns, y, tolerance) for piece in forms)
         if least > EXCEPTION_BITS * _FEW:
             fit = forward_stepwise(columns, y, sigma=sigma, max_terms=MOST_TERMS)
-            if np.abs(y - fit.predict(columns)).max() > tolerance:
+            if mixed and np.abs(y - fit.predict(columns)).max() > tolerance:
                 terms = min(len(order), MOST_TERMS)
                 found = consensus(
                     columns, y, sigma=sigma, tolerance=tolerance, terms=terms, size=terms + 3, draws=256,

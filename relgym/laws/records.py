@@ -292,13 +292,14 @@ class Region:
 
     def where(self, columns: Mapping[str, FloatArray]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether bodies are surely inside, and surely outside."""
-        inside, outside = np.bool_(True), np.bool_(False)
+        shape = columns[self.bounds[0].name].shape
+        inside, outside = np.ones(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
         for bound in self.bounds:
             value = columns[bound.name]
             below, beyond = value <= bound.low, value >= bound.high
             inside = inside & (beyond if bound.above else below)
             outside = outside | (below if bound.above else beyond)
-        return np.asarray(inside), np.asarray(outside)
+        return inside, outside
 
 
 @dataclass(frozen=True, slots=True)

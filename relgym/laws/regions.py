@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import LEFT_OPEN
 from relgym.laws.records import Bound, Piece, Region
 from relgym.numeric.tree import DecisionTree, learn_tree
 
@@ -22,14 +21,14 @@ __all__ = ["find_laws", "find_regions"]
 MOST_LAWS = 4
 
 PARTS = (2, 4, 8)
-"""Numbers of blocks into which examples are cut along an axis. A region narrower than an eighth of all is found when others
-are explained: blocks are cut anew from what is left."""
+"""Numbers of blocks into which examples are cut along an axis. Narrower regions are found once others are explained:
+blocks are cut anew from what is left."""
 
 _Laws = Sequence[tuple[Piece, ...]]
 
 
 def find_laws(
-    fit: Callable[[NDArray[np.intp]], tuple[Piece, ...]],
+    fit: Callable[[NDArray[np.intp]], tuple[Piece, ...] | None],
     obeys: Callable[[tuple[Piece, ...]], NDArray[np.bool_]],
     place: NDArray[np.float64],
     *,
@@ -40,7 +39,7 @@ def find_laws(
     Parameters
     ----------
     fit
-        The law of some examples, given by number.
+        The law of some examples, given by number; None if it doesn't explain nearly all of them.
     obeys
         Which of all examples a law explains, shape ``(n,)``.
     place
@@ -64,19 +63,20 @@ def find_laws(
 
 
 def _most_telling(
-    fit: Callable[[NDArray[np.intp]], tuple[Piece, ...]],
+    fit: Callable[[NDArray[np.intp]], tuple[Piece, ...] | None],
     obeys: Callable[[tuple[Piece, ...]], NDArray[np.bool_]],
     place: NDArray[np.float64],
     left: NDArray[np.bool_],
     fewest: int,
 ) -> tuple[Piece, ...] | None:
-    """The law of a block that explains most of what is left; a law explains nearly all of its own block."""
+    """The law of a block that explains most of what is left."""
     best: tuple[int, tuple[Piece, ...]] | None = None
     for rows in _blocks(place, np.flatnonzero(left), fewest):
         law = fit(rows)
-        held = obeys(law)
-        count = int((held & left).sum())
-        if held[rows].mean() >= 1.0 - LEFT_OPEN and (best is None or count > best[0]):
+        if law is None:
+            continue
+        count = int((obeys(law) & left).sum())
+        if best is None or count > best[0]:
             best = count, law
             if 2 * count >= int(left.sum()):
                 break

@@ -102,7 +102,7 @@ def _squared(features: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 
 def _inert(sources: Sources, name: str) -> bool:
     """Whether a column is a body's own and no velocity."""
-    return "." not in name and name not in sources.moving and name not in sources.where
+    return "." not in name and name not in (*sources.moving, *sources.drag, *sources.where)
 
 
 # ------------------------------------------------------------------ what points do

@@ -46,14 +46,14 @@ WINDY = FreeLaw(
 
 def test_only_where_bodies_turn_places_are_known() -> None:
     assert sources(BLOCK).where == ("px", "py")
-    assert sources(BLOCK).names == ("vx", "vy", "spin", "px", "py")
-    assert sources(BLOCK).readable == ("vx", "vy", "spin")
-    assert sources(ROUND).where == ()
+    assert sources(BLOCK).names == ("vx", "vy", "spin", "|v|*vx", "|v|*vy", "px", "py")
+    assert sources(BLOCK).readable == ("vx", "vy", "spin", "|v|*vx", "|v|*vy")
+    assert sources(ROUND).where == sources(ROUND).drag == ()
 
 
 def test_between_regions_only_what_both_say_is_known() -> None:
     places = np.array([[0.5, 1.0], [0.25, 0.0], [3.0, 2.0], [0.3, 0.0], [3.0, 1.5]]).T
-    x = np.concatenate([np.full((3, 5), 0.5), places])
+    x = np.concatenate([np.full((5, 5), 0.5), places])
     found = free_motion(WINDY, sources(BLOCK).names, x)
     assert found[0, :3].tolist() == [0.625, 0.5, 0.5]
     assert np.isnan(found[0, 3:]).all()
@@ -64,8 +64,8 @@ def test_a_region_is_found_and_its_border_narrows(rng: np.random.Generator) -> N
     learner = FreeLearner(sources(BLOCK), seed=0)
     gaps = []
     for k in range(800):
-        x = rng.uniform(-1.0, 1.0, 5)
-        after = x[:3] + np.array([0.125 * (x[3] > 0.0), 0.0, 0.0])
+        x = rng.uniform(-1.0, 1.0, 7)
+        after = x[:3] + np.array([0.125 * (x[5] > 0.0), 0.0, 0.0])
         law = learner.law
         said = (
             np.full(3, np.nan) if law is None else free_motion(law, learner.sources.names, x[:, None])[:, 0]
@@ -85,7 +85,7 @@ def test_a_region_is_found_and_its_border_narrows(rng: np.random.Generator) -> N
 def test_no_region_where_places_tell_nothing(rng: np.random.Generator) -> None:
     learner = FreeLearner(sources(BLOCK), seed=0)
     for _ in range(400):
-        x = rng.uniform(-1.0, 1.0, 5)
+        x = rng.uniform(-1.0, 1.0, 7)
         learner.learn_one(x, x[:3] + 0.125 * rng.integers(0, 2), False, 1e-12)
     assert learner.law is None
 

@@ -491,7 +491,7 @@ class RegionRecord(Record):
 
 
 class FreeLawRecord(Record):
-    """How objects of a type move that touch nothing: a function for each component of the velocity; elsewhere others."""
+    """How objects of a type move that touch nothing: a function for each component, and where others hold."""
 
     type: Name
     components: Annotated[list[Terms], Meta(min_length=1, max_length=4)]
