@@ -326,7 +326,7 @@ def _chosen(law: PairLaw, kinds: tuple[Kind, ...]) -> NDArray[np.intp]:
     for k, laws in enumerate(law.axes):
         for pair, kind in enumerate(kinds):
             found = law.law_of(k, kind)
-            if found is not None and found.trusted():
+            if found is not None and found.trusted(kind):
                 numbers[k, pair] = laws.index(found)
     return numbers
 

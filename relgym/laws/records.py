@@ -97,6 +97,8 @@ class AxisLaw:
         Of these kinds, among the stored contacts.
     bits
         Description length, the unexplained examples included.
+    doubted
+        Kinds of contacts of which it leaves surely more unexplained than a law may: rare ones don't show among all.
     """
 
     pieces: tuple[Piece, ...]
@@ -107,6 +109,7 @@ class AxisLaw:
     examples: int = 0
     unexplained: int = 0
     bits: float = 0.0
+    doubted: tuple[Kind, ...] = ()
 
     def values(self, features: Mapping[str, FloatArray], like: FloatArray) -> FloatArray:
         """Velocity after the contact along the axis."""
@@ -121,11 +124,11 @@ class AxisLaw:
         """Operator and pieces of the law and of its alternatives, weights to nine digits, and what it has seen."""
         forms = ((self.operator, self.pieces), *self.alternatives)
         stated = tuple((o, tuple(piece.formula(9) for piece in pieces)) for o, pieces in forms)
-        return stated, self.signs, self.trusted()
+        return stated, self.signs, self.trusted(), self.doubted
 
-    def trusted(self) -> bool:
-        """Whether it explains nearly all of its own examples: what it doesn't, it must not claim."""
-        return self.unexplained <= LEFT_OPEN * self.examples
+    def trusted(self, kind: Kind | None = None) -> bool:
+        """Whether it explains nearly all of its own examples (of a kind): what it doesn't, it must not claim."""
+        return self.unexplained <= LEFT_OPEN * self.examples and kind not in self.doubted
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
@@ -138,7 +141,7 @@ class AxisLaw:
             "examples": self.examples,
             "unexplained": self.unexplained,
             "bits": self.bits,
-        }
+        } | ({"doubted": [list(kind) for kind in self.doubted]} if self.doubted else {})
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> AxisLaw:
@@ -152,6 +155,7 @@ class AxisLaw:
             int(data["examples"]),
             int(data["unexplained"]),
             float(data["bits"]),
+            tuple((str(a), str(b)) for a, b in data.get("doubted", ())),
         )
 
 

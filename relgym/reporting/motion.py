@@ -122,6 +122,8 @@ class MotionRules:
         for operator, pieces in law.alternatives:
             form = f"{operator}({', '.join(piece.formula(digits) for piece in pieces)})"
             yield f"  or, as good: v'_{letter} = {form}; where they differ, no prediction", "", ""
+        for a, b in law.doubted:
+            yield f"  where {a} touches {b}: no prediction", "", ""
         for known, side in zip(law.signs, "<>", strict=True):
             if not known:
                 yield f"  where that turns the motion to v'_{letter} {side} 0: no prediction", "", ""
@@ -193,6 +195,7 @@ _OTHER = re.compile(
     r"    or, as good: v'_\w = (?P<operator>max|min)\((?P<pieces>.*)\); where they differ, .*"
 )
 _TURN = re.compile(r"    where that turns the motion to v'_\w (?P<side>[<>]) 0: no prediction")
+_DOUBT = re.compile(r"    where (?P<a>\S+) touches (?P<b>\S+): no prediction")
 _SHARE = re.compile(r"  of a change between (\S+) A and (\S+) B, A takes (.*), B the rest")
 _GRIP = re.compile(r"  of a change along t between (\S+) and (\S+), velocities take (\S+), spins the rest")
 _MASS = re.compile(r"  masses go as (?P<factors>.*?)(?:; by (?P<by>type|object), times (?P<constants>.*))?")
@@ -228,7 +231,14 @@ class _Draft:
         if match := _AXIS.fullmatch(line):
             letter = next((c for c, text in DIRECTIONS.items() if text == match["where"]), match["where"][-1])
             kinds = tuple(_kind(k) for k in match["kinds"].split(", ")) if match["kinds"] else ()
-            self.law = {"pieces": [], "operator": "max", "kinds": kinds, "others": [], "signs": [True, True]}
+            self.law = {
+                "pieces": [],
+                "operator": "max",
+                "kinds": kinds,
+                "others": [],
+                "signs": [True, True],
+                "doubted": [],
+            }
             self.law |= {
                 "examples": whole_of(match["n"] or "0"),
                 "unexplained": whole_of(match["bad"] or "0"),
@@ -241,6 +251,8 @@ class _Draft:
         elif self.law and (match := _OTHER.fullmatch(line)):
             pieces = tuple(map(_piece, match["pieces"].split(", ")))
             self.law["others"].append((match["operator"], pieces))
+        elif self.law and (match := _DOUBT.fullmatch(line)):
+            self.law["doubted"].append((match["a"], match["b"]))
         elif self.law and (match := _TURN.fullmatch(line)):
             self.law["signs"]["<>".index(match["side"])] = False
         else:
@@ -324,6 +336,7 @@ def _axis_law(data: Mapping[str, Any]) -> AxisLaw:
         tuple(data["signs"]),
         data["examples"],
         data["unexplained"],
+        doubted=tuple(data["doubted"]),
     )
 
 

@@ -626,6 +626,9 @@ def _check_pair_law(laws: LearnedLawsRecord, learner: LawLearner) -> None:
 def _check_axis(law: AxisLawRecord, known: Collection[str], bodies: Collection[str]) -> None:
     for a, b in law.kinds:
         _require(a in bodies and b in bodies, "laws.pair.axes", f"there are no bodies {a!r} and {b!r}")
+    _require(
+        set(law.doubted) <= set(law.kinds), "laws.pair.axes", "expected doubts of kinds that a law is of"
+    )
     for pieces in (law.pieces, *(pieces for _, pieces in law.alternatives)):
         for terms in pieces:
             _check_terms(terms, known, "laws.pair.axes")

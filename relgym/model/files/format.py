@@ -512,6 +512,7 @@ class AxisLawRecord(Record):
     examples: Count
     unexplained: Count
     bits: Spread
+    doubted: list[Pair] = []
 
 
 class PairLawRecord(Record):

@@ -1,0 +1,24 @@
+"""One law for all kinds of contacts, and what it doesn't hold for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relgym.laws.kinds import fit_together
+from relgym.laws.pieces import AxisExamples
+from relgym.laws.records import AxisLaw
+
+
+def test_a_rare_kind_that_a_law_has_wrong_is_doubted(rng: np.random.Generator) -> None:
+    x = np.concatenate([rng.uniform(0.5, 1.0, (203, 1)), np.ones((203, 1))], axis=1)
+    y = x[:, 0].copy()
+    y[200:] += np.array([0.1, 0.23, 0.31])
+    examples = AxisExamples(("u_t", "1"), x, y, "u_t", 1e-9)
+    kinds = np.repeat([0, 1], [200, 3])
+    (law,) = fit_together(examples, kinds, [("box", "wall"), ("box", "belt")], rng=rng).laws
+    assert law.trusted() and law.trusted(("box", "wall")) and not law.trusted(("box", "belt"))
+    assert law.doubted == (("box", "belt"),)
+    assert AxisLaw.from_json(law.to_json()) == law
+    y[201:] = x[201:, 0]  # one exception alone tells nothing of its kind
+    (law,) = fit_together(examples, kinds, [("box", "wall"), ("box", "belt")], rng=rng).laws
+    assert law.doubted == ()
