@@ -31,11 +31,12 @@ settles, nothing is claimed. Without a law of pairs, types that turn are governe
 is left unsaid. What no free law explains is noise only if it is anew in every step (`relgym.laws.drift`): a magnet's
 pull isn't, and is left unsaid as well.
 
-Bodies that turn may move freely by other laws in other regions (`relgym.laws.regions`): where wind blows, though nothing
-marks the place. Laws are found in blocks of neighbouring examples, and a tree over positions tells where each holds;
-between the last example on one side and the first one on the other nothing is claimed. Their velocity times its magnitude
-is among what free laws read, for drag. What modes say of bodies that turn is never claimed while no law governs them: what
-contacts do to them is no function along the world's axes, and no clause tells when they are touched where.
+Bodies that turn may move freely by other laws in other regions (`relgym.laws.regions`): where wind blows, though
+nothing marks the place. Laws are found in blocks of neighbouring examples, and a tree over positions tells where each
+holds; between the last example on one side and the first one on the other nothing is claimed. Their velocity times its
+magnitude is among what free laws read, for drag. What modes say of bodies that turn is never claimed while no law
+governs them: what contacts do to them is no function along the world's axes, and no clause tells when they are touched
+where.
 
 *Composition.* Every contact sees the free motion and what all others do to it; sweeps repeat until nothing changes. A
 ball jammed in a rough wedge would need thousands; they are extrapolated, and where nothing settles nothing is
@@ -43,9 +44,9 @@ claimed. Single contacts teach, the others check.
 
 *Selection.* Frame, pieces, operator and features are those of the shortest description. Types of bodies get laws of
 their own only where that is shorter (materials). Other laws that explain all examples as briefly stay as
-*alternatives*: where they disagree, nothing is predicted. So it is where a law fails on its own examples, or surely
-on those of one kind of contacts (a conveyor among walls), and where an impulse would turn a body back in a sense in which none was seen to. A law that has no piece for letting go pays
-extra.
+*alternatives*: where they disagree, nothing is predicted. So it is where a law fails on its own examples, or surely on
+those of one kind of contacts (a conveyor among walls), and where an impulse would turn a body back in a sense in which
+none was seen to. A law that has no piece for letting go pays extra.
 
 *Revision.* Contacts are kept raw, at most 3,000; what was news when it came stays longest. When a free law turns out
 to have been over-specific, all that rests on it is derived again.
