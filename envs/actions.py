@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from relgym.envs.arguments import action_numbers, checked_actions, physical_action
 from relgym.errors import ConfigError
@@ -77,7 +78,7 @@ class BatchActions:
         self.layout = schema.layout((*layout.names, ACTION)) if self._acts else layout
         columns = np.arange(self.layout.width)
         cut = self.layout.slice(self.layout.index(ACTION)) if self._acts else slice(0, 0)
-        self._own, self._rest = columns[cut], np.delete(columns, cut)
+        self._own, self._rest = columns[cut], as_slice(np.delete(columns, cut))
         scaled = {prop: (k, low, high) for k, (prop, low, high) in enumerate(schema.action_scale)}
         properties = schema.type_of(ACTION).properties if self._acts else ()
         self._scale = [scaled[prop] for prop in properties] if scaled else []
@@ -103,6 +104,13 @@ class BatchActions:
         """State vectors without the actions."""
         rest: Float2D = vectors[:, self._rest] if self._acts else vectors
         return rest
+
+
+def as_slice(columns: NDArray[np.intp]) -> NDArray[np.intp] | slice:
+    """Columns that lie side by side as a slice, which copies nothing."""
+    if len(columns) and (columns == np.arange(columns[0], columns[0] + len(columns))).all():
+        return slice(int(columns[0]), int(columns[-1]) + 1)
+    return columns
 
 
 def check_action_space(schema: SceneSchema, space: spaces.Space[Any]) -> None:

@@ -183,8 +183,8 @@ def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:
             raise ActionError(f"expected {count} actions of {space}, got {actions!r}")
         return array.astype(space.dtype)
     if not isinstance(space, spaces.Box):
-        legal, array = batch_space(space, count), np.asarray(actions)
-        if not legal.contains(array):
+        array = np.asarray(actions)
+        if not _batched(space, count).contains(array):
             raise ActionError(f"expected {count} actions of {space}, got {actions!r}")
         return array
     try:
@@ -201,6 +201,20 @@ def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:
             f"action {row} of {count} lies outside [{space.low}, {space.high}]: {array[row]}; clip or rescale it"
         )
     return np.clip(array, space.low, space.high)
+
+
+def _batched(space: spaces.Space[Any], count: int) -> spaces.Space[Any]:
+    """`batch_space`, which copies the space and its generator of random numbers; the last few are kept."""
+    known = _BATCHED.get(id(space))
+    if known is None or known[0] is not space or known[1] != count:
+        if len(_BATCHED) >= _KEPT:
+            _BATCHED.clear()
+        known = _BATCHED[id(space)] = space, count, batch_space(space, count)
+    return known[2]
+
+
+_KEPT = 64
+_BATCHED: dict[int, tuple[spaces.Space[Any], int, spaces.Space[Any]]] = {}
 
 
 def checked_mask(mask: Any, count: int) -> NDArray[np.bool_]:

@@ -74,8 +74,8 @@ def causes(
     if margins.shape[1] and min_margin > 0.0:
         found[(margins < min_margin).any(axis=1)] = CAUSES.index(Cause.LOW_MARGIN)
     abstained = outcomes != _FOLLOWED
-    some = abstained.any(axis=1)
-    if some.any():
+    if abstained.any():
+        some = abstained.any(axis=1)
         first = outcomes[np.arange(n), abstained.argmax(axis=1)]
         found[some] = _OF_OUTCOME[first[some]]
     return found

@@ -12,6 +12,9 @@ from relgym.envs.dreams.step import DreamStep, Stepped
 
 __all__ = ["masked", "told_of"]
 
+_HORIZON = CAUSES.index(Cause.HORIZON)
+_NAMES = tuple(cause.name.lower() for cause in CAUSES)
+
 
 def told_of(step: DreamStep, stepped: Stepped, going: NDArray[np.bool_] | None) -> dict[str, Any]:
     """Infos of a step of many dreams; what happened to none is left out.
@@ -24,16 +27,17 @@ def told_of(step: DreamStep, stepped: Stepped, going: NDArray[np.bool_] | None) 
         Which dreams went on, shape ``(n,)``; None: all.
     """
     infos: dict[str, Any] = {}
-    cut, count = np.flatnonzero(stepped.truncated), len(stepped.truncated)
-    if len(cut):
+    count = len(stepped.truncated)
+    if stepped.truncated.any():
         reasons, names = (np.full(count, None, dtype=object) for _ in range(2))
-        for k in cut.tolist():
-            reasons[k] = step.reason(stepped, k)
-            names[k] = CAUSES[stepped.causes[k]].name.lower()
+        out = stepped.causes == _HORIZON
+        reasons[out], names[out] = step.out_of_time, _NAMES[_HORIZON]
+        for k in np.flatnonzero(stepped.truncated & ~out).tolist():
+            reasons[k], names[k] = step.reason(stepped, k), _NAMES[stepped.causes[k]]
         mask = stepped.truncated.copy()
         infos |= {"reason": reasons, "_reason": mask, "cause": names, "_cause": mask.copy()}
     if stepped.success is not None:
-        followed = (stepped.causes < 0) | (stepped.causes == CAUSES.index(Cause.HORIZON))
+        followed = (stepped.causes < 0) | (stepped.causes == _HORIZON)
         told = followed if going is None else followed & going
         infos["is_success"] = stepped.success & told
         infos["_is_success"] = told

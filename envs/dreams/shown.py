@@ -118,21 +118,24 @@ class Boxes:
             least, most = limits_of(box.dtype)
             self._low[name], self._high[name] = np.maximum(box.low, least), np.minimum(box.high, most)
         self._whole = frozenset(name for name, dtype in self._dtypes.items() if is_whole(dtype))
+        self._places: tuple[SceneLayout, list[tuple[str, slice]]] | None = None
+        self._last: tuple[SceneLayout, tuple[Float1D, Float1D]] | None = None
         self._as_they_are = all(dtype == np.float64 for dtype in self._dtypes.values())
 
     def shown(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
         """Property vectors by object, of one state vector or of n: arrays that nobody else has."""
         if self._as_they_are:
             own = vectors.copy()
-            return {
-                name: own[..., layout.slice(k)] for k, name in enumerate(layout.names) if name in self._dtypes
-            }
+            return {name: own[..., place] for name, place in self._slices(layout)}
         rounded = self.rounded(layout, vectors)
-        return {
-            name: rounded[..., layout.slice(k)].astype(self._dtypes[name])
-            for k, name in enumerate(layout.names)
-            if name in self._dtypes
-        }
+        return {name: rounded[..., place].astype(self._dtypes[name]) for name, place in self._slices(layout)}
+
+    def _slices(self, layout: SceneLayout) -> list[tuple[str, slice]]:
+        """The objects shown, and where each one's numbers lie; those of the last layout are kept."""
+        if self._places is None or self._places[0] is not layout:
+            there = [(name, layout.slice(k)) for k, name in enumerate(layout.names) if name in self._dtypes]
+            self._places = layout, there
+        return self._places[1]
 
     def inside(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which of n state vectors lie within the limits, shape ``(n,)``; not those with NaN."""
@@ -148,17 +151,18 @@ class Boxes:
             return self.inside(layout, vectors)
         low, high = self.limits(layout)
         some = vectors.take(columns, axis=1)
-        return np.asarray(((low[columns] <= some) & (some <= high[columns])).all(axis=1))
+        fits = (low[columns] <= some) & (some <= high[columns])
+        return np.ones(len(some), dtype=np.bool_) if fits.all() else np.asarray(fits.all(axis=1))
 
     def limits(self, layout: SceneLayout) -> tuple[Float1D, Float1D]:
-        """Smallest and largest element of each column."""
-        if layout not in self._limits:
+        """Smallest and largest element of each column; those of the last layout are kept."""
+        if self._last is None or self._last[0] is not layout:
             low, high = np.full(layout.width, -np.inf), np.full(layout.width, np.inf)
             for k, name in enumerate(layout.names):
                 if name in self._low:
                     low[layout.slice(k)], high[layout.slice(k)] = self._low[name], self._high[name]
-            self._limits[layout] = low, high
-        return self._limits[layout]
+            self._last = layout, (low, high)
+        return self._last[1]
 
     def rounded(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """State vectors with whole numbers where only those are shown."""
@@ -169,10 +173,6 @@ class Boxes:
             if name in self._whole:
                 found[..., layout.slice(k)] = np.rint(found[..., layout.slice(k)])
         return found
-
-    @cached_property
-    def _limits(self) -> dict[SceneLayout, tuple[Float1D, Float1D]]:
-        return {}
 
 
 class BoxesShown:
@@ -197,6 +197,7 @@ class BoxesShown:
         seen = checked_boxes(observation_space, schema)
         self._schema, self._action_space, self._boxes = schema, action_space, Boxes(seen)
         self._changing: dict[tuple[tuple[str, str], ...], NDArray[np.intp]] = {}
+        self._columns: tuple[SceneLayout, list[str]] | None = None
         self.layout = schema.layout([*seen, *(name for name in (TASK,) if name in schema.order)])
 
     def acting(self, scene: Scene, action: Any) -> Scene:
@@ -238,10 +239,16 @@ class BoxesShown:
         left = np.flatnonzero(~((low <= vector) & (vector <= high)))
         if not len(left):
             return ""
-        names = [f"{o.name}.{p}" for o in scene for p in o.type.properties]
+        names = self._names(scene.layout)
         return "; ".join(
             f"{names[k]} = {vector[k]:g} left the observation space [{low[k]:g}, {high[k]:g}]" for k in left
         )
+
+    def _names(self, layout: SceneLayout) -> list[str]:
+        if self._columns is None or self._columns[0] is not layout:
+            pairs = zip(layout.names, layout.types, strict=True)
+            self._columns = layout, [f"{name}.{p}" for name, t in pairs for p in t.properties]
+        return self._columns[1]
 
 
 class ViewShown:

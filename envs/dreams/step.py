@@ -27,7 +27,8 @@ class Stepped:
     Attributes
     ----------
     vectors
-        State vectors after the step; those before it where the prediction could not be followed.
+        State vectors after the step; those before it where the prediction could not be followed. They may be the
+        prediction's own: who changes them copies them first.
     rewards, terminated, truncated
         As Gymnasium has them.
     causes
@@ -113,10 +114,12 @@ class DreamStep:
         lost = (why >= 0) & (why != _HORIZON)
         if among is not None:
             why[~among] = -1
-        followed = after.copy()
+        followed = after
         if lost.any():
+            followed = after.copy()
             followed[lost] = before[lost]
         if len(self.setting.brought):
+            followed = after.copy() if followed is after else followed
             followed[:, self.setting.brought] = 0.0  # what the next step will bring isn't known
         return Stepped(followed, rewards, ended, why >= 0, why, success, after, prediction)
 
@@ -145,10 +148,15 @@ class DreamStep:
                 success[good] = tells(layout, *steps)
         return rewards, ended, success
 
+    @property
+    def out_of_time(self) -> str:
+        """The sentence for those that have lasted as long as they may."""
+        return horizon_reached(self.horizon)
+
     def reason(self, stepped: Stepped, row: int) -> str:
         """Why a dream was truncated, in a sentence that names objects and properties."""
         if stepped.causes[row] == _HORIZON:
-            return horizon_reached(self.horizon)
+            return self.out_of_time
         if stepped.causes[row] == _NO_REWARD:
             return Cause.NO_REWARD.value
         told = explained(parts_of_row(stepped.prediction, row), self.min_margin, self.evaluator.overruled)

@@ -240,7 +240,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             infos = self._ended(infos, over)
         self._over = over
         if first is not None:
-            self._begin(begun, first)
+            self._begin(begun, first, told=same)  # else nothing was told of those that began anew
         return self._setting.shown.observations(self.vectors), rewards, ended, cut, infos
 
     def render(self) -> tuple[Any, ...]:
@@ -321,10 +321,13 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
             )
         return vectors
 
-    def _begin(self, rows: _Rows, first: Float2D) -> None:
+    def _begin(self, rows: _Rows, first: Float2D, *, told: bool = True) -> None:
+        """Some dreams begin; `told`: what was said of their last step may still be asked for."""
         assert self._vectors is not None, "made by reset"
         if self._cameras:
             self._cameras = {k: camera for k, camera in self._cameras.items() if k not in set(rows.tolist())}
+        if told and self._last is not None and np.may_share_memory(self._vectors, self._last[0].vectors):
+            self._vectors = self._vectors.copy()  # what the model said stays as it is
         self._vectors[rows] = first
         self._steps[rows] = 0
         self._over[rows] = False
@@ -337,9 +340,10 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
 
     def _follow(self, stepped: Stepped, going: _Bools | None) -> None:
         """Go on to where a step has led."""
-        self._vectors = stepped.vectors
+        self._vectors = stepped.vectors.view()  # the model's words, perhaps: nobody else may write there
         self._steps += 1
         self._last = stepped.prediction, going
+        stepped.prediction.vectors.flags.writeable = False
 
     @property
     def prediction(self) -> BatchPrediction | None:

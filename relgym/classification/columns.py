@@ -65,20 +65,25 @@ class Columns:
         )
 
     def append(self, most: int = sys.maxsize) -> int:
-        """Add a row of fill values; its number. There will never be more than `most` rows."""
+        """Add a row, which is to be written; its number. There will never be more than `most` rows."""
         if self.size == self._capacity():
             self._rebuild(min(2 * self.size, max(most, self.size + 1)))
         self.size += 1
-        row = self.size - 1
-        for name, column in self.columns.items():
-            self._arrays[name][row] = column.fill
-        return row
+        return self.size - 1
 
     def write(self, row: int, values: Mapping[str, Any]) -> None:
-        """Set one row's arrays, growing axes as needed; elements that a smaller value leaves get the fill."""
-        arrays = {name: np.asarray(value) for name, value in values.items()}
-        self._grow(arrays)
-        for name, value in arrays.items():
+        """Set all of a row's arrays, growing axes as needed; elements that a smaller value leaves get the fill."""
+        known = self._arrays
+        others: dict[str, NDArray[Any]] = {}
+        for name, value in values.items():
+            if getattr(value, "shape", ()) == known[name].shape[1:]:
+                known[name][row] = value
+            else:
+                others[name] = np.asarray(value)
+        if not others:
+            return
+        self._grow(others)
+        for name, value in others.items():
             target = self._arrays[name]
             if value.shape != target.shape[1:]:
                 target[row] = self.columns[name].fill

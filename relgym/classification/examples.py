@@ -138,6 +138,12 @@ class Example:
         """`approached`, or its default."""
         return self.close if self.approached is None else self.approached
 
+    def with_own(self, own: Floats, row: int = -1) -> Example:
+        """The same situation with other own features, of another row of the history."""
+        return Example(
+            self.table, self.unary, self.close, self.pair, own, self.target, self.key, row, self.approached
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class ExampleBatch:
@@ -163,9 +169,13 @@ class ExampleBatch:
         return len(self.table)
 
     def __getitem__(self, index: int) -> Example:
+        return self.at(index)
+
+    def at(self, index: int, key: bytes = b"") -> Example:
+        """One of them, in the relational state of a key."""
         i = index
         arrays = self.table[i], self.unary[i], self.close[i], self.pair[i], self.own[i]
-        return Example(*arrays, self.target, approached=self.struck[i])
+        return Example(*arrays, self.target, key, approached=self.struck[i])
 
     @classmethod
     def of(cls, example: Example) -> ExampleBatch:

@@ -62,10 +62,11 @@ class Familiarity:
 
     def add(self, example: Example, key: Key) -> None:
         """Remember an example's situation."""
-        if not self._known.get(key, False):
-            self.seen.add(self._situation(example))
-            self._known.clear()
-            self._known[key] = True
+        if self.is_seen(example, key):
+            return
+        self.seen.add(self._situation(example))
+        self._known.clear()  # other keys may stand for the same situation
+        self._known[key] = True
 
     def _situation(self, example: Example) -> int:
         view = View.of_batch(ExampleBatch.of(example), (), np.empty((1, 0)))

@@ -140,8 +140,10 @@ class RoleClassifier:
 
     def refresh(self, exemplars: Exemplars, mode: int) -> int:
         """Learn the descriptions anew from a mode's exemplars if they are stale; the work spent."""
+        if not self.stale:
+            return 0
         rows, roles = self._lessons(exemplars, mode)
-        if not self.stale or not len(rows):
+        if not len(rows):
             return 0
         view, weights = View.of_exemplars(exemplars), exemplars.weights()
         work = sum(self._learn(description, view, rows, roles, weights) for description in self.descriptions)

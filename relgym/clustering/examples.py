@@ -99,6 +99,10 @@ class ExampleTable:
 
     def signature_id(self, signature: SlotSignature) -> int:
         """Number of the signature; a new one is taken up."""
+        if (
+            self.signatures and self.signatures[-1] is signature
+        ):  # most tables hold one, whose hash takes long
+            return len(self.signatures) - 1
         if (known := self._ids.get(signature)) is None:
             known = self._ids[signature] = len(self.signatures)
             self.signatures.append(signature)

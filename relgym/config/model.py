@@ -72,12 +72,13 @@ class ModelConfig:
         changes. Default 0.05, range (0, 1]. Raising it claims approximations, too; lowering it claims exact laws alone.
     claim_probability
         How probable it must be, after how such predictions came out, that a prediction is no further off than that,
-        for it to be claimed (`Prediction.ok`). Default 0.9, range (0, 1]. Raising it claims less, and more of that
-        is right. It counts only where predictions are looked back at, as wrappers and `WorldModel.fit` do.
+        for it to be claimed (`Prediction.ok`). Default 0.5, range (0, 1]: more likely right than not. Raising it doubts
+        what is seldom and unsure, too. It counts only where predictions are looked back at, as wrappers and
+        `WorldModel.fit` do.
     claim_slips
-        Where more than this share of a property's latest predictions were claimed and off, only what is at least one
-        minus this probable is claimed. Default 0.0075, range (0, 1]: in the long run less than a per cent is claimed
-        and off, though some kinds of predictions are less sure than that.
+        Share of a property's predictions that may be expected to be claimed and off. The surest kinds of predictions
+        are claimed first, as many as that allows. Default 0.0075, range (0, 1]: less than a per cent, with a margin for
+        what is learned of the kinds meanwhile. Raising it claims more, and more of that is off.
     regression_columns
         Regressions on all that a target may depend on are made on at most so many columns, squares and products
         included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.
@@ -97,7 +98,7 @@ class ModelConfig:
     hypotheses: tuple[str, ...] = ()
     history: int = 200_000
     claim_error: float = 0.05
-    claim_probability: float = 0.9
+    claim_probability: float = 0.5
     claim_slips: float = 0.0075
     regression_columns: int = 320
 

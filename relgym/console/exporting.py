@@ -83,7 +83,7 @@ def exported(found: ModelInEnv, out: Path, *, steps: int, seed: int) -> Exported
     for start in range(0, len(alike), CHUNK):
         vectors = _vectors(alike[start : start + CHUNK])
         told = found.model.predict_batch(layout, vectors)
-        after, outcomes, modes, _ = module["predict"](vectors)
+        after, outcomes, modes, *_ = module["predict"](vectors)
         agreed = (outcomes == told.outcomes) & (modes == told.modes)
         same, total = same + int(agreed.sum()), total + agreed.size
         largest = max(largest, _difference(after, told))

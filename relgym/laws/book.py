@@ -95,7 +95,8 @@ class LawBook:
         self.turning = any(s.turns for s in sources.values())
         self.tolerance = 1e-15
         self._casts: dict[SceneLayout, Cast] = {}
-        self._rounded: dict[SceneLayout, NDArray[np.intp]] = {}
+        self._latest: tuple[SceneLayout, Cast] | None = None
+        self._rounded: dict[int, tuple[Cast, NDArray[np.intp]]] = {}
         self._engaged: dict[SceneLayout, list[Engaged]] = {}
 
     def _repr_html_(self) -> str:
@@ -107,20 +108,23 @@ class LawBook:
 
     def cast(self, layout: SceneLayout) -> Cast:
         """What a layout means for the laws; cached."""
+        if self._latest is not None and self._latest[0] is layout:  # a layout's hash takes long
+            return self._latest[1]
         if (known := self._casts.get(layout)) is None:
             known = self._casts[layout] = Cast.of(self.schema, layout, self.sources)
+        self._latest = (layout, known)
         return known
 
     def rounded(self, cast: Cast) -> NDArray[np.intp]:
         """Columns of the movers' positions and velocities, whose rounding the laws inherit; cached."""
-        if (known := self._rounded.get(cast.layout)) is None:
+        if (known := self._rounded.get(id(cast))) is None or known[0] is not cast:
             places = []
             for body in cast.movers:
                 i = cast.layout.bodies[body]
                 own = (*cast.layout.types[i].pose_columns()[:3], *cast.layout.types[i].velocity_columns())
                 places += [cast.layout.offsets[i] + k for k in own if k >= 0]
-            known = self._rounded[cast.layout] = np.array(places, dtype=np.intp)
-        return known
+            known = self._rounded[id(cast)] = (cast, np.array(places, dtype=np.intp))
+        return known[1]
 
     def components(self, type_name: str) -> tuple[str, ...]:
         """Properties of a type that the laws predict: its velocity, and its spin if contacts act on surfaces."""

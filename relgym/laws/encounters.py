@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,22 @@ from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["EncounterStore"]
+
+
+class _Waiting(NamedTuple):
+    """A contact that is kept and wasn't looked at yet: arguments of `EncounterStore.confirm`."""
+
+    contacts: Callable[[NDArray[np.float64]], Contacts]
+    cast: Cast
+    pair: int
+    vector: NDArray[np.float64]
+    after: NDArray[np.float64]
+
+    def finite(self) -> bool:
+        """Whether all that is kept of it are numbers: those of its scene are, but what is read may not be there."""
+        width, sources = self.cast.layout.width, self.cast.sources
+        read = [sources[body][1] for body in self.cast.pairs[self.pair] if body in sources]
+        return not any((places == width).any() for places in read)
 
 
 class EncounterStore:
@@ -52,6 +68,11 @@ class EncounterStore:
         ends = np.cumsum(list(widths.values())).tolist()
         self._at = {name: slice(end - w, end) for (name, w), end in zip(widths.items(), ends, strict=True)}
         self._store = Store(ends[-1], CONTACTS_KEPT, seed=seed)
+        self._waiting: dict[int, _Waiting] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        self._look_at_waiting()
+        return self.__dict__
 
     def __len__(self) -> int:
         return len(self._store.rows)
@@ -83,57 +104,88 @@ class EncounterStore:
         kind = contacts.cast.kinds[pair]
         if kind not in self.kinds:
             self.kinds.append(kind)
-        row = self._row(contacts, pair, vector, after)
-        if np.isfinite(row).all():
-            self._store.add(row, cell=self._cell(kind, wrong))
+        row = self._rows(contacts, np.array([pair]), vector[None], after[None])[0]
+        cell = self._cell(kind, wrong)
+        if np.isfinite(row).all() and (place := self._store.draw(cell)) is not None:
+            self._store.put(place, row, cell=cell)
+            self._waiting.pop(place, None)
 
     def confirm(
         self,
-        contacts: Callable[[], Contacts],
+        contacts: Callable[[NDArray[np.float64]], Contacts],
         cast: Cast,
         pair: int,
         vector: NDArray[np.float64],
         after: NDArray[np.float64],
     ) -> None:
-        """`add` of a contact of a known kind that came as predicted; looked at only if it is drawn to be kept."""
+        """`add` of a contact of a known kind that came as predicted, and of bodies that are where they can be.
+
+        It is looked at, with others, when somebody wants the contacts kept, if it is drawn to be kept and still is.
+
+        Parameters
+        ----------
+        contacts
+            Gives who touches whom in some scenes of the cast's layout, shape ``(n, width)``.
+        cast, pair, vector, after
+            As of `add`.
+        """
         cell = self._cell(cast.kinds[pair], False)
-        if (place := self._store.draw(cell)) is not None:
-            row = self._row(contacts(), pair, vector, after)
-            if np.isfinite(row).all():
-                self._store.put(place, row, cell=cell)
+        if (place := self._store.draw(cell)) is None:
+            return
+        waiting = _Waiting(contacts, cast, pair, vector, after)
+        if waiting.finite():
+            self._store.put(place, np.zeros(self._store.shape[0]), cell=cell)
+            self._waiting[place] = waiting
+
+    def _look_at_waiting(self) -> None:
+        """Look at the contacts that are kept and nobody has looked at yet."""
+        waiting, self._waiting = self._waiting, {}
+        casts = {id(each.cast): each.cast for each in waiting.values()}
+        for cast in casts.values():
+            places = [place for place, each in waiting.items() if each.cast is cast]
+            some = [waiting[place] for place in places]
+            vectors = np.array([each.vector for each in some])
+            after = np.array([each.after for each in some])
+            pairs = np.array([each.pair for each in some])
+            self._store.rows[places] = self._rows(some[-1].contacts(vectors), pairs, vectors, after)
 
     def _cell(self, kind: Kind, wrong: bool) -> int:
         return 2 * self.kinds.index(kind) + wrong
 
-    def _row(
-        self, contacts: Contacts, pair: int, vector: NDArray[np.float64], after: NDArray[np.float64]
+    def _rows(
+        self,
+        contacts: Contacts,
+        pairs: NDArray[np.intp],
+        vectors: NDArray[np.float64],
+        after: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """All that is kept of a contact."""
-        cast = contacts.cast
-        a, b = int(cast.first[pair]), int(cast.second[pair])
-        state = cast.padded(vector[None])[:, 0]
-        there = contacts.bearings(np.zeros(1, dtype=np.intp), np.array([pair]))
-        row = np.zeros(self._store.rows.shape[1])
-        row[self._at["kind"]] = self.kinds.index(cast.kinds[pair])
-        for side, body in (("a", a), ("b", b)):
-            row[self._at[f"now_{side}"]] = state[cast.velocities[:, body]]
-            row[self._at[f"after_{side}"]] = after[:, body]
-            row[self._at[f"arm_{side}"]] = contacts.arms(np.zeros(1, dtype=np.intp), np.array([body]))
-            row[self._at[f"extent_{side}"]] = contacts.pose[0, body, 6 + cast.axes.used[0]]
-            if body in cast.sources:
-                start = self._at[f"x_{side}"].start
-                places = cast.sources[body][1]
-                row[start : start + len(places)] = state[places]
-        if not cast.both[pair]:  # what isn't learned keeps its velocity
-            row[self._at["after_b"]] = row[self._at["now_b"]]
-        row[self._at["normal"]], row[self._at["centres"]] = there.normal[:, 0], there.centres[:, 0]
-        row[self._at["angles"]] = there.angles[:, 0]
-        return row
+        """All that is kept of one contact in each of n scenes, shape ``(n, columns)``; after ``(n, components, K)``."""
+        cast, scenes = contacts.cast, np.arange(len(pairs))
+        state = cast.padded(vectors)
+        there = contacts.bearings(scenes, pairs)
+        rows = np.zeros((len(pairs), self._store.shape[0]))
+        rows[:, self._at["kind"]] = np.array([[self.kinds.index(cast.kinds[k])] for k in pairs.tolist()])
+        for side, bodies in (("a", cast.first[pairs]), ("b", cast.second[pairs])):
+            rows[:, self._at[f"now_{side}"]] = state[cast.velocities[:, bodies], scenes].T
+            rows[:, self._at[f"after_{side}"]] = after[scenes, :, bodies]
+            rows[:, self._at[f"arm_{side}"]] = contacts.arms(scenes, bodies)[:, None]
+            extent = contacts.pose[scenes, bodies, 6 + cast.axes.used[0]]
+            rows[:, self._at[f"extent_{side}"]] = extent[:, None]
+            start = self._at[f"x_{side}"].start
+            for body in np.unique(bodies).tolist():
+                if body in cast.sources:
+                    part, places = np.flatnonzero(bodies == body), cast.sources[body][1]
+                    rows[part, start : start + len(places)] = state[places][:, part].T
+        still = ~cast.both[pairs]  # what isn't learned keeps its velocity
+        rows[still, self._at["after_b"]] = rows[still, self._at["now_b"]]
+        rows[:, self._at["normal"]], rows[:, self._at["centres"]] = there.normal.T, there.centres.T
+        rows[:, self._at["angles"]] = there.angles.T
+        return rows
 
     def encounters(self, book: LawBook) -> Encounters | None:
         """The contacts as laws see them, with the present free laws; None where none has one."""
-        rows = self._store.rows
         kinds = self._column("kind")[0].astype(np.intp)
+        rows = self._store.rows
         usable = [
             k
             for k, (a, b) in enumerate(self.kinds)
@@ -203,6 +255,7 @@ class EncounterStore:
 
     def _column(self, name: str) -> FloatArray:
         """One field of all contacts, components first."""
+        self._look_at_waiting()
         return np.ascontiguousarray(self._store.rows[:, self._at[name]].T)
 
     # ------------------------------------------------------------------ saving
@@ -212,6 +265,7 @@ class EncounterStore:
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """The contacts."""
+        self._look_at_waiting()
         return self._store.to_arrays()
 
     def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:

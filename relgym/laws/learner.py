@@ -182,7 +182,7 @@ class LawLearner:
         following: NDArray[np.float64],
         touched: Mapping[int, Sequence[int]],
         off: Mapping[int, float],
-        contacts: Callable[[], Contacts],
+        contacts: Callable[[NDArray[np.float64]], Contacts],
     ) -> bool:
         """`learn_one` of a transition that came as the laws said, if that is all it teaches: else nothing is done.
 
@@ -195,7 +195,8 @@ class LawLearner:
         off
             What the prediction of each mover was off by at most.
         contacts
-            Gives who touches whom, with all that is to be known of it; asked only where a contact is kept.
+            Gives who touches whom in scenes of that layout, with all that is to be known of it; asked only of contacts
+            that are kept, and later.
         """
         self._rescale(cast, vector)
         if set(off) != set(cast.movers) or any(not error <= self.book.tolerance for error in off.values()):

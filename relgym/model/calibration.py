@@ -2,22 +2,25 @@
 
 Several experts have a value for what comes next: the mode or law that won, the guess, regressions on everything, and
 that nothing changes. A learner that predicts before each step reports how each of them came out
-(`WorldModel.look_back`), and that is counted in *cells*: by outcome, winner, and how far it led its runner-up. Of a
-cell
+(`WorldModel.look_back`), and that is counted in *cells*: by outcome, winner, and how far it led its runner-up; in those
+of its winner where there are few trials. Of a cell
 
 - the expert who coded what came in fewest bits gives the value; another one takes over when it leads by
   `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984). A law that can be claimed keeps the word
   where it is hardly worse;
-- the *probability* of being right is the posterior mean of the share of hits, its prior that of all cells of the
-  outcome. A hit is off by no more than `ModelConfig.claim_error` of what mostly changes;
+- the *probability* of being right is the posterior mean of the share of hits, its prior that of all that modes, or
+  laws, said with this outcome; and until the first miss what speaks may be a law that is always right. A hit is off by
+  no more than `ModelConfig.claim_error` of what mostly changes;
 - the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
 
 A run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a law that changed is
 doubted at once, and a mode whose conditions were found is believed at once.
 
-A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`;
-where more than `ModelConfig.claim_slips` of a target's predictions were claimed and off lately, it must be that sure.
-Of a model that was never told how its predictions came out nothing is known, and nothing is doubted.
+A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
+Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
+`ModelConfig.claim_slips` of the target's predictions (selective prediction: Geifman & El-Yaniv 2017). That is reckoned
+from the records of those who speak now: what slipped before a law was known isn't held against the law. Of a model that
+was never told how its predictions came out nothing is known, and nothing is doubted.
 """
 
 from __future__ import annotations
@@ -59,9 +62,6 @@ LEAVE: Final = 1.1
 PRIOR: Final = 1.0
 """Trials that the prior of a share counts for, as Jeffreys' does."""
 
-YOUNG: Final = 256.0
-"""The share of slips is taken of at least so many predictions: one or two early ones say little."""
-
 COVERED: Final = 0.95
 """Share of what comes that intervals are to hold."""
 
@@ -73,6 +73,10 @@ OCTAVE: Final = 4
 
 _EXACT: Final = -(1 << 14)
 """The bin of errors no larger than rounding."""
+
+
+OF_WINNER, OF_FAMILY = -1, -2
+"""Bins of leads that stand for all of a winner's, and for those of all modes or all laws."""
 
 
 class Key(NamedTuple):
@@ -144,34 +148,63 @@ class _Record:
     hits: float = 0.0
     run: int = 0  # of hits (> 0) or misses (< 0), up to now
     errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
+    runs: list[float] = field(
+        default_factory=lambda: [0.0] * 4
+    )  # over: trials in those of misses, of hits; how many
 
     def count(self, error: float, within: float) -> bool:
         """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
         self.errors = _counted(self.errors, _place(error))
         hit = error <= within
         if hit != (self.run > 0):
+            if self.run:
+                was = self.run > 0
+                self.runs[was] += abs(self.run)
+                self.runs[2 + was] += 1.0
             self.run = 0
         self.run += 1 if hit else -1
         # The run under way isn't part of the record that it is held against.
-        before = max(self.trials - (abs(self.run) - 1), 0.0)
+        length = abs(self.run)
+        before = max(self.trials - (length - 1), 0.0)
         share = (max(self.hits - max(self.run - 1, 0), 0.0) + 0.5) / (before + 1.0)
+        one = share if hit else max(1.0 - share, 1e-300)
+        # Where hits, or misses, mostly come in long runs, another one is no news.
+        trials, ends = self.runs[hit], self.runs[2 + hit]
+        again = max(one, (trials - ends + one) / (trials + 1.0))
         # It may have begun at any of the trials, which takes the logarithm of their number to say.
-        bits = -abs(self.run) * math.log2(share if hit else max(1.0 - share, 1e-300)) - math.log2(
-            before + 1.0
-        )
+        bits = -math.log2(one) - (length - 1) * math.log2(again) - math.log2(before + 1.0)
         self.trials += 1.0
         self.hits += hit
         # Hits come in runs where little happens: what was doubted is believed after more of them.
         ended = before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= FEW)
-        if ended:
-            self.trials, self.hits = float(abs(self.run)), float(max(self.run, 0))
+        if ended:  # a run of hits begins with the miss that it follows: what failed once isn't right always
+            self.trials, self.hits = float(abs(self.run) + hit), float(max(self.run, 0))
+            self.runs = [0.0] * 4
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+        if self.runs[0] + self.runs[1] > MEMORY:
+            self.runs = [0.5 * each for each in self.runs]
         return ended
 
-    def share(self, prior: float) -> float:
-        """Posterior mean of the share of hits."""
+    def mean(self, prior: float) -> float:
+        """Posterior mean of the share of hits, after a beta distribution of `PRIOR` trials around the given mean."""
         return (self.hits + prior * PRIOR) / (self.trials + PRIOR)
+
+    def share(self, prior: float, bits: float = 0.0) -> float:
+        """How probably the next one is a hit.
+
+        One part of the prior has it that hits come in some share (`mean`). The other one, larger by so many bits, that
+        what speaks is a law and always right: that holds until the first miss.
+        """
+        some = self.mean(prior)
+        if self.hits < self.trials or not (self.trials or bits):
+            return some
+        n = (
+            self.trials
+        )  # all hits: how likely is that in a share of which nothing is known (Jeffreys' prior)?
+        by_chance = math.exp(math.lgamma(n + 0.5) - math.lgamma(n + 1.0) - bits * math.log(2.0))
+        by_chance /= math.sqrt(math.pi)
+        return 1.0 - (1.0 - some) * by_chance / (1.0 + by_chance)
 
 
 @dataclass(slots=True)
@@ -183,10 +216,17 @@ class _Cell:
     squares: list[
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials
+    heard: float = 0.0  # predictions, those of long ago counting less
 
     @classmethod
     def new(cls, speaker: int, experts: int) -> _Cell:
         return cls(speaker, {}, [[0.0, 0.0, 0.0] for _ in range(experts)])
+
+    def note(self, speaker: int, errors: Sequence[float], within: float) -> None:
+        """Take in whether the winner and the speaker were right, no more."""
+        for expert in {OWN, speaker}:
+            if errors[expert] == errors[expert]:
+                self.records.setdefault(expert, _Record()).count(errors[expert], within)
 
     def count(self, errors: Sequence[float], within: float) -> None:
         """Take in what each expert was off by; the best one speaks, if it leads by enough."""
@@ -207,6 +247,14 @@ class _Cell:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
 
+    def sure(self, claims: tuple[float, float], bits: float) -> float:
+        """How probably what would be claimed is right, after this record alone; 0 if no mode and no law speaks."""
+        able = [k for k, sums in enumerate(self.squares) if sums[0]]
+        speaker = self.preferred(able, claims) if able else OWN
+        known = self.records.get(speaker)
+        share = 0.5 if known is None else known.share(0.5, bits)
+        return share if _makes_claims(speaker) else 0.0
+
     def left(self, expert: int) -> float:
         """Squares left of what saying that nothing changes leaves; infinite if the expert was never heard."""
         trials, own, base = self.squares[expert]
@@ -220,13 +268,16 @@ class _Cell:
         ratio = self.left(other) / self.left(expert)
         return 0.5 * trials * math.log2(min(max(ratio, 1e-300), 1e300))
 
-    def preferred(self, able: Collection[int], probability: float) -> int:
+    def preferred(self, able: Collection[int], claims: tuple[float, float]) -> int:
         """Who of those who have a value speaks.
 
-        The winner where that can be claimed and leaves hardly more than what anybody would try; else who codes best.
+        The winner where that can be claimed, is right as often as who codes best (or as it takes for all to be
+        claimed), and leaves hardly more than what anybody would try; else who codes best.
         """
-        own = self.records.get(OWN)
-        if OWN in able and own is not None and own.share(0.5) >= probability:
+        own, other = self.records.get(OWN), self.records.get(self.speaker, _Record())
+        probability, slips = claims
+        least = max(probability, min(other.share(0.5), 1.0 - slips))
+        if OWN in able and own is not None and own.share(0.5) >= least:
             least = min(self.left(expert) for expert in able if expert in _KNOWN or expert >= len(EXPERTS))
             if self.left(OWN) <= LEAVE * LEAVE * least:
                 return OWN
@@ -241,6 +292,8 @@ class Calibration:
     probability
         How probable it must be that what the winner says is right, for it to be claimed
         (`ModelConfig.claim_probability`).
+    slips
+        Share of predictions that may be expected to be claimed and off (`ModelConfig.claim_slips`).
     hypotheses
         Laws of `ModelConfig.hypotheses`: experts behind those that there always are.
 
@@ -250,17 +303,21 @@ class Calibration:
         Predictions that somebody looked back at.
     """
 
-    def __init__(self, probability: float = 0.9, hypotheses: int = 0) -> None:
-        self.probability = probability
+    def __init__(self, probability: float = 0.9, slips: float = 0.0075, hypotheses: int = 0) -> None:
+        self.probability, self.allowed = probability, slips
         self.experts = len(EXPERTS) + hypotheses
         self.trials = 0
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
+        self._least: dict[int, float] = {}  # probability that claims need, by who makes them
+        self._vouched = (
+            0.0  # bits by which laws, when they came in force, described what came better than modes
+        )
         self._assessed: dict[Key, tuple[tuple[int, ...], Assessment]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_assessed": {}}
+        return self.__dict__ | {"_assessed": {}, "_least": {}}
 
     @property
     def change(self) -> float:
@@ -268,12 +325,12 @@ class Calibration:
 
         A median, since a few crashes make most of the squares, and no outlier is to say what is right.
         """
-        return _quantile({k: n for k, n in self._changes.items() if k != _EXACT}, 0.5)
+        return _quantile(self._changes, 0.5, self._changes.get(_EXACT, 0.0))
 
     @property
     def slips(self) -> float:
-        """Share of the latest predictions that were claimed and off; of few, as if more had been right."""
-        return self._slips[1] / max(self._slips[0], YOUNG)
+        """Share of the latest predictions that were claimed and off."""
+        return self._slips[1] / max(self._slips[0], 1.0)
 
     # ------------------------------------------------------------------ what is made of a prediction
     def assess(self, key: Key, values: Sequence[float]) -> Assessment:
@@ -293,22 +350,95 @@ class Calibration:
             rows = np.flatnonzero(which.reshape(-1) == number)
             yield rows, self.assess(key, np.where(row, 0.0, np.nan).tolist())
 
+    def table(self, outcomes: int, able: Sequence[int]) -> Iterator[tuple[Key, int, Assessment, bool]]:
+        """What is made of every kind of predictions: a table that says of any prediction what `assess` and `claims` do.
+
+        A prediction whose cell isn't listed is of the kind of its winner (a lead of `OF_WINNER`); one whose winner
+        isn't listed of the kind of its family (`OF_FAMILY`, and 1, -1 or 0 for a winner).
+
+        Parameters
+        ----------
+        outcomes
+            Numbers of outcomes are smaller than this.
+        able
+            Experts who may have a value, as bits by their places in `EXPERTS`, set by set; persistence always has one.
+
+        Yields
+        ------
+        Key, set of experts, what is made of it, and whether it is claimed.
+        """
+        nowhere = 1 << 20
+        families = [(outcome, who) for outcome in range(outcomes) for who in (-1, 0, 1)]
+        rows = [(Key(*each, OF_FAMILY), Key(each[0], each[1] << 40, nowhere)) for each in families]
+        rows += [(k, k._replace(lead=nowhere)) for k in sorted(self._cells) if k.lead == OF_WINNER]
+        rows += [(k, k) for k in sorted(self._cells) if k.lead >= 0]
+        for shown, key in rows:
+            for bits in able:
+                having = tuple(k for k in range(len(EXPERTS)) if bits >> k & 1 or k == PERSISTENCE)
+                told = self._assess(key, having)
+                yield shown, bits, told, self.claims(key, told)
+
     def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
-        default = next(k for k in _BY_DEFAULT if k in able)
-        whole, cell = self._cells.get(_whole(key)), self._cells.get(key)
-        if whole is None:
-            return Assessment(default, math.nan if not self.trials else 0.5, math.nan, math.nan)
-        trusted = cell if cell is not None and cell.squares[PERSISTENCE][0] >= FEW else whole
-        speaker = trusted.preferred(able, self.probability)
-        share = 0.5
-        for each in (whole, cell):
-            if each is not None and speaker in each.records:
-                share = each.records[speaker].share(share)
+        cells = [self._cells.get(each) for each in (_family(key), _winner(key), key)]
+        # Who speaks is told by this winner's record alone: what others won says nothing of a new law.
+        known = [c for c in cells[1:] if c is not None and c.squares[PERSISTENCE][0]]
+        if not known:
+            speaker = next(k for k in _BY_DEFAULT if k in able)
+        else:
+            trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
+            speaker = trusted.preferred(able, (self.probability, self.allowed))
+        bits = self._bits(_who(key)) if speaker == OWN else 0.0
+        own = [_Record() if c is None else c.records.get(speaker, _Record()) for c in cells]
+        latest = own[2] if own[2].trials else own[1]
+        share = latest.share(own[0].mean(0.5), bits) if self.trials else math.nan
+        if not known:
+            return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
         few = record is None or sum(record.errors.values()) < ENOUGH
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
-        trials, own, _ = trusted.squares[speaker]
-        return Assessment(speaker, share, half, math.sqrt(own / trials) if trials else math.nan)
+        trials, squares, _ = trusted.squares[speaker]
+        return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
+
+    def claims(self, key: Key, told: Assessment) -> bool:
+        """Whether a prediction in a cell is claimed: a mode or a law speaks, and it is right probably enough.
+
+        The surest kinds are claimed first, as many as may together be expected to be off in no more than the share
+        allowed of what is predicted, and once more: a single miss tells no share. What doesn't speak any more isn't
+        counted: neither modes where laws predict, nor the reverse.
+        """
+        if not _makes_claims(told.speaker):
+            return False
+        if not self.trials:
+            return True
+        who, cell = _who(key), self._cells.get(key)
+        if who not in self._least:
+            self._least[who] = self._needed(who)
+        share = (
+            told.probability if cell is None else cell.sure((self.probability, self.allowed), self._bits(who))
+        )
+        return min(told.probability, share) >= self.probability and share >= self._least[who]
+
+    def _needed(self, who: int) -> float:
+        """The least probability that is claimed."""
+        kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
+        left = 1.0 + 0.5 * PRIOR + self.allowed * sum(c.heard for c in kinds)
+        claims, bits = (self.probability, self.allowed), self._bits(who)
+        for share, heard in sorted(((c.sure(claims, bits), c.heard) for c in kinds), reverse=True):
+            if share < self.probability:
+                break
+            left -= (1.0 - share) * heard
+            if left < 0.0:
+                return math.nextafter(share, 2.0)
+        return 0.0
+
+    def _bits(self, who: int) -> float:
+        return self._vouched if who < 0 else 0.0
+
+    def vouch(self, bits: float) -> None:
+        """Laws come in force, which describe what came in so many bits less than modes: so much likelier they are."""
+        self._vouched = bits
+        self._assessed.clear()
+        self._least.clear()
 
     # ------------------------------------------------------------------ how it came out
     def look_back(
@@ -347,16 +477,26 @@ class Calibration:
         self._slips[1] += claimed and errors[audit.speaker] > within
         if self._slips[0] > MEMORY:
             self._slips = [0.5 * each for each in self._slips]
-        for key in dict.fromkeys((_whole(audit.key), audit.key)):
+            for cell in self._cells.values():
+                cell.heard *= 0.5
+        for key in (_family(audit.key), _winner(audit.key), audit.key):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker, self.experts)
-            self._cells[key].count(errors, within)
+            if key.lead == OF_FAMILY:
+                self._cells[key].note(audit.speaker, errors, within)
+            else:
+                self._cells[key].count(errors, within)
+        self._cells[audit.key].heard += 1.0
         self._assessed.clear()
+        self._least.clear()
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
-        self._cells = {k: c for k, c in self._cells.items() if k.winner <= 0 or k.winner in modes}
+        self._cells = {
+            k: c for k, c in self._cells.items() if k.winner <= 0 or k.lead == OF_FAMILY or k.winner in modes
+        }
         self._assessed.clear()
+        self._least.clear()
 
     def renewed(self, expert: int) -> None:
         """An expert has another law: it begins as if it had been as good as who speaks in the latest few trials.
@@ -369,43 +509,45 @@ class Calibration:
             share = min(1.0, EVIDENCE / known[0]) if known[0] else 0.0
             cell.squares[expert] = [share * each for each in known]
         self._assessed.clear()
+        self._least.clear()
 
     def speakers(self) -> dict[int, float]:
         """Trials of the cells in which each expert gives the value, by place of the expert."""
         found: dict[int, float] = {}
         for key, cell in sorted(self._cells.items()):
-            if key != _whole(key):
+            if key.lead >= 0:
                 speaker = self._assess(key, tuple(range(self.experts))).speaker
                 found[speaker] = found.get(speaker, 0.0) + cell.squares[PERSISTENCE][0]
         return found
 
-    def doubts(self, outcome: int, probability: float) -> bool:
-        """Whether what won the vote was right less often than that, or the mode that held last speaks instead."""
-        whole = self._cells.get(Key(outcome, -1, -1))
-        return whole is not None and (whole.speaker != OWN or self.share(outcome) < probability)
+    def doubts(self, outcome: int) -> bool:
+        """Whether what won votes was off more often than claims may be, or the mode that held last spoke instead."""
+        if not self.share(outcome) >= 1.0 - self.allowed:
+            return _family(Key(outcome, 1, 0)) in self._cells
+        return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 
     def forget(self) -> None:
         """What follows is another model's word: only what mostly changes stays."""
-        self._cells, self._assessed, self.trials = {}, {}, 0
+        self._cells, self._assessed, self._least, self.trials, self._vouched = {}, {}, {}, 0, 0.0
 
     def share(self, outcome: int) -> float:
-        """Share of an outcome's predictions that were hits lately; NaN where there were none."""
-        whole = self._cells.get(_whole(Key(outcome, 0, 0)))
+        """Share of what modes predicted with an outcome that were hits lately; NaN where there were none."""
+        whole = self._cells.get(_family(Key(outcome, 1, 0)))
         own = None if whole is None else whole.records.get(OWN)
         return math.nan if own is None or not own.trials else own.hits / own.trials
 
-    def kinds(self, outcome: int) -> Iterator[tuple[float, Assessment]]:
-        """Trials of each kind of predictions of an outcome, and what is made of such a prediction."""
+    def kinds(self, outcome: int) -> Iterator[tuple[Key, float, Assessment]]:
+        """Each kind of predictions of an outcome, its trials, and what is made of such a prediction."""
         for key, cell in sorted(self._cells.items()):
-            if key.outcome == outcome and key != _whole(key):
-                yield cell.squares[PERSISTENCE][0], self._assess(key, tuple(range(self.experts)))
+            if key.outcome == outcome and key.lead >= 0:
+                yield key, cell.heard, self._assess(key, tuple(range(self.experts)))
 
     def united(self, other: Calibration) -> Calibration:
         """What two models know together: cell by cell, the record of who looked back more often."""
         more, less = (self, other) if self.trials >= other.trials else (other, self)
-        hypotheses = self.experts - len(EXPERTS)
-        found = Calibration.from_json(more.to_json(), self.probability, hypotheses)
-        for key, cell in Calibration.from_json(less.to_json(), self.probability, hypotheses)._cells.items():
+        others = self.allowed, self.experts - len(EXPERTS)
+        found = Calibration.from_json(more.to_json(), self.probability, *others)
+        for key, cell in Calibration.from_json(less.to_json(), self.probability, *others)._cells.items():
             found._cells.setdefault(key, cell)
         found.trials = self.trials + other.trials
         return found
@@ -416,13 +558,22 @@ class Calibration:
         return {
             "trials": self.trials,
             "slips": list(self._slips),
+            "vouched": self._vouched,
             "changes": [[place, count] for place, count in sorted(self._changes.items())],
             "cells": [
                 {
                     "key": list(key),
                     "speaker": cell.speaker,
+                    "heard": cell.heard,
                     "records": [
-                        [who, r.trials, r.hits, r.run, [[k, n] for k, n in sorted(r.errors.items())]]
+                        [
+                            who,
+                            r.trials,
+                            r.hits,
+                            r.run,
+                            [[k, n] for k, n in sorted(r.errors.items())],
+                            list(r.runs),
+                        ]
                         for who, r in sorted(cell.records.items())
                     ],
                     "squares": [list(sums) for sums in cell.squares],
@@ -432,25 +583,51 @@ class Calibration:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any], probability: float, hypotheses: int = 0) -> Calibration:
+    def from_json(
+        cls, data: Mapping[str, Any], probability: float, slips: float = 0.0075, hypotheses: int = 0
+    ) -> Calibration:
         """Read what `to_json` wrote."""
-        found = cls(probability, hypotheses)
+        found = cls(probability, slips, hypotheses)
         found.trials = int(data["trials"])
         found._slips = [float(each) for each in data["slips"]]
+        found._vouched = float(data["vouched"])
         found._changes = {int(place): float(count) for place, count in data["changes"]}
         for each in data["cells"]:
             records = {
-                int(who): _Record(float(n), float(hits), int(run), {int(k): float(c) for k, c in bins})
-                for who, n, hits, run, bins in each["records"]
+                int(who): _Record(
+                    float(n),
+                    float(hits),
+                    int(run),
+                    {int(k): float(c) for k, c in bins},
+                    [float(c) for c in runs],
+                )
+                for who, n, hits, run, bins, runs in each["records"]
             }
             squares = [[float(s) for s in sums] for sums in each["squares"]]
-            found._cells[Key(*map(int, each["key"]))] = _Cell(int(each["speaker"]), records, squares)
+            found._cells[Key(*map(int, each["key"]))] = _Cell(
+                int(each["speaker"]), records, squares, float(each["heard"])
+            )
         return found
 
 
-def _whole(key: Key) -> Key:
-    """The cell of all predictions of one outcome."""
-    return Key(key.outcome, -1, -1)
+def _makes_claims(speaker: int) -> bool:
+    """Whether an expert is a mode, a law, or a law of a hypothesis class that was added; others have values only."""
+    return speaker in (OWN, LATEST) or speaker >= len(EXPERTS)
+
+
+def _who(key: Key) -> int:
+    """Who makes a prediction: laws (-1), modes (1), or neither (0)."""
+    return (key.winner > 0) - (key.winner < 0)
+
+
+def _family(key: Key) -> Key:
+    """The cell of all predictions of one outcome that laws, or modes, make."""
+    return Key(key.outcome, _who(key), OF_FAMILY)
+
+
+def _winner(key: Key) -> Key:
+    """The cell of all predictions of one outcome and winner."""
+    return Key(key.outcome, key.winner, OF_WINNER)
 
 
 def _place(error: float) -> int:
@@ -466,9 +643,12 @@ def _counted(bins: dict[int, float], place: int) -> dict[int, float]:
     return {k: 0.5 * v for k, v in bins.items() if v > 2.0**-10}
 
 
-def _quantile(bins: Mapping[int, float], share: float) -> float:
-    """What a share of the sizes, and of one more, are no larger than; 0 where there are none."""
-    wanted, seen = share * (sum(bins.values()) + 1.0), 0.0
+def _quantile(bins: Mapping[int, float], share: float, exact: float = 0.0) -> float:
+    """What a share of the sizes, and of one more, are no larger than; 0 where there are none.
+
+    Of the sizes that are no larger than rounding so many are left aside: all, if any.
+    """
+    wanted, seen = share * (sum(bins.values()) - exact + 1.0), -exact
     for place in sorted(bins):
         before, seen = seen, seen + bins[place]
         if seen >= wanted:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import ScenePrediction
-from relgym.model.scenes import next_values, stays, unwrapped
+from relgym.model.scenes import next_values, passage, unwrapped
 from relgym.model.target.property_model import bodies_of
 from relgym.scene.objects import TASK, Target, Transition
 from relgym.scheduling.agenda import Budget
@@ -78,6 +78,7 @@ def learn(
     before, after = transition.before, transition.after
     if parts.open:
         parts.discover_targets(before, after)
+    stays = passage(before.layout, after.layout).stays
     following = unwrapped(before.layout, before.vector, next_values(before, after))
     reports: dict[tuple[str, str], ClusterReport] = {}
     budget = parts.agenda.open()
@@ -87,7 +88,7 @@ def learn(
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
-            if (only is None or index in only) and stays(before, after, index):
+            if (only is None or index in only) and stays[index]:
                 _learn_object(parts, percept, index, following, reports, searches)
     for type_name, table in parts.tables.items():
         if parts.open and table.seen in CHECK_AT:
@@ -125,8 +126,8 @@ def _inquire(parts: Parts, budget: Budget) -> None:
 
 def _there(parts: Parts, transition: Transition, only: frozenset[int] | None) -> dict[int, bool]:
     """Whether each object stays; of those that move, only some may teach."""
-    before, after = transition.before, transition.after
-    there = {i: stays(before, after, i) for i in range(len(before))}
+    before = transition.before
+    there = dict(enumerate(passage(before.layout, transition.after.layout).stays))
     if only is not None:
         moving = {t.type for t in parts.targets}
         others = (i for i, t in enumerate(before.layout.types) if t.name in moving and i not in only)
@@ -165,7 +166,7 @@ def _learn_object(
     x = percept.rows(index, following[None])[0]
     bodies = bodies_of(situation.order[0], layout)
     row = table.add(situation.signature, x, situation.keys[0], bodies)
-    example = replace(situation.examples[0], key=situation.keys[0])
+    example = situation.examples.at(0, situation.keys[0])
     changes: dict[str, float] = {}
     rough = False
     for target in parts.targets:

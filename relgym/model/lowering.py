@@ -108,6 +108,8 @@ class _Lowering:
         bodies = tuple(self._body(k) for k in range(len(layout.bodies)))
         names = sorted({layout.types[i].name for i in layout.bodies})
         groups = tuple(names.index(layout.types[i].name) for i in layout.bodies)
+        if parts.laws is not None and parts.laws.learner.book.turning:
+            raise ir.BeyondError("bodies that turn: laws at points, and modes that are never claimed")
         motion = self._motion() if parts.laws is not None and parts.laws.governed else None
         answers = tuple(
             self._answer(target, index) for target in parts.targets for index in layout.of_type(target.type)
@@ -200,8 +202,6 @@ class _Lowering:
         if not self.axes.planar:
             raise ir.BeyondError("laws of motion in space")
         book: LawBook = laws.learner.book
-        if book.turning:
-            raise ir.BeyondError("laws at points of bodies that turn")
         cast = book.cast(self.layout)
         movers = tuple(self._mover(book, cast, body) for body in cast.movers)
         engaged = book._engaged_pairs(cast)
@@ -312,7 +312,10 @@ class _Lowering:
         """What an answer by modes says besides."""
         ids = model.classifier.modes
         if model.lost or not ids:
-            return {"state": "lost" if model.lost else "none"}
+            latest = [model.latest] if model.latest in ids else []  # it may be asked all the same
+            bound = [m for m in latest if not _open(bind(model.mode(m), situation.signature))]
+            found = tuple(self._mode(model, number, situation, one, body) for number in bound)
+            return {"state": "lost" if model.lost else "none", "modes": found}
         signature = situation.signature
         found = tuple(self._mode(model, number, situation, one, body) for number in ids)
         registers = {mode.id: mode.register for mode in found}
@@ -597,6 +600,10 @@ def _bound_sum(
         return None
     terms = [(ir.CONSTANT, float(binding.intercept))]
     return ir.Sum((*terms, *((column(c), float(w)) for c, w in binding.fixed)))
+
+
+def _open(binding: Binding | None) -> bool:
+    return binding is None or bool(binding.open)
 
 
 def _piece(piece: Piece, where: Mapping[str, int]) -> ir.Sum:

@@ -112,16 +112,14 @@ class Laws:
         if not self.learner.sources:
             return
         self._seen += 1
-        if told is not None and self._seen % WEIGH_EVERY and self._confirmed(percept, following, stays, told):
-            self._last = None
-            return
-        motion = self._last[2] if self._last is not None and self._last[0] is percept else None
-        contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
-        changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
+        changed = False
+        if told is None or not self._confirmed(percept, following, stays, told):
+            motion = self._last[2] if self._last is not None and self._last[0] is percept else None
+            contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
+            changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
         self._last = None  # what the laws say may have changed
         if changed or self._seen % WEIGH_EVERY == 0:
-            self.governed = frozenset(name for name in self.learner.types if self._prevail(name, models))
-            self.mark(models)
+            self._weigh(models)
 
     def _confirmed(
         self,
@@ -157,24 +155,41 @@ class Laws:
             kind = layout.types[layout.bodies[body]].name
             if said.get(body, 0) != len(self.learner.book.components(kind)):
                 return False
-        vector = percept.vectors[0]
-        return self.learner.confirm(cast, vector, following, touched, off, lambda: self._contacts(percept))
+        perception = percept.perception
+        return self.learner.confirm(
+            cast,
+            percept.vectors[0],
+            following,
+            touched,
+            off,
+            lambda vectors: self._contacts(perception.percept(layout, vectors)),
+        )
 
-    def _prevail(self, type_name: str, models: Mapping[Target, PropertyModel]) -> bool:
-        """Whether laws predict a type from now on. What modes would say is not known while they rest."""
-        rests = type_name in self.governed and self.suffice(type_name, tuple(models))
-        return rests or self._shorter(type_name, models)
+    def _weigh(self, models: Mapping[Target, PropertyModel]) -> None:
+        """Laws that describe what came in fewer bits than modes come in force, and are believed accordingly.
 
-    def _shorter(self, type_name: str, models: Mapping[Target, PropertyModel]) -> bool:
-        """Whether a type's motion takes fewer bits by laws than by modes of every component."""
+        What modes would say is not known while they rest: laws that have long been right stay in force.
+        """
+        leads = {name: self._lead(name, models) for name in self.learner.types}
+        targets = tuple(models)
+        resting = {name for name in self.governed if self.suffice(name, targets)}
+        governed = frozenset(name for name, lead in leads.items() if lead > 0.0 or name in resting)
+        for target, part in models.items():
+            if target.type in governed - self.governed:
+                part.calibration.vouch(leads[target.type])
+        self.governed = governed
+        self.mark(models)
+
+    def _lead(self, type_name: str, models: Mapping[Target, PropertyModel]) -> float:
+        """Bits by which laws describe a type's motion better than modes of every component; 0 without laws."""
         if not self.learner.ready(type_name):
-            return False
+            return 0.0
         governed = self.learner.book.components(type_name)
         parts = [part for t, part in models.items() if t.type == type_name and t.property in governed]
         if len(parts) < len(governed):
-            return False
+            return 0.0
         seen = self.learner.seen(type_name)
-        return self.learner.bits(type_name) < sum(mode_bits(part, self._columns, seen) for part in parts)
+        return sum(mode_bits(part, self._columns, seen) for part in parts) - self.learner.bits(type_name)
 
     # ------------------------------------------------------------------ prediction
     def speak(self, percept: Percept) -> Motion | None:

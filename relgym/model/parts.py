@@ -17,7 +17,7 @@ from relgym.model.chaining import Inquiry, Look, in_order
 from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Percept, Perception
 from relgym.model.regression import Regression
-from relgym.model.scenes import mismatch, stays
+from relgym.model.scenes import mismatch, next_values, passage
 from relgym.model.screening import Screen
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
@@ -208,17 +208,21 @@ class Parts:
 
         What the task says is asked for, and a target at once: of ends, that most steps are none is half the story.
         """
-        derived = {(k.type, k.property) for k in self.schema.kinematics}
+        layout, way = before.layout, passage(before.layout, after.layout)
+        known = {(t.type, t.property) for t in self.targets}
+        known |= {(k.type, k.property) for k in self.schema.kinematics}
+        changed = before.vector != next_values(before, after)
         found: list[Target] = []
-        for i, t in enumerate(before.layout.types):
-            if t.name == ACTION or not stays(before, after, i):
+        for i, t in enumerate(layout.types):
+            if t.name == ACTION or not way.stays[i]:
                 continue
-            was, now = before.vector[before.layout.slice(i)], after[before.layout.names[i]].values
-            for k in np.flatnonzero((was != now) | (t.name == TASK)):
-                prop = t.properties[k]
-                known = any(x.type == t.name and x.property == prop for x in (*self.targets, *found))
-                if not known and (t.name, prop) not in derived and prop not in t.exogenous:
+            start = layout.offsets[i]
+            for k, prop in enumerate(t.properties):
+                if (t.name, prop) in known or not (changed[start + k] or t.name == TASK):
+                    continue
+                if prop not in t.exogenous:
                     found.append(Target(t.name, prop))
+                    known.add((t.name, prop))
         check_number(len(self.targets) + len(found))
         for target in found:
             self.add_target(target)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,30 @@ from relgym.scene.surroundings import surroundings
 __all__ = ["Percept", "Perception", "Situation"]
 
 
+class Standing(NamedTuple):
+    """How an object stands among the others of a layout, whatever the scene.
+
+    Attributes
+    ----------
+    body
+        Its number among the bodies; -1 where it has none.
+    head
+        Objects of the first slots, which have no order: itself, and those without a body, shape ``(h,)``.
+    plain
+        Object in each slot where nobody asks which of several alike comes first, shape ``(slots,)``.
+    signature
+        Types of the slots.
+    bodies
+        Index of each body, shape ``(K,)``.
+    """
+
+    body: int
+    head: NDArray[np.intp]
+    plain: NDArray[np.intp]
+    signature: SlotSignature
+    bodies: NDArray[np.intp]
+
+
 class Situation:
     """A batch of scenes as one object sees them; each part is worked out when it is asked for.
 
@@ -35,33 +59,29 @@ class Situation:
     """
 
     def __init__(self, percept: Percept, target: int) -> None:
-        layout = percept.layout
         self._percept, self._target = percept, target
-        self._body = layout.bodies.index(target) if target in layout.bodies else -1
-        self._head = np.array(slot_order(layout, target, ()), dtype=np.intp)
+        self._standing = percept.perception.standing(percept.layout, target)
+        self._body, self._head = self._standing.body, self._standing.head
 
-    @cached_property
+    @property
     def plain(self) -> NDArray[np.intp]:
         """Object index in each slot where nobody asks which of several alike comes first, shape ``(slots,)``."""
-        layout = self._percept.layout
-        numbers = [k for _, those in slots(layout, self._body) for k in those.tolist()]
-        others = [layout.bodies[k] for k in numbers] if self._body >= 0 else layout.bodies
-        return np.array([*self._head, *others], dtype=np.intp)
+        return self._standing.plain
 
-    @cached_property
+    @property
     def signature(self) -> SlotSignature:
         """Types of the slots, the same in all scenes."""
-        layout = self._percept.layout
-        return self._percept.perception.signature_of(tuple(layout.types[i] for i in self.plain))
+        return self._standing.signature
 
     @cached_property
     def order(self) -> NDArray[np.intp]:
         """Object index in each slot, shape ``(n, slots)``; slot 0 is the object itself."""
-        layout, n = self._percept.layout, len(self._percept)
+        n = len(self._percept)
         if self._body < 0:
-            return np.broadcast_to(self.plain, (n, len(self.plain)))
-        others = np.array(layout.bodies, dtype=np.intp)[self._numbers]
-        return np.concatenate([np.broadcast_to(self._head, (n, len(self._head))), others], axis=1)
+            return self.plain[None] if n == 1 else np.broadcast_to(self.plain, (n, len(self.plain)))
+        return np.concatenate(
+            [self._head[None].repeat(n, axis=0), self._standing.bodies[self._numbers]], axis=1
+        )
 
     @cached_property
     def keys(self) -> list[bytes]:
@@ -138,6 +158,7 @@ class Perception:
 
     def _forget(self) -> None:
         self._signatures: dict[tuple[ObjectType, ...], SlotSignature] = {}
+        self._standings: dict[tuple[int, int], Standing] = {}
         self._gathers: dict[tuple[int, tuple[int, ...]], NDArray[np.intp]] = {}
         self._layouts: dict[int, SceneLayout] = {}
         self._own_columns: dict[tuple[int, int], NDArray[np.intp]] = {}
@@ -149,6 +170,7 @@ class Perception:
         # Caches are keyed by identity, which a copy doesn't share.
         caches = (
             "_signatures",
+            "_standings",
             "_gathers",
             "_layouts",
             "_own_columns",
@@ -191,6 +213,20 @@ class Perception:
         if (known := self._signatures.get(types)) is None:
             library = self.libraries[types[0].name]
             known = self._signatures[types] = SlotSignature(types, self.given, self.chained, library)
+        return known
+
+    def standing(self, layout: SceneLayout, target: int) -> Standing:
+        """How an object stands in a layout of which there is a percept; cached."""
+        if (known := self._standings.get((id(layout), target))) is None:
+            body = layout.bodies.index(target) if target in layout.bodies else -1
+            head = np.array(slot_order(layout, target, ()), dtype=np.intp)
+            numbers = [k for _, those in slots(layout, body) for k in those.tolist()]
+            others = [layout.bodies[k] for k in numbers] if body >= 0 else layout.bodies
+            plain = np.array([*head, *others], dtype=np.intp)
+            kind = self.signature_of(tuple(layout.types[i] for i in plain))
+            bodies = np.array(layout.bodies, dtype=np.intp)
+            known = self._standings[id(layout), target] = Standing(body, head, plain, kind, bodies)
+            self._layouts[id(layout)] = layout  # keeps it alive, so that its id stays its own
         return known
 
     def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
@@ -301,7 +337,7 @@ class Percept:
         own = padded[:, perception.own_columns(self.layout, target)]
         numbers = padded[:, perception.feature_columns(self.layout)]
         table = perception.unary_table(self.layout)
-        every = np.broadcast_to(table, (n, *table.shape))
+        every = table[None] if n == 1 else np.broadcast_to(table, (n, *table.shape))
         nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
         close, struck, contacts = surroundings(
             self.relations,

@@ -102,12 +102,12 @@ class Outcomes:
         parts = tuple((p.object, p.property) for p in told)
         off = np.array([residuals[key] for key in parts])
         # Observed minus predicted plus predicted minus before; a turn is measured the short way, as its residual is.
-        moved = [
-            math.remainder(p.value - before[p.object][p.property], 2.0 * math.pi)
-            if p.property in before[p.object].type.angles
-            else p.value - before[p.object][p.property]
-            for p in told
-        ]
+        places = before.layout.places
+        columns = [places[key] for key in parts]
+        moved = [p.value - was for p, was in zip(told, before.vector[columns].tolist(), strict=True)]
+        for k, column in enumerate(columns):
+            if column in before.layout.angles:
+                moved[k] = math.remainder(moved[k], 2.0 * math.pi)
         claimed = np.array([p.ok for p in told], dtype=np.bool_)
         return cls(parts, off, off + np.array(moved), claimed, np.array([p.spread for p in told]))
 
@@ -233,16 +233,18 @@ def compared(
     """
     residuals: dict[Key, float] = {}
     wrong: list[Key] = []
-    layout = after.layout
+    places, angles = after.layout.places, after.layout.angles
     for part in () if prediction is None else prediction.parts:
-        if part.object not in after:
-            continue
         key = (part.object, part.property)
-        column = layout.column(layout.index(part.object), part.property)
+        column = places.get(key)
+        if column is None:
+            if part.object not in after:
+                continue
+            column = after.layout.column(after.layout.index(part.object), part.property)
         came = float(after.vector[column])
-        residuals[key] = came - part.value
-        if part.property in after[part.object].type.angles:  # π and -π are the same place
-            residuals[key] = math.remainder(residuals[key], 2.0 * math.pi)
-        if not part.ok or not abs(residuals[key]) <= max(WRONG, precision * max(1.0, abs(came))):
+        off = residuals[key] = came - part.value
+        if column in angles:  # π and -π are the same place
+            off = residuals[key] = math.remainder(off, 2.0 * math.pi)
+        if not part.ok or not abs(off) <= max(WRONG, precision * max(1.0, abs(came))):
             wrong.append(key)
     return residuals, tuple(wrong)

@@ -19,7 +19,7 @@ from relgym.model.target.property_model import Verdict
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["derive", "predict", "predict_many"]
+__all__ = ["derive", "predict", "predict_many", "settled"]
 
 _PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED, _UNSURE = (
     OUTCOMES.index(o)
@@ -46,17 +46,17 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
                 one = replace(one, outcome=outcome, mode=0, spread=np.nan)
-            one = _settled(parts, target, percept, index, following, one)
+            one = settled(parts, target, percept, index, following, one)
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
-            found.append(replace(one, object=layout.names[index], property=target.property))
+            found.append(one)
     derive(parts.schema, layout, scene.vector[None], following[None])
     wrap(layout, following)
     return ScenePrediction(Scene(scene.schema, layout, following), tuple(found))
 
 
-def _settled(
+def settled(
     parts: Parts,
     target: Target,
     percept: Percept,
@@ -64,31 +64,51 @@ def _settled(
     following: NDArray[np.float64],
     one: Prediction,
 ) -> Prediction:
-    """A prediction with the value of who codes such ones best, and how right that will be."""
+    """A prediction with the value of who codes such ones best, how right that will be, and what it is of.
+
+    Parameters
+    ----------
+    parts, target, percept, index
+        The model, and of which object of which scene what is predicted.
+    following
+        Next values as far as they are predicted, the present one of this property, shape ``(width,)``.
+    one
+        What modes or laws say; its value is NaN where they say nothing.
+    """
     model = parts.models[target]
-    values = _experts_one(parts, target, percept, index, following, one.value)
-    winner = -one.mode if parts.governs(target) else one.mode
+    lawful = parts.governs(target)
+    values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
+    winner = -one.mode if lawful else one.mode
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
     told = model.assess(key, values)
-    if told.speaker == LATEST and one.mode:
-        one = replace(one, mode=model.latest, roles=one.roles[:1])
-    elif told.speaker >= len(EXPERTS):  # its word has nothing to do with modes
-        one = replace(one, mode=0, roles=(), margin=0.0)
-    spread = one.spread
+    mode, roles, spread = one.mode, one.roles, one.spread
+    if told.speaker == LATEST and mode:
+        mode, roles = model.latest, roles[:1]
+    margin = one.margin
+    if told.speaker >= len(EXPERTS):  # its word has nothing to do with modes
+        mode, roles, margin = 0, (), 0.0
     if told.speaker == GUESS:
         best = model.fallback.guess_at(percept, index, following)
         spread = spread if best is None else best.mode.sigma
     elif told.speaker != OWN:
-        spread = np.nan if told.speaker == PERSISTENCE else told.spread
-    return replace(
-        one,
-        value=values[told.speaker],
-        outcome=_outcome(one, told.speaker, claimed=model.claims(told), known=bool(model.calibration.trials)),
-        spread=spread,
-        probability=told.probability,
-        interval=told.interval,
-        audit=Audit(key, values, told.speaker),
+        spread = math.nan if told.speaker == PERSISTENCE else told.spread
+    outcome = _outcome(
+        one, told.speaker, claimed=model.claims(key, told), known=bool(model.calibration.trials)
+    )
+    return Prediction(
+        percept.layout.names[index],
+        target.property,
+        values[told.speaker],
+        outcome,
+        mode,
+        roles,
+        margin,
+        one.frame,
+        spread,
+        told.probability,
+        told.interval,
+        Audit(key, values, told.speaker),
     )
 
 
@@ -99,18 +119,19 @@ def _experts_one(
     index: int,
     following: NDArray[np.float64],
     own: float,
+    *,
+    lawful: bool,
 ) -> tuple[float, ...]:
     """`_experts` of a single scene."""
     model = parts.models[target]
     found = [math.nan] * model.calibration.experts
-    present = float(following[percept.layout.column(index, target.property)])
-    found[PERSISTENCE] = present
+    present = found[PERSISTENCE] = float(following[percept.layout.column(index, target.property)])
     if math.isfinite(own):
         found[OWN] = own
     if model.fallback.guesses_something:
         guessed = model.fallback.guessed(percept, index, following[None])
         found[GUESS] = math.nan if guessed is None else float(guessed[0])
-    if parts.governs(target):
+    if lawful:
         return tuple(found)
     latest = model.latest_values(percept, index, following[None])
     found[LATEST] = math.nan if latest is None else float(latest[0])
@@ -194,7 +215,8 @@ def predict_many(
             column = layout.column(index, target.property)
             values, probability, interval = _settled_many(parts, target, percept, index, following, verdict)
             following[:, column] = values
-            known &= verdict.outcomes == _PREDICTED
+            # What is claimed after all is known, though the answer is undecided.
+            known = verdict.outcomes == _PREDICTED
             probabilities.append(probability)
             intervals.append(interval)
             key = (target.type, target.property)
@@ -215,7 +237,7 @@ def _settled_many(
     following: NDArray[np.float64],
     verdict: Verdict,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """`_settled` of n scenes: values, probabilities and intervals, shape ``(n,)`` each; outcomes change in place."""
+    """`settled` of n scenes: values, probabilities and intervals, shape ``(n,)`` each; outcomes change in place."""
     model = parts.models[target]
     said = _experts(parts, target, percept, index, following, verdict.values)
     values, probability, interval = (np.full(len(said), np.nan) for _ in range(3))
@@ -231,9 +253,9 @@ def _settled_many(
             before = verdict.outcomes[some]
             if told.speaker >= len(EXPERTS):  # its word has nothing to do with modes
                 verdict.modes[some], verdict.margins[some] = 0, 0.0
-                before = np.where(model.claims(told), np.int8(_PREDICTED), before)
+                before = np.where(model.claims(key, told), np.int8(_PREDICTED), before)
                 verdict.outcomes[some] = before
-            if not model.claims(told):
+            if not model.claims(key, told):
                 verdict.outcomes[some[before == _PREDICTED]] = _UNSURE
             elif model.calibration.trials and key.winner:
                 verdict.outcomes[some[before == _UNEXPLAINED]] = _PREDICTED

@@ -8,6 +8,7 @@ try first. So it is tried beside everything else, and where it codes what comes 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -108,7 +109,7 @@ class Regression:
         """Columns for each of the regressions."""
         found = [z]
         if len(self._ridges) > 1:
-            first, second = np.triu_indices(z.shape[1])
+            first, second = _products(z.shape[1])
             found.append(np.concatenate([z, z[:, first] * z[:, second]], axis=1))
         return found
 
@@ -127,6 +128,21 @@ class Regression:
         slack = BEYOND * (most - least)
         clipped: NDArray[np.float64] = np.clip(found, least - slack, most + slack)
         return clipped
+
+    def sums(
+        self, signature: SlotSignature, target: str
+    ) -> (
+        tuple[list[int], list[float], list[float], tuple[tuple[float, ...], ...], tuple[float, float]] | None
+    ):
+        """What `values` works out for a target: columns of a row, their centres and scales, weights, bounds."""
+        if not self._ridges or (places := self._columns(signature)) is None:
+            return None
+        k = self.targets.index(target)
+        weights = tuple(tuple(r.weights[k].tolist()) for r in self._ridges if k < len(r.weights))
+        least, most = self._range[:, k].tolist()
+        slack = BEYOND * (most - least)
+        centre, scale = self._centre.tolist(), self._scale.tolist()
+        return places.tolist(), centre, scale, weights, (least - slack, most + slack)
 
     def _columns(self, signature: SlotSignature) -> NDArray[np.intp] | None:
         """Where the columns lie in a signature's rows; None where one is missing."""
@@ -174,6 +190,13 @@ class Regression:
             if f"gram{k}" in arrays:
                 parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
+
+
+@cache
+def _products(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs of columns, each with itself and with those behind it."""
+    first, second = np.triu_indices(columns)
+    return first, second
 
 
 def _core(signature: SlotSignature) -> list[int]:

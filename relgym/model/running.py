@@ -1,9 +1,10 @@
-"""Asking the compiled program of a model: one scene or many, as long as the model stays as it is.
+"""Asking the compiled program of a model: one scene or many, as long as the model says the same.
 
 The kernel is loaded, and compiled where no file holds it, once so much was asked that it pays (`Kernel`). A program
-is lowered (`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model changed that
-it pays, too: lowering costs as much as arrays take for a few scenes. Until then, and where there is no program for what
-was learned, arrays answer (`relgym.model.querying`); all give the same bits.
+is lowered (`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model said
+something else that it pays, too: lowering costs as much as arrays take for a few scenes. What most transitions change,
+votes, is written into the program that there is. Until then, and where there is no program for what was learned, arrays
+answer (`relgym.model.querying`); all give the same bits.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -18,17 +20,19 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.errors import SlowWarning
-from relgym.model.calibration import OWN, Audit, key_of, lead_bins
+from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
 from relgym.model.motion import TOUCHING
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.target.property_model import PropertyModel
+from relgym.model.querying import derive, settled
+from relgym.model.scenes import wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
+from relgym.model.trusting import trusting
 from relgym.program.records import Answer, BeyondError, Program
-from relgym.program.tape import encoded
+from relgym.program.tape import Tape, encoded
 from relgym.scene.objects import Scene, SceneLayout
 
 if TYPE_CHECKING:
@@ -37,7 +41,8 @@ if TYPE_CHECKING:
 __all__ = ["KERNEL", "Kernel", "Programs"]
 
 PATIENCE = 8
-"""Scenes that arrays answer after each change of the model before a program is lowered: that takes about as long."""
+"""Scenes that arrays answer after each change of what a model says before a program is lowered: that takes about as
+long."""
 
 ASKING, SCENE = 5e-4, 6e-6
 """What arrays take to answer, in seconds: each time, and for each scene."""
@@ -45,14 +50,14 @@ ASKING, SCENE = 5e-4, 6e-6
 LOADING, COMPILING = 0.5, 20.0
 """What it takes to load the kernel from the disk, and to compile it, in seconds."""
 
-_PREDICTED, _UNEXPLAINED, _DEPENDS, _UNSURE = (
-    OUTCOMES.index(o) for o in (Outcome.PREDICTED, Outcome.UNEXPLAINED, Outcome.DEPENDS, Outcome.UNSURE)
-)
+_PREDICTED, _DEPENDS = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.DEPENDS)
 _Bits = NDArray[np.int64]
 
 
 class Programs:
     """The programs of one model, by layout; holds only what can be worked out again.
+
+    A program stays as long as the model holds what it was lowered from (`relgym.model.grounds`), whatever is learned.
 
     Attributes
     ----------
@@ -62,18 +67,17 @@ class Programs:
 
     def __init__(self) -> None:
         self.changes = 0
-        self._known: dict[int, tuple[SceneLayout, Parts, Runner | None]] = {}
+        self._grounds: Grounds | None = None
+        self._known: dict[int, _Known] = {}
         self._asked = 0
+        self._looked = 0  # at the grounds, after so many changes
 
     def __reduce__(self) -> tuple[type[Programs], tuple[()]]:
         return Programs, ()
 
     def changed(self) -> None:
-        """The model isn't what it was: programs are out of date."""
+        """The model isn't what it was: programs may be out of date."""
         self.changes += 1
-        self._asked = 0
-        if self._known:
-            self._known.clear()
 
     def of(self, parts: Parts, layout: SceneLayout, scenes: int) -> Runner | None:
         """What runs the program for a layout; None: arrays answer.
@@ -87,19 +91,43 @@ class Programs:
         scenes
             How many are asked.
         """
+        if (kernel := KERNEL.after(scenes)) is None:
+            return None
+        if self._grounds is None or self._looked != self.changes:
+            self._look(parts)
         known = self._known.get(id(layout))
-        if known is not None and known[0] is layout and known[1] is parts:
-            return known[2]
+        if known is not None and known.layout is layout and known.parts is parts:
+            if known.changes != self.changes and known.runner is not None:
+                known.runner.follow()
+            known.changes = self.changes
+            return known.runner
         self._asked += scenes
-        if (kernel := KERNEL.after(scenes)) is None or self._asked < PATIENCE:
+        if self._asked < PATIENCE:
             return None
         runner: Runner | None
         try:
             runner = Runner(parts, layout, lowered(parts, layout), kernel)
         except BeyondError:
             runner = None
-        self._known[id(layout)] = (layout, parts, runner)
+        self._known[id(layout)] = _Known(layout, parts, runner, self.changes)
         return runner
+
+    def _look(self, parts: Parts) -> None:
+        """Drop all programs if they were lowered from something else than the model now holds."""
+        grounds, self._looked = Grounds.of(parts), self.changes
+        if self._grounds is None or not self._grounds.same(grounds):
+            self._grounds, self._asked = grounds, 0
+            self._known.clear()
+
+
+@dataclass(slots=True)
+class _Known:
+    """What runs the program for a layout, None where there is none, and after how many changes it was up to date."""
+
+    layout: SceneLayout
+    parts: Parts
+    runner: Runner | None
+    changes: int
 
 
 class Kernel:
@@ -161,6 +189,7 @@ class _Told(NamedTuple):
     outcomes: NDArray[np.int8]
     modes: _Bits
     margins: NDArray[np.float64]
+    sure: NDArray[np.float64]
     players: _Bits
     noted: _Bits
 
@@ -172,16 +201,13 @@ class Runner:
     ----------
     parts, layout, program, kernel
         The model, the layout, the program for it, and the module that runs it.
-
-    Raises
-    ------
-    BeyondError
-        Others than modes and laws may give values, as far as anybody looked back: arrays know them.
     """
 
     def __init__(self, parts: Parts, layout: SceneLayout, program: Program, kernel: ModuleType) -> None:
-        self._layout = layout
+        self._parts, self._layout = parts, layout
         self.program = program
+        self._settling: bool | None = None
+        self._settled = False  # whether that is what is known now
         tape = encoded(program)
         self._run = kernel.run
         self._roles, self._space = tape.roles, tape.space()
@@ -193,28 +219,44 @@ class Runner:
         self._frames = tuple(frame if a.component >= 0 else "world" for a in program.answers)
         self._tellers = tuple(_Teller(parts, layout, a, frame) for a in program.answers)
         self._needed = frozenset(key for a in program.answers for key in a.needs)
-        if not all(t.plain or not t.model.calibration.trials for t in self._tellers):
-            raise BeyondError("values that guesses, regressions or former modes may give")
-        self._plain = all(t.plain for t in self._tellers)
+        self._voted = tuple(t.model for t in self._tellers if t.answer.vote is not None)
+        self._votes: list[list[tuple[int, int]] | None] = []
+        self._lay(tape)
+
+    def _lay(self, tape: Tape) -> None:
+        """Take note of where votes stand in the tape that is run, and write those that hold now."""
+        self._places = tape.votes
+        self._votes = [None for places, _ in tape.votes for _ in places]
+        self.follow()
+
+    def follow(self) -> None:
+        """Write the votes that hold now into the program; all else that it says is as it was.
+
+        How right its predictions are is written anew when somebody asks for many.
+        """
+        self._settled = False
+        code, k, moved = self._space["code"][0], 0, False
+        for model, (places, by_tie) in zip(self._voted, self._places, strict=True):
+            voting = model.classifier._voting
+            for place, votes in zip(places, voting._votes, strict=True):
+                if votes is not self._votes[k]:  # they are counted into a list of their own
+                    self._votes[k], moved = votes, True
+                    code[place : place + 2 * len(votes)] = [v for pair in votes for v in pair]
+                k += 1
+            first = voting._by_tie(model.classifier.counts)
+            code[by_tie : by_tie + len(first)] = first
+        if moved:
+            self._space["memory_keys"] = 0  # answers that are remembered were voted for as it was before
 
     def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """Predict what follows n scenes; None: arrays must, or can say why not."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            total = float(vectors.sum())
-        if (
-            not math.isfinite(total) and not np.isfinite(vectors).all()
-        ):  # finite numbers may add up to infinity
+        if (settling := self._settles()) is None:
             return None
-        calibrated = any(t.model.calibration.trials for t in self._tellers)
-        told = self._told(vectors, len(vectors) if calibrated else 1)
+        told = self._told(vectors, settling=settling, told=0)
         if told is None:
             return None
-        probabilities = intervals = np.full(told.margins.shape, np.nan)
-        if calibrated:
-            probabilities, intervals = probabilities.copy(), intervals.copy()
-            for k in range(len(self._tellers)):
-                if not self._calibrate(k, told, probabilities, intervals):
-                    return None
+        if not settling:
+            told = told._replace(sure=np.full((2, *told.margins.shape), np.nan))
         return BatchPrediction(
             self._layout,
             told.following,
@@ -223,69 +265,75 @@ class Runner:
             told.outcomes,
             told.margins,
             self._frames,
-            probabilities,
-            intervals,
+            *told.sure,
         )
 
-    def _calibrate(
-        self, k: int, told: _Told, probabilities: NDArray[np.float64], intervals: NDArray[np.float64]
-    ) -> bool:
-        """How right an answer's predictions are, in place; False where that changes what others rest on."""
-        teller, outcomes, modes = self._tellers[k], told.outcomes[:, k], told.modes[:, k]
-        a, model = teller.answer, teller.model
-        if a.component >= 0 and (outcomes == _DEPENDS).any():
-            return False  # whether laws had a value isn't told
-        own = outcomes == _PREDICTED if a.component >= 0 else told.noted[:, k] > 0
-        kinds = np.where(modes != 0, np.int8(_PREDICTED), outcomes)
-        for rows in _alike(kinds, modes, told.margins[:, k], own):
-            row, trusted = rows[0], bool(model.calibration.trials)
-            winner = int(-modes[row] if a.component >= 0 else modes[row])
-            key = key_of(int(kinds[row]), winner, float(told.margins[row, k]))
-            value = 0.0 if own[row] else math.nan  # who has a value counts, not which
-            said = model.assess(key, (value, math.nan, math.nan, math.nan, math.nan, 0.0))
-            if said.speaker != OWN and own[row]:
-                return False
-            probabilities[rows, k], intervals[rows, k] = said.probability, said.interval
-            claimed, before = model.claims(said), outcomes[rows]
-            if claimed and not (trusted and winner):
-                continue
-            changed = before == (_UNEXPLAINED if claimed else _PREDICTED)
-            if changed.any() and a.key in self._needed:
-                return False
-            outcomes[rows[changed]] = _PREDICTED if claimed else _UNSURE
-        return True
+    def _settles(self) -> bool | None:
+        """Whether it is known how right predictions were; then the kernel is told. None: it has no words for that."""
+        if self._settled:
+            return self._settling
+        self._settling = any(t.model.calibration.trials for t in self._tellers)
+        if self._settling:
+            try:
+                tape = encoded(trusting(self._parts, self._layout, self.program))
+                tape.lay(self._space)
+                self._lay(tape)
+            except BeyondError:
+                self._settling = None
+        self._settled = True
+        return self._settling
 
-    def one(self, scene: Scene) -> ScenePrediction | None:
-        """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not."""
-        if not self._plain:
-            return None
+    def one(self, scene: Scene, percept: Percept | None = None) -> ScenePrediction | None:
+        """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not.
+
+        What the program says is what arrays would have said of modes and laws; whose value counts is settled as there
+        (`relgym.model.querying.settled`). A percept of the scene may be given, for what isn't asked of the program.
+        """
         now = scene.vector
-        told = self._told(now[None], 1)
+        if percept is None:
+            percept = self._parts.perception.percept(self._layout, now[None])
+        told = self._told(now[None], settling=False, told=1)
         if told is None:
             return None
         after, players = told.following[0], told.players[0]
         outcomes, modes = told.outcomes[0].tolist(), told.modes[0].tolist()
         margins, noted = told.margins[0].tolist(), told.noted[0].tolist()
+        following, own = now.copy(), True
         found: list[Prediction] = []
         for k, teller in enumerate(self._tellers):
-            one = teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
-            if one is None or (one.ok != (outcomes[k] == _PREDICTED) and teller.answer.key in self._needed):
+            a = teller.answer
+            raw = teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
+            if raw is None:
+                return None
+            one = settled(self._parts, teller.target, percept, teller.index, following, raw)
+            following[a.column] = one.value
+            if one.value != after[a.column]:
+                own = False
+                if a.key in self._needed:
+                    return None
+            if one.ok != (outcomes[k] == _PREDICTED) and a.key in self._needed:
                 return None
             found.append(one)
-        return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
+        if own:
+            following = after
+        else:
+            derive(scene.schema, self._layout, now[None], following[None])
+            wrap(self._layout, following)
+        return ScenePrediction(Scene(scene.schema, self._layout, following), tuple(found))
 
-    def _told(self, vectors: NDArray[np.float64], told: int) -> _Told | None:
+    def _told(self, vectors: NDArray[np.float64], *, settling: bool, told: int) -> _Told | None:
         """Run the program. What it writes to is new each time: another thread may ask before this one has read it."""
         n, count = len(vectors), len(self._keys)
         found = _Told(
-            vectors.copy(),
+            np.empty(vectors.shape),
             np.empty((n, count), dtype=np.int8),
             np.empty((n, count), dtype=np.int64),
             np.empty((n, count)),
+            np.empty((2, n if settling else 0, count)),
             np.empty((told, count, self._roles), dtype=np.int64),
             np.zeros((told, count), dtype=np.int64),
         )
-        return None if self._run(self._space, vectors, *found) else found
+        return None if self._run(self._space, vectors, settling, *found) else found
 
 
 class _Teller:
@@ -295,23 +343,27 @@ class _Teller:
     ----------
     answer, model
         The answer, and the model of its target.
-    plain
-        Whether none but modes, laws, and that nothing changes have values for it (`relgym.model.calibration`).
+    target, index
+        Which property of which object it is of.
     """
 
-    __slots__ = ("_body_names", "_frame", "_modes", "_spreads", "answer", "model", "plain")
+    __slots__ = (
+        *("_body_names", "_frame", "_modes", "_spreads", "_turns"),
+        *("answer", "index", "model", "target"),
+    )
 
     def __init__(self, parts: Parts, layout: SceneLayout, answer: Answer, frame: str) -> None:
         self.answer, self._frame = answer, frame
         self._body_names = tuple(layout.names[i] for i in layout.bodies)
         self._modes = {mode.id: mode for mode in answer.modes}
-        index = layout.index(answer.object)
+        index = self.index = layout.index(answer.object)
         model = self.model = parts.property_model(layout.types[index].name, answer.property)
+        self.target = model.target
+        self._turns = answer.property in layout.types[index].angles
         situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)
         signature = situation.signature
         gather = parts.perception.gather(layout, signature, tuple(situation.plain.tolist())).tolist()
         self._spreads = _spreads(model.spreads, signature, gather) if answer.modes else {}
-        self.plain = _plain(model, governed=answer.component >= 0)
 
     def tell(
         self,
@@ -323,49 +375,28 @@ class _Teller:
         noted: int,
         players: _Bits,
     ) -> Prediction | None:
-        """The prediction of a scene; `noted` is the mode that gave the value, or of laws whom the body touches.
+        """What modes or laws say of a scene; `noted` is the mode that gave the value, or of laws whom the body touches.
 
-        None where it isn't the winner who gives the value, though it has one, or whether it has one isn't told.
+        None where whether they have a value isn't told, or what it was before a turn was taken off.
         """
         a = self.answer
         lawful = a.component >= 0
         if lawful and outcome == _DEPENDS:
             return None
-        own = outcome == _PREDICTED if lawful else noted > 0
-        value, present = float(after[a.column]), float(now[a.column])
+        value = math.nan
+        if outcome == _PREDICTED if lawful else noted > 0:
+            value = float(after[a.column])
+            if self._turns and abs(value - now[a.column]) > math.pi:
+                return None
         roles: tuple[str, ...] = ()
         spread = math.nan
         if lawful and mode:
             roles = (a.object, *(name for k, name in enumerate(self._body_names) if noted >> k & 1))
-        elif own and not lawful:
+        elif noted > 0 and not lawful:
             spread = self._spreads[noted](now) if noted in self._spreads else math.nan
             roles = self._roles(mode, players) if mode else ()
-        nothing = math.nan
-        values = (value if own else nothing, nothing, nothing, nothing, nothing, present)
-        key = key_of(_PREDICTED if mode else outcome, -mode if lawful else mode, margin)
-        said = self.model.assess(key, values)
-        if own and said.speaker != OWN:
-            return None
-        claimed = self.model.claims(said)
-        if outcome == _PREDICTED and not claimed:
-            outcome = _UNSURE
-        elif outcome == _UNEXPLAINED and mode and claimed and self.model.calibration.trials:
-            outcome = _PREDICTED
         frame = self._frame if lawful and mode == TOUCHING else "world"
-        return Prediction(
-            a.object,
-            a.property,
-            value,
-            OUTCOMES[outcome],
-            mode,
-            roles,
-            margin,
-            frame,
-            spread if own else nothing,
-            said.probability,
-            said.interval,
-            Audit(key, values, said.speaker),
-        )
+        return Prediction("", "", value, OUTCOMES[outcome], mode, roles, margin, frame, spread)
 
     def _roles(self, mode: int, players: _Bits) -> tuple[str, ...]:
         known = self._modes.get(mode)
@@ -377,26 +408,6 @@ class _Teller:
         for role in known.roles:
             names[role.number + 1] = self._body_names[int(players[role.number])]
         return tuple(name for name in names if name is not None)
-
-
-def _alike(
-    kinds: NDArray[np.int8], modes: _Bits, margins: NDArray[np.float64], own: NDArray[np.bool_]
-) -> list[NDArray[np.intp]]:
-    """Rows whose predictions are of one kind: of one outcome, mode and lead, with or without a value."""
-    codes = ((modes * 8 + lead_bins(margins)) * 16 + kinds) * 2 + own
-    order = np.argsort(codes, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(codes[order])) + 1) if len(order) else []
-
-
-def _plain(model: PropertyModel, *, governed: bool) -> bool:
-    """Whether none but a target's modes or laws, and that nothing changes, have values for it."""
-    if model.fallback.guesses_something or model.candidates:
-        return False
-    if governed:
-        return True
-    former = model.latest in model.clusterer.clusters and not model.bounds(model.latest)
-    doubted = model.record.doubts(_PREDICTED, model.config.claim_probability)
-    return not model.rough and not (former and doubted and len(model.classifier.modes) > 1)
 
 
 def _spreads(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,23 @@ from relgym.errors import ObservationError
 from relgym.scene.objects import ACTION, Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["angle_columns", "mismatch", "next_values", "stays", "unwrapped", "with_action", "wrap"]
+__all__ = [
+    "Passage",
+    "angle_columns",
+    "mismatch",
+    "next_values",
+    "passage",
+    "stays",
+    "unwrapped",
+    "with_action",
+    "wrap",
+]
 
 TURN = 2.0 * math.pi
 """A full turn, in radians."""
+
+MOST_PASSAGES = 256
+"""Of so many other layouts is known what a layout has in common with them."""
 
 
 @refusing(ObservationError)
@@ -31,10 +45,50 @@ def with_action(scene: Scene, values: Sequence[float] | NDArray[np.float64]) -> 
     return Scene(scene.schema, layout, vector)
 
 
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """Which objects of one layout are in another one, of the same name and type, and where their numbers lie.
+
+    Attributes
+    ----------
+    later
+        The other layout.
+    stays
+        Of each object, whether it is.
+    columns, sources
+        Columns of those that are, and the same numbers' columns in the other layout, shape ``(m,)``.
+    """
+
+    later: SceneLayout
+    stays: tuple[bool, ...]
+    columns: NDArray[np.intp]
+    sources: NDArray[np.intp]
+
+
+def passage(before: SceneLayout, after: SceneLayout) -> Passage:
+    """What becomes of the objects of a layout in another one; cached on the first."""
+    known: dict[int, Passage] = before.__dict__.setdefault("_passages", {})
+    found = known.get(id(after))
+    if found is None or found.later is not after:  # kept alive, so that its id stays its own
+        there = {name: i for i, name in enumerate(after.names)}
+        both = [(i, there.get(name, -1)) for i, name in enumerate(before.names)]
+        stay = tuple(k >= 0 and after.types[k] == before.types[i] for i, k in both)
+        columns, sources = list[int](), list[int]()
+        for (i, k), stays in zip(both, stay, strict=True):
+            if stays:
+                columns += range(before.width)[before.slice(i)]
+                sources += range(after.width)[after.slice(k)]
+        if len(known) >= MOST_PASSAGES:
+            known.clear()
+        found = known[id(after)] = Passage(
+            after, stay, np.array(columns, dtype=np.intp), np.array(sources, dtype=np.intp)
+        )
+    return found
+
+
 def stays(before: Scene, after: Scene, index: int) -> bool:
     """Whether an object of the first scene is in the second one: of the same name, and of the same type."""
-    name = before.layout.names[index]
-    return name in after and after.layout.types[after.layout.index(name)] == before.layout.types[index]
+    return passage(before.layout, after.layout).stays[index]
 
 
 def mismatch(schema: SceneSchema, known: SceneSchema) -> str:
@@ -87,8 +141,6 @@ def next_values(before: Scene, after: Scene) -> NDArray[np.float64]:
     """The next values in the layout of the scene before; objects that vanished keep theirs."""
     if after.layout is before.layout:
         return after.vector
-    following = before.vector.copy()
-    for i, name in enumerate(before.layout.names):
-        if name in after and after[name].type == before.layout.types[i]:
-            following[before.layout.slice(i)] = after[name].values
+    following, way = before.vector.copy(), passage(before.layout, after.layout)
+    following[way.columns] = after.vector[way.sources]
     return following

@@ -87,14 +87,16 @@ class Screen:
         else:
             self._suspect(places, np.where(np.abs(before) < np.abs(after), after, before), sizes > limits)
             limits = self._limit()[places]
+        within = bool((sizes <= limits).all())
         for vector in (before, after):
-            fine = np.abs(vector) <= limits
-            self._note(places[fine], np.abs(vector[fine]))
-        young = np.unique(places[self._scenes[places] < START])
-        if len(young):
-            self._scenes[young] += 1
+            magnitudes = np.abs(vector)
+            fine = slice(None) if within else magnitudes <= limits
+            self._note(places[fine], magnitudes[fine])
+        young = self._scenes[places] < START
+        if young.any():
+            self._scenes[np.unique(places[young])] += 1
             self._limits = None
-        if (sizes <= limits).all():
+        if within:
             return True
         self.set_aside += 1
         return False
@@ -138,6 +140,8 @@ class Screen:
     def _note(self, places: NDArray[np.intp], sizes: NDArray[np.float64]) -> None:
         """Take up magnitudes, several of one property or one."""
         news = sizes > self._largest[places, 0]
+        if not news.any():
+            return
         for place, size in zip(places[news].tolist(), sizes[news].tolist(), strict=True):
             row = self._largest[place]
             if size > row[0]:

@@ -52,6 +52,7 @@ from relgym.model.target.hindsight import (
     restore_hindsight,
 )
 from relgym.model.target.property_model import PropertyModel
+from relgym.model.trusting import trusting
 from relgym.program.records import BeyondError
 from relgym.program.source import python_source
 from relgym.reporting.naming import named_text
@@ -553,7 +554,7 @@ class WorldModel:
         if not parts.admits(scene) or large(scene.layout):
             return None
         runner = self._programs.of(parts, scene.layout, 1)
-        return None if runner is None else runner.one(scene)
+        return None if runner is None else runner.one(scene, self._perceive(scene))
 
     def _run_many(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """The same of n scenes; None too for what isn't an array of such."""
@@ -683,8 +684,8 @@ class WorldModel:
         """The model as the text of a Python module that needs numpy alone, for scenes with certain objects.
 
         Its ``step(vector)`` predicts one scene, ``predict(vectors)`` many: next state vectors, outcomes (by the order
-        of `Outcome`), modes and margins, as `predict_batch` does. Every mode, law and choice between two modes is a
-        function of its own.
+        of `Outcome`), modes, margins, probabilities and intervals, as `predict_batch` does. Every mode, law, choice
+        between two modes and description of a role is a function of its own.
 
         Parameters
         ----------
@@ -694,12 +695,12 @@ class WorldModel:
         Raises
         ------
         ConfigError
-            The model holds what isn't written as Python: roles that several objects could play, bodies in space,
-            functions that a user registered.
+            There is no program for the model: it has laws of motion in space, bodies there that are turned, functions
+            that a user registered, or roles that several objects without a body could play.
         """
         layout = self.schema.layout() if layout is None else layout
         try:
-            program = lowered(self._parts, layout)
+            program = trusting(self._parts, layout, lowered(self._parts, layout))
             sentences = tuple(outcome.value for outcome in Outcome)
             return python_source(program, self.describe() if self.has_rules else repr(self), sentences)
         except BeyondError as beyond:

@@ -28,7 +28,6 @@ from relgym.program.tape import (
     AT_MOVERS,
     AT_NEXTS,
     AT_PAIRS,
-    AT_READS,
     BODIES,
     BODY,
     DIMENSIONS,
@@ -46,7 +45,6 @@ from relgym.program.tape import (
     PART,
     PARTING,
     PRECISION,
-    READS,
     RELATIONS,
     REMEMBERED,
     REMEMBERED_MODES,
@@ -87,7 +85,7 @@ def is_compiled() -> bool:
     return any(file.stat().st_mtime >= written for file in Path(folder).glob("kernel.run-*.nbi"))
 
 
-PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS = range(6)
+PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
 """Outcomes, in the order of `relgym.model.prediction.OUTCOMES`."""
 
 BAD_SIZE = 1
@@ -98,6 +96,12 @@ TOO_MANY = 2
 
 TURNED = 3
 """A box in space is turned: that takes arrays."""
+
+NOT_FINITE = 4
+"""A number is NaN or infinite: arrays say so."""
+
+OWN, GUESS, LATEST = 0, 1, 4
+"""Who gives a value (`relgym.program.records.EXPERTS`); what nobody does stays as it is."""
 
 FREE, TOUCHING = 1, 2
 VOTE_UNIT = 4294967296.0
@@ -111,7 +115,7 @@ TURN_AROUND = 2.0 * math.pi
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 MIX_A, MIX_B = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 S30, S27, S31, ONE64, ZERO64 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(1), np.uint64(0)
-BX, LOW_X, HIGH_X, SIZE, SPEED = 0, 3, 6, 9, 10
+BX, LOW_X, HIGH_X, SIZE, SPEED, WHOLE = 0, 3, 6, 9, 10, 11
 BY, LOW_Y, HIGH_Y = 1, 4, 7
 (SHAPE, CORNERS, OUTLINE, COL_X, COL_Y, COL_Z, COL_SX, COL_SY, COL_SZ, COL_ANGLE, COL_VX, COL_VY, COL_VZ) = (
     range(13)
@@ -692,7 +696,7 @@ def move(s):
                 flags[0, k] = flags[1, k] = 0
         return count
     law = s.code[s.code[AT_LAWS]]
-    settled = compose(s, law, count, bodies, spins, 2)
+    settled = compose(s, law, count, bodies, spins, np.int64(2))
     lawful, point = True, s.code[law] == 1
     for k in range(count):
         c, pair = s.contact[k], s.pair[k, 0]
@@ -717,7 +721,7 @@ def move(s):
         flags[3, k] = 1 if stated else 0
         flags[0, k] = 1 if stated and flags[0, k] else 0
     for other in range(1, s.code[LAWS]):
-        compose(s, s.code[s.code[AT_LAWS] + other], count, bodies, spins, 3)
+        compose(s, s.code[s.code[AT_LAWS] + other], count, bodies, spins, np.int64(3))
         for k in range(bodies):
             if flags[2, k]:
                 for d in range(governed):
@@ -843,11 +847,10 @@ def closing(s, a, b):
 
 
 @compiled
-def side(s, a, b):
-    """How body a lies to b: bits of the kinds of relations between their bounding boxes; touching aside."""
-    one, kinds = np.int64(1), np.int64(0)
-    mine = theirs = 0.0
-    over = True
+def sides(s, a, b):
+    """How body a lies to b, and b to a: bits of the kinds of relations between bounding boxes; touching aside."""
+    one, there, back, beside = np.int64(1), np.int64(0), np.int64(0), np.int64(0)
+    over, under = True, True
     for d in range(s.code[DIMENSIONS]):
         low_a, high_a = s.body[a, LOW_X + d], s.body[a, HIGH_X + d]
         low_b, high_b = s.body[b, LOW_X + d], s.body[b, HIGH_X + d]
@@ -856,22 +859,29 @@ def side(s, a, b):
         margin = -(ALIGN_MARGIN * min(wide_a, wide_b))
         less, greater = (low_b - high_a) - offset >= margin, (low_a - high_b) + offset >= margin
         if less:
-            kinds |= one << (5 + d)
+            there |= one << (5 + d)
+            back |= one << (8 + d)
         if greater:
-            kinds |= one << (8 + d)
+            there |= one << (8 + d)
+            back |= one << (5 + d)
         if not (less or greater):
-            kinds |= one << (11 + d)
-        mine, theirs = mine + wide_a * wide_a, theirs + wide_b * wide_b
+            beside |= one << (11 + d)
         if d == s.code[UP]:
-            over = over and greater
-        else:
-            top, bottom = min(high_a + offset, high_b), max(low_a + offset, low_b)
-            over = over and top - bottom >= MIN_OVERLAP * wide_a
+            over, under = over and greater, under and less
+        elif over or under:
+            shared = min(high_a + offset, high_b) - max(low_a + offset, low_b)
+            over = over and shared >= MIN_OVERLAP * wide_a
+            shared = min(high_b - offset, high_a) - max(low_b - offset, low_a)
+            under = under and shared >= MIN_OVERLAP * wide_b
     if over:
-        kinds |= one << 3
-    if SIZE_RATIO * math.sqrt(mine) < math.sqrt(theirs):
-        kinds |= one << 4
-    return kinds
+        there |= one << 3
+    if under:
+        back |= one << 3
+    if SIZE_RATIO * s.body[a, WHOLE] < s.body[b, WHOLE]:
+        there |= one << 4
+    if SIZE_RATIO * s.body[b, WHOLE] < s.body[a, WHOLE]:
+        back |= one << 4
+    return there | beside, back | beside
 
 
 @compiled
@@ -887,41 +897,68 @@ def fastest(s, a, b):
 
 @compiled
 def relate(s, among):
-    """Work out all relations that are asked for between some objects."""
+    """Work out all relations that are asked for between some objects: bits of kinds, and a number for all of them."""
     if among & ~s.masks[4] == 0:
         return
     among |= s.masks[4]
-    s.masks[4] = among
+    s.masks[4], s.masks[6] = among, 0
     one, at, bodies = np.int64(1), s.code[AT_BODIES] + BODY * s.code[BODIES], s.code[BODIES]
     asked, state = np.int64(0), mixed(np.uint64(among))
     for r in range(s.code[RELATIONS]):
         if s.code[at + r] >= 0:
             asked |= one << s.code[at + r]
-            for k in range(bodies):
-                s.rows[r, k] = s.columns[r, k] = 0
+    if asked & (one << 4):
+        for k in range(bodies):
+            whole = 0.0
+            for d in range(s.code[DIMENSIONS]):
+                wide = s.body[k, HIGH_X + d] - s.body[k, LOW_X + d]
+                whole += wide * wide
+            s.body[k, WHOLE] = math.sqrt(whole)
     for a in range(bodies):
         if not among & (one << a):
             continue
-        for b in range(bodies):
-            if b == a or not among & (one << b):
+        for b in range(a + 1, bodies):
+            if not among & (one << b):
                 continue
-            kinds = side(s, a, b) if asked & ~7 else np.int64(0)
+            there = back = np.int64(0)
+            if asked & ~7:
+                there, back = sides(s, a, b)
             if touch(s, a, b):
-                kinds |= 4
+                there, back = there | 4, back | 4
                 if asked & 3 and closing(s, a, b) < math.inf:
-                    kinds |= 1
-                    if asked & 2 and fastest(s, a, b):
-                        kinds |= 2
+                    there, back = there | 1, back | 1
+                    if asked & 2:
+                        there |= 2 if fastest(s, a, b) else 0
+                        back |= 2 if fastest(s, b, a) else 0
             else:
-                kinds &= ~(one << 3)
-            kinds &= asked
-            state = (state ^ np.uint64(kinds + 1)) * MIX_A
+                there, back = there & ~(one << 3), back & ~(one << 3)
+            there, back = there & asked, back & asked
+            s.kinds[a, b], s.kinds[b, a] = there, back
+            state = (state ^ np.uint64((there << 16) + back + 1)) * MIX_A
             state ^= state >> S27
-            for r in range(s.code[RELATIONS]):
-                if s.code[at + r] >= 0 and kinds & (one << s.code[at + r]):
-                    s.rows[r, a] |= one << b
-                    s.columns[r, b] |= one << a
     s.state[0] = state
+
+
+@compiled
+def unfold(s):
+    """Write relations out: for each of them, and for each object, to whom it stands in it, and who does to it."""
+    if s.masks[6]:
+        return
+    s.masks[6] = 1
+    one, among, bodies = np.int64(1), s.masks[4], s.code[BODIES]
+    at = s.code[AT_BODIES] + BODY * bodies
+    for r in range(s.code[RELATIONS]):
+        kind = s.code[at + r]
+        if kind < 0:
+            continue
+        for k in range(bodies):
+            s.rows[r, k] = s.columns[r, k] = 0
+        for a in range(bodies):
+            if among & (one << a):
+                for b in range(bodies):
+                    if b != a and among & (one << b) and s.kinds[a, b] >> kind & 1:
+                        s.rows[r, a] |= one << b
+                        s.columns[r, b] |= one << a
 
 
 # ---------------------------------------------------------------------------------------------- clauses
@@ -1155,6 +1192,7 @@ def situation(s, used, target):
 @compiled
 def seen_before(s, experience, target):
     """Whether the situation was seen in training."""
+    unfold(s)
     number = ZERO64
     for k in range(s.code[experience]):
         number = mixed(number + situation(s, s.code[experience + 3 + k], target))
@@ -1174,6 +1212,7 @@ def seen_before(s, experience, target):
 @compiled
 def rank(s, vote, count, target):
     """Put the modes in order, `s.order[0]`, the winner first; its lead in the last count."""
+    unfold(s)
     lead, totals, alive, order = s.votes, s.order[1], s.order[2], s.order[0]
     for i in range(count):
         for j in range(count):
@@ -1329,7 +1368,7 @@ def assign(s, casting, t):
             score = s.numbers[s.code[record + 1] + s.code[record + 3]]
             for k in range(s.code[record + 3]):
                 s.value[0], s.value[1] = t, each
-                if solve(s, s.code[record + 5 + k], everyone, False):
+                if solve(s, s.code[record + 5 + k], everyone, roles < 0):  # a variable: else compiled twice
                     score = s.numbers[s.code[record + 1] + k]
                     break
             if score != score:
@@ -1520,6 +1559,7 @@ def players_of(s, a, mode, number, slot, tied):
         for k in range(roles):
             s.cast[0, k] = record[at + 1 + k]
         return record[at] == 1, tied
+    unfold(s)
     if tied < 0:
         tied = 1 if line_up(s, s.code[a + 2]) else 0
     done = assign(s, casting, s.code[a + 2])
@@ -1567,7 +1607,7 @@ def by_modes(s, a, answer):
         else:
             # What has no body stands alone: object 0 of one, in no relation to anything.
             s.masks[0] = s.masks[1] = s.masks[2] = 1
-            s.masks[3], s.masks[4] = -1, 0
+            s.masks[3], s.masks[4], s.masks[6] = -1, 0, 1
             s.told[0, :] = math.nan
             s.rows[:, 0] = 0
             s.columns[:, 0] = 0
@@ -1639,14 +1679,77 @@ def guessed(s, a):
 
 
 @compiled
-def step(s):
+def lead_of(margin):
+    """The bin of a lead (`relgym.model.calibration.key_of`)."""
+    if not margin > 0.0:
+        return 0
+    if margin == math.inf:
+        return 7
+    return min(max(math.frexp(margin)[1] + 2, 1), 6)
+
+
+@compiled
+def find(s, at, count, wanted):
+    """The place of a number among ascending ones; -1: it isn't there."""
+    low, high = np.int64(0), count
+    while low < high:
+        middle = (low + high) // 2
+        if s.code[at + middle] < wanted:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < count and s.code[at + low] == wanted else np.int64(-1)
+
+
+@compiled
+def settled(s, a, k, value, outcome, mode, margin):
+    """Value, outcome and mode, once it is known how right such predictions were (`relgym.model.querying`)."""
+    trust = s.code[a + 25]
+    winner = -mode if s.code[trust + 4] else mode
+    kind = np.int64(PREDICTED if mode else outcome)
+    guess = latest = math.nan
+    able = np.int64(1 if math.isfinite(value) else 0)
+    if s.code[a + 16] or s.code[a + 17]:
+        guess = guessed(s, a)
+        able |= 2 if math.isfinite(guess) else 0
+    if s.code[trust + 6]:
+        latest = total(s, s.code[trust + 6])
+        able |= 16 if math.isfinite(latest) else 0
+    number = ((winner * 16 + lead_of(margin) + 2) * 8 + kind) * 32 + able
+    if s.believed[k, 0] != number:
+        place = find(s, s.code[trust + 1], s.code[trust], number)
+        if place < 0:  # all of the winner
+            place = find(s, s.code[trust + 1], s.code[trust], ((winner * 16 + 1) * 8 + kind) * 32 + able)
+        if place < 0:  # all that modes, or laws, or neither say
+            who = np.int64(winner > 0) - np.int64(winner < 0)
+            place = find(s, s.code[trust + 1], s.code[trust], (who * 128 + kind) * 32 + able)
+        s.believed[k, 0], s.believed[k, 1] = number, place
+    place = s.believed[k, 1]
+    said, sure = s.code[trust + 2] + 2 * place, s.code[trust + 3] + 2 * place
+    speaker, claimed = s.code[said], s.code[said + 1]
+    s.sure[k, 0], s.sure[k, 1] = s.numbers[sure], s.numbers[sure + 1]
+    if not claimed:
+        outcome = UNSURE if outcome == PREDICTED else outcome
+    elif outcome == UNEXPLAINED and winner:
+        outcome = PREDICTED
+    if speaker == OWN:
+        return value, outcome, mode
+    if speaker == GUESS:
+        return guess, outcome, mode
+    if speaker == LATEST:
+        return latest, outcome, s.code[trust + 5] if winner else mode
+    return math.nan, outcome, mode
+
+
+@compiled
+def step(s, settling, telling):
     """One step of the scene whose present values stand in `s.x`; 0, or why not."""
     x, width = s.x, s.code[WIDTH]
     if s.code[BODIES]:
         bad = look(s)
         if bad:
             return bad
-        s.masks[3], s.masks[4] = -1, 0
+        s.masks[3], s.masks[4], s.masks[6] = -1, 0, 0
         if s.code[MOVERS] and move(s) < 0:
             return TOO_MANY
     for k in range(s.code[KEYS]):
@@ -1664,7 +1767,8 @@ def step(s):
                 mode = np.int64(TOUCHING if s.body_flags[2, body] else FREE)
             else:
                 value, outcome, mode, margin = math.nan, OUTSIDE, np.int64(0), 0.0
-            s.touched[k] = hits(s, body)
+            if telling:
+                s.touched[k] = hits(s, body)
         else:
             value, outcome, mode, margin = by_modes(s, a, k)
             s.touched[k] = mode
@@ -1673,20 +1777,23 @@ def step(s):
             if s.lost[s.code[needs + 1 + j]]:
                 outcome, margin = DEPENDS, 0.0
         told = math.isfinite(value)
-        if told:
-            x[width + column] = value
+        if not told and outcome == PREDICTED:
+            outcome = OUTSIDE
+        if not (told and (outcome == PREDICTED or outcome == UNEXPLAINED)):
+            mode = np.int64(0)
+        if settling and s.code[a + 25]:
+            value, outcome, mode = settled(s, a, k, value, outcome, mode, margin)
         else:
-            if outcome == PREDICTED:
-                outcome = OUTSIDE
+            s.sure[k, 0] = s.sure[k, 1] = math.nan
+        if not (told or (settling and s.code[a + 25])):
             value = guessed(s, a)
             s.touched[k] = 0
             if math.isfinite(value):
                 s.touched[k] = -2 if beyond(s, a) else -1
-                x[width + column] = value
-        known = told and outcome == PREDICTED
-        s.outcomes[k], s.margins[k] = outcome, margin
-        s.modes[k] = mode if known or (told and outcome == UNEXPLAINED) else 0
-        if not known:
+        if math.isfinite(value):
+            x[width + column] = value
+        s.outcomes[k], s.modes[k], s.margins[k] = outcome, mode, margin
+        if outcome != PREDICTED:
             s.lost[s.code[a + 1]] = 1
     for k in range(s.code[KINEMATICS]):
         at = s.code[AT_KINEMATICS] + 3 * k
@@ -1708,17 +1815,23 @@ def hits(s, body):
 
 
 @entered
-def run(spaces, vectors, following, outcomes, modes, margins, players, touched):
+def run(spaces, vectors, settling, following, outcomes, modes, margins, sure, players, touched):
     """A step of n scenes.
 
     Parameters
     ----------
     spaces
         Work space with the tape in it, shape ``(1,)`` of `SPACE`.
-    vectors, following
-        State vectors, finite, and copies of them, into which next values are written, shape ``(n, width)``.
+    vectors
+        State vectors, shape ``(n, width)``.
+    settling
+        Whether how right predictions were decides who gives the value, and what is claimed.
+    following
+        Where the next ones go, shape ``(n, width)``.
     outcomes, modes, margins
         Where these go, shape ``(n, answers)``.
+    sure
+        How probably a value is right, and how far off it may be, shape ``(2, n, answers)``; of length 0: nobody asks.
     players, touched
         Bodies that play roles, shape ``(n, answers, roles)``, and, ``(n, answers)``, whom a mover touches, as bits, or
         the mode that gave a value, -1: a guess, -2: one out of scope. Of length 1 where nobody asks.
@@ -1728,16 +1841,20 @@ def run(spaces, vectors, following, outcomes, modes, margins, players, touched):
     0, or why some scene can't be.
     """
     s = spaces[0]
-    width, reads, nexts = s.code[WIDTH], s.code[AT_READS], s.code[AT_NEXTS]
+    width, nexts = s.code[WIDTH], s.code[AT_NEXTS]
     s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
     for n in range(vectors.shape[0]):
-        for k in range(s.code[READS]):
-            column = s.code[reads + k]
-            s.x[column] = vectors[n, column]
+        wrong = 0
+        for k in range(width):
+            value = vectors[n, k]
+            s.x[k] = following[n, k] = value
+            wrong += not abs(value) < math.inf
+        if wrong:
+            return NOT_FINITE
         for k in range(s.code[NEXTS]):
             column = s.code[nexts + k]
             s.x[width + column] = s.x[column]
-        bad = step(s)
+        bad = step(s, settling, n < players.shape[0])
         if bad:
             return bad
         for k in range(s.code[NEXTS]):
@@ -1745,6 +1862,9 @@ def run(spaces, vectors, following, outcomes, modes, margins, players, touched):
             following[n, column] = s.x[width + column]
         for k in range(s.code[ANSWERS]):
             outcomes[n, k], modes[n, k], margins[n, k] = s.outcomes[k], s.modes[k], s.margins[k]
+        if n < sure.shape[1]:
+            for k in range(s.code[ANSWERS]):
+                sure[0, n, k], sure[1, n, k] = s.sure[k, 0], s.sure[k, 1]
         if n < players.shape[0]:
             for k in range(s.code[ANSWERS]):
                 touched[n, k] = s.touched[k]

@@ -23,10 +23,12 @@ __all__ = [
     "ANY",
     "CONSTANT",
     "CONTEXTS",
+    "EXPERTS",
     "FRAMES",
     "MOST_BODIES",
     "Answer",
     "AxisRule",
+    "Belief",
     "BeyondError",
     "Body",
     "Casting",
@@ -48,6 +50,7 @@ __all__ = [
     "PairTest",
     "Program",
     "Reach",
+    "Regression",
     "Related",
     "Role",
     "Share",
@@ -57,6 +60,7 @@ __all__ = [
     "Sum",
     "Test",
     "Tree",
+    "Trust",
     "Vote",
 ]
 
@@ -71,6 +75,9 @@ MOST_BODIES = 62
 
 CONTEXTS = ("approached", "touching", "all")
 """Which objects a clause may mention: what the target approaches fastest, what is close to it, or all."""
+
+EXPERTS = ("own", "guess", "linear", "products", "latest", "persistence")
+"""Who may give a value (`relgym.model.calibration.EXPERTS`): those of whom a `Belief` tells by bits."""
 
 FRAMES = ("contact", "point", "turned", "centres", "own", "world")
 """Frames of contact laws (`relgym.laws.frames`)."""
@@ -454,6 +461,83 @@ class Reach:
     most: float
 
 
+# ---------------------------------------------------------------------------------------------- who is believed
+@dataclass(frozen=True, slots=True)
+class Regression:
+    """Least squares: ``present + weights @ (1, z)`` with ``z = (column - centre) / scale``, changes kept within bounds.
+
+    Attributes
+    ----------
+    present
+        Column of the present value.
+    columns
+        Column, centre and scale of each number looked at.
+    weights
+        Of 1 and z, then of 1, z and all products of two of them, row by row; one or two of them.
+    least, most
+        Bounds of the change.
+    """
+
+    present: int
+    columns: tuple[tuple[int, float, float], ...]
+    weights: tuple[tuple[float, ...], ...]
+    least: float
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What is made of predictions of one kind.
+
+    Attributes
+    ----------
+    outcome, winner, lead
+        The kind: its outcome, who gave the value (a mode, laws below 0; 0: nobody) and the bin of its lead. A lead of
+        -1 stands for all others of the winner, -2 for those of all other modes (winner 1), laws (-1) or nobody (0).
+    able
+        Who of `EXPERTS` has a value, as bits, persistence left aside, which always has.
+    speaker
+        Place in `EXPERTS` of who gives the value.
+    probability, interval
+        That it is right, and the half width of its 95 % interval; NaN where too little is known.
+    claimed
+        Whether that is a prediction.
+    """
+
+    outcome: int
+    winner: int
+    lead: int
+    able: int
+    speaker: int
+    probability: float
+    interval: float
+    claimed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """How right an answer's predictions were, and whose value counts therefore.
+
+    What is claimed of a mode is a prediction, though the answer as a whole is undecided.
+
+    Attributes
+    ----------
+    beliefs
+        One for each kind.
+    lawful
+        Whether winners are laws.
+    latest
+        The mode that held last, and its function; None where nobody asks.
+    regression
+        Least squares; None where nobody asks.
+    """
+
+    beliefs: tuple[Belief, ...]
+    lawful: bool
+    latest: tuple[int, Sum] | None
+    regression: Regression | None
+
+
 @dataclass(frozen=True, slots=True)
 class Answer:
     """The next value of one property of one object.
@@ -488,8 +572,8 @@ class Answer:
         Limits: (mode, value).
     stops
         Walls, in the order in which they are applied.
-    own, pairs
-        Columns of the bodies' own numbers that pair features show, by feature; -1 where it is a contact fact.
+    trust
+        How right its predictions were; None: that isn't told.
     """
 
     object: str
@@ -514,6 +598,7 @@ class Answer:
     low: tuple[int, float] = (0, float("-inf"))
     high: tuple[int, float] = (0, float("inf"))
     stops: tuple[Stop | Landing, ...] = ()
+    trust: Trust | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -574,3 +659,8 @@ class Program:
     answers: tuple[Answer, ...]
     kinematics: tuple[tuple[int, float, int], ...]
     angles: tuple[int, ...]
+
+    @property
+    def casts(self) -> bool:
+        """Whether some mode has roles that are cast in each scene."""
+        return any(mode.roles for a in self.answers for mode in a.modes)

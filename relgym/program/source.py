@@ -32,15 +32,10 @@ def python_source(program: ir.Program, told: str, sentences: tuple[str, ...]) ->
     sentences
         What each outcome means, in the order of their numbers.
 
-    Raises
-    ------
-    BeyondError
-        The program casts roles in each scene, or bodies are in space: that isn't written out as Python.
+    Notes
+    -----
+    Whatever a program says can be written: the text grows with it, some lines for each mode, law and stage of a choice.
     """
-    if any(mode.roles for answer in program.answers for mode in answer.modes):
-        raise ir.BeyondError("roles that several objects could play")
-    if program.dimensions == 3 and program.bodies:
-        raise ir.BeyondError("bodies in space")
     return _Source(program, told, sentences).text()
 
 
@@ -63,7 +58,7 @@ class _Source:
             f'"""{_doc(self.told)}\n\nMade by relgym; needs numpy alone. `step` predicts one scene, `predict` many.'
             '\n"""\n'
         )
-        add("import math\n\nimport numpy as np\n")
+        add(("import itertools\n" if p.casts else "") + "import math\n\nimport numpy as np\n")
         add("# ---- the state vector")
         add(f"COLUMNS = {p.columns!r}")
         for k in range(p.width):
@@ -81,16 +76,29 @@ class _Source:
             self._motion(p.motion)
         answers = [self._answer(k, a) for k, a in enumerate(p.answers)]
         self._step(answers)
+        self._general()
+        return "\n".join(self.lines).rstrip() + "\n"
+
+    def _general(self) -> None:
+        """What is the same for all models, as far as this one needs it."""
+        p, add = self.program, self.lines.append
+        votes = [a.vote for a in p.answers if a.vote is not None]
+        trusts = [a.trust for a in p.answers if a.trust is not None]
         if p.bodies:
             add(_kernel_text(_GEOMETRY))
             add(_SCENE)
-        if any(a.vote is not None for a in p.answers):
+        if trusts:
+            add(_TRUST)
+        if any(trust.regression is not None for trust in trusts):
+            add(_REGRESSION)
+        if p.casts or votes:
             add(_VOTES)
-        if any(a.vote is not None and a.vote.experience is not None for a in p.answers):
+        if p.casts or any(vote.experience is not None for vote in votes):
             add(_SITUATIONS)
+        if p.casts:
+            add(_ROLES)
         if p.motion is not None:
             add(_COMPOSITION)
-        return "\n".join(self.lines).rstrip() + "\n"
 
     # ------------------------------------------------------------------ numbers
     def x(self, column: int) -> str:
@@ -113,11 +121,11 @@ class _Source:
     def _bodies(self) -> None:
         p, add = self.program, self.lines.append
         add(
-            "# ---- bodies: name, shape, outline, type, and the columns of place, depth, extents, angle, velocity"
+            "# ---- bodies: name, shape, outline, type, and the columns of place, extents, angle, velocity, spin"
         )
         add("BODIES = (")
         for b, group in zip(p.bodies, p.groups, strict=True):
-            columns = (*b.position, *b.extent, b.angle, b.velocity[0], b.velocity[1], b.spin)
+            columns = (*b.position, *b.extent, b.angle, *b.velocity, b.spin)
             add(f"    ({b.name!r}, {b.shape!r}, {b.outline!r}, {group},")
             add(f"     ({', '.join(self.names[c] for c in columns)}), {b.moves}, {b.spins}),")
         add(")")
@@ -126,8 +134,37 @@ class _Source:
         others = tuple(tuple(self.names[c] for c in row) for row in p.others)
         add("OTHERS = (" + " ".join(f"({', '.join(row)}{',' if row else ''})," for row in others) + ")")
         letters = tuple(name.removeprefix("normal-") for name in p.facts if name.startswith("normal-"))
-        add(f"AXES = {letters!r}")
+        add(f"AXES, UP, FACTS = {letters!r}, {p.up}, {len(p.facts)}")
+        add("DIMENSIONS = len(AXES)")
+        if p.dimensions == 3 or p.casts:
+            poses = (f"({', '.join(self.names[c] for c in b.pose)})" for b in p.bodies)
+            add(f"POSES = ({', '.join(poses)},)")
+        self._others_columns()
         add(f"OFFSETS, PARTING, MOVES = {p.offsets}, {p.parting}, {p.motion is not None}\n")
+
+    def _others_columns(self) -> None:
+        """Where each body has the numbers that players of roles are asked for."""
+        terms = [
+            term for a in self.program.answers for mode in a.modes for r in mode.roles for term in r.terms
+        ]
+        rows: dict[str, list[str]] = {}
+        for _, columns in terms:
+            row = rows.setdefault(self._property(columns), ["None"] * len(columns))
+            for k, column in enumerate(columns):
+                if column >= 0:
+                    row[k] = self.names[column]
+        if rows:
+            self.lines.append(f"RELATIONS = {self.program.relations!r}")
+            self.lines.append("OF = {  # where each body has a property")
+            for name, row in rows.items():
+                self.lines.append(f"    {name!r}: ({', '.join(row)},),")
+            self.lines.append("}")
+
+    def _property(self, columns: tuple[int, ...]) -> str:
+        """What the bodies' columns hold, by its name; next values with a prime."""
+        column = next(c for c in columns if c >= 0)
+        width = self.program.width
+        return self.program.columns[column % width].partition(".")[2] + ("'" if column >= width else "")
 
     def _motion(self, m: ir.Motion) -> None:
         add = self.lines.append
@@ -207,10 +244,8 @@ class _Source:
             self.names[follow.register] = f"NEXT + {follow.register - self.program.width}"
         for mode in a.modes:
             self.names[mode.register] = f"NEXT + {mode.register - self.program.width}"
-            if mode.function is not None:
-                add(f"def {name}_mode_{mode.id}(x):")
-                add(f'    """Mode {mode.id}, of {", ".join(str(player) for player in mode.players)}."""')
-                add(f"    return {self.sum(mode.function)}\n")
+            if mode.function is not None and (mode.casting is not None or not mode.roles):
+                self._mode(name, mode)
         if a.vote is not None:
             for contest in a.vote.contests:
                 self._contest(name, a, contest)
@@ -231,6 +266,40 @@ class _Source:
         self._said(name, a)
         add("")
         return name
+
+    def _mode(self, name: str, mode: ir.Mode) -> None:
+        """A mode as a function of the registers and of the bodies that are bound to its roles."""
+        add = self.lines.append
+        assert mode.function is not None, "asked of such alone"
+        cast = {role.number + 1: _variable(role.place + 1) for role in mode.roles}
+        who = ", ".join(cast.get(k, str(player)) for k, player in enumerate(mode.players))
+        players = [f", {_variable(place + 1)}" for place in range(mode.casting.roles if mode.casting else 0)]
+        if mode.roles and mode.casting is not None:
+            self._casting(f"{name}_players_{mode.id}", mode.id, mode.casting)
+        add(f"def {name}_mode_{mode.id}(x{''.join(players)}):")
+        add(f'    """Mode {mode.id}, of {who}."""')
+        text = self.sum(mode.function)
+        for role in mode.roles:
+            for weight, columns in role.terms:
+                place = f"x[OF[{self._property(columns)!r}][{_variable(role.place + 1)}]]"
+                text += f" {'-' if weight < 0.0 else '+'} {abs(weight)!r} * {place}"
+        add(f"    return {text}\n")
+
+    def _casting(self, name: str, mode: int, casting: ir.Casting) -> None:
+        add, described = self.lines.append, list[str]()
+        for k, d in enumerate(casting.descriptions):
+            described.append(f"        ({d.objects}, {name}_{k}, {d.common!r}, {d.places!r}),\n")
+            add(f"def {name}_{k}(target, B, shown, stands):")
+            add(f'    """Log-odds that B is bound to role {", ".join(map(str, d.places))} of mode {mode}."""')
+            for clause, score in d.clauses:
+                add(f"    # {clause.text}")
+                add(f"    if {self._clause(clause)[0]}:\n        return {_number(score)}")
+            add(f"    return {_number(d.otherwise)}\n")
+        add(f"def {name}(target, scene):")
+        add(f'    """Bodies bound to the roles of mode {mode}; None: none are, or it is in doubt which."""')
+        add("    # whom, how well, what all who did had in common (relations both ways, kinds), which roles")
+        add(f"    described = (\n{''.join(described)}    )")
+        add(f"    return players(described, {casting.roles}, {casting.lenient}, target, scene)\n")
 
     def _clipped(self, a: ir.Answer, value: str) -> str:
         if a.reach is None:
@@ -264,7 +333,7 @@ class _Source:
         if a.scope is not None:
             add(f"    if not {self._tree(*a.scope)}:\n        return math.nan, UNEXPLAINED, 0, 0.0, guess")
         for mode in a.modes:
-            value = "math.nan" if mode.function is None else f"{name}_mode_{mode.id}(x)"
+            value = "math.nan" if mode.function is None or mode.roles else f"{name}_mode_{mode.id}(x)"
             add(f"    {self.x(mode.register)} = {value}")
         for f in a.follows:
             join = f"+ {f.scale!r} *" if f.scale else "*"
@@ -278,6 +347,22 @@ class _Source:
         add("    for place, number in enumerate(order):")
         add("        mode, value, known = modes[number]")
         add("        if not known:\n            continue")
+        cast = [
+            f"{k}: ({name}_players_{m.id}, {name}_mode_{m.id})"
+            for k, m in enumerate(a.modes)
+            if m.roles and m.casting
+        ]
+        if any(m.roles for m in a.modes):
+            add(f"        if number in {tuple(k for k, m in enumerate(a.modes) if m.roles)!r}:")
+            add(f"            who, what = {{{', '.join(cast)}}}.get(number, (nobody, None))")
+            add(f"            chosen = who({a.body}, scene)")
+            add("            if chosen is None:")
+            add(
+                "                return math.nan, OUTSIDE, 0, 0.0, guess"
+                if a.abstains
+                else "                continue"
+            )
+            add("            value = what(x, *chosen)")
         if a.clipped:
             add(f"        value = {self._clipped(a, 'value')}")
         self._walls(a)
@@ -407,7 +492,8 @@ class _Source:
         tests = [self._literal(each) for each in clause.literals]
         if clause.variables <= clause.arity:
             return " and ".join(tests) or "True", ""
-        loops = " for ".join(f"{_variable(v)} in objects(shown)" for v in range(1, clause.variables))
+        free = range(clause.arity, clause.variables)
+        loops = " for ".join(f"{_variable(v)} in objects(shown)" for v in free)
         body = f"{loops} if {' and '.join(tests) or 'True'}"
         return f"any(True for {body})", body
 
@@ -436,9 +522,53 @@ class _Source:
             text = f"any({text} for P in objects(shown))" if each.variable == ir.ANY else text
         return f"not ({text})" if each.negated else f"({text})"
 
+    # ------------------------------------------------------------------ who is believed
+    def _trust(self) -> None:
+        """How right predictions of each kind were; of all objects of a type alike."""
+        add, known, told = self.lines.append, list[tuple[ir.Belief, ...]](), list[str]()
+        if all(a.trust is None for a in self.program.answers):
+            return
+        add(
+            "# ---- how right predictions were: by outcome, mode (laws below 0), bin of the margin (-1: all others,"
+        )
+        add(
+            "# -2: of all other modes), and whose values there are (bits of EXPERTS): who speaks, and how sure that is"
+        )
+        add(f"EXPERTS = {ir.EXPERTS!r}")
+        for a in self.program.answers:
+            trust = a.trust
+            if trust is None:
+                told.append("None")
+                continue
+            if trust.beliefs not in known:
+                known.append(trust.beliefs)
+                add(f"BELIEFS_{len(known) - 1} = {{")
+                for b in trust.beliefs:
+                    sure = f"{_number(b.probability)}, {_number(b.interval)}, {b.claimed}"
+                    add(f"    ({b.outcome}, {b.winner}, {b.lead}, {b.able}): ({b.speaker}, {sure}),")
+                add("}")
+            name = f"{_name(a.object)}_{_name(a.property)}"
+            latest = (
+                f"({trust.latest[0]}, {name}_mode_{trust.latest[0]})" if trust.latest is not None else "None"
+            )
+            squares = self._regression(name, trust.regression) if trust.regression is not None else "None"
+            told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {trust.lawful}, {latest}, {squares})")
+        add("# beliefs, whether of laws, the mode that held last, regressions; of each answer below")
+        add("TRUST = (\n" + "".join(f"    {each},\n" for each in told) + ")\n")
+
+    def _regression(self, name: str, r: ir.Regression) -> str:
+        add = self.lines.append
+        add(f"{name.upper()}_LEAST_SQUARES = (")
+        columns = (f"({self.names[c]}, {_number(m)}, {_number(s)})" for c, m, s in r.columns)
+        weights = (f"({', '.join(map(_number, row))},)" for row in r.weights)
+        add(f"    {self.names[r.present]},\n    ({', '.join(columns)},),\n    ({', '.join(weights)},),")
+        add(f"    {_number(r.least)}, {_number(r.most)},\n)")
+        return f"{name.upper()}_LEAST_SQUARES"
+
     # ------------------------------------------------------------------ the step
     def _step(self, answers: list[str]) -> None:
         p, add = self.program, self.lines.append
+        self._trust()
         add("# ---- all of it, in causal order: what, its column, its (type, property), those it depends on")
         add("ANSWERS = (")
         for name, a in zip(answers, p.answers, strict=True):
@@ -449,7 +579,13 @@ class _Source:
         angles = ", ".join(self.names[c] for c in p.angles)
         add(f"ANGLES = ({angles}{',' if angles else ''})\n")
         scene = "Scene(x)" if p.bodies else "None"
-        add(_STEP.replace("REGISTERS", str(p.registers - 2 * p.width)).replace("SCENE", scene))
+        plain = "        value = value if finite else guess"
+        if any(a.trust is not None for a in p.answers):
+            plain = (
+                "        value, outcome, mode, sure = settled(number, value, outcome, mode, margin, guess, x)"
+            )
+        registers = str(p.registers - 2 * p.width)
+        add(_STEP.replace("REGISTERS", registers).replace("SCENE", scene).replace("SETTLED", plain))
 
 
 def _variable(number: int) -> str:
@@ -491,23 +627,27 @@ def _functions(text: str, names: tuple[str, ...]) -> Iterator[str]:
 _STEP = '''def step(now):
     """Predict what follows one state vector.
 
-    Returns the next state vector, and for every entry of ANSWERS its outcome, mode and margin.
+    Returns the next state vector, and for every entry of ANSWERS its outcome, mode, margin, how probably it is
+    right, and the half width of its 95 % interval.
     """
     x = [*now, *now, math.nan, 0.0, 1.0] + [math.nan] * (REGISTERS - 3)
     scene, lost, told = SCENE, set(), []
-    for answer, column, key, needs in ANSWERS:
+    for number, (answer, column, key, needs) in enumerate(ANSWERS):
         value, outcome, mode, margin, guess = answer(x, scene)
         if not lost.isdisjoint(needs):
             outcome, margin = DEPENDS, 0.0
         finite = math.isfinite(value)
         if not finite and outcome == PREDICTED:
             outcome = OUTSIDE
-        known = finite and outcome == PREDICTED
-        if finite or math.isfinite(guess):
-            x[NEXT + column] = value if finite else guess
-        if not known:
+        if not (finite and outcome in (PREDICTED, UNEXPLAINED)):
+            mode = 0
+        sure = math.nan, math.nan
+SETTLED
+        if math.isfinite(value):
+            x[NEXT + column] = value
+        if outcome != PREDICTED:
             lost.add(key)
-        told.append((outcome, mode if known or (finite and outcome == UNEXPLAINED) else 0, margin))
+        told.append((outcome, mode, margin, *sure))
     for place, size, rate in KINEMATICS:
         x[NEXT + place] = x[place] + size * x[rate]
     for column in ANGLES:
@@ -516,11 +656,14 @@ _STEP = '''def step(now):
 
 
 def predict(vectors):
-    """Predict what follows n state vectors, shape (n, width): next ones, outcomes, modes and margins."""
+    """Predict what follows n state vectors, shape (n, width).
+
+    Returns the next ones, then outcomes, modes, margins, probabilities and intervals, shape (n, answers) each.
+    """
     found = [step([float(v) for v in row]) for row in np.asarray(vectors, dtype=np.float64)]
     after = np.array([row for row, _ in found]).reshape(len(found), NEXT)
-    told = np.array([row for _, row in found], dtype=np.float64).reshape(len(found), len(ANSWERS), 3)
-    return after, told[..., 0].astype(int), told[..., 1].astype(int), told[..., 2]
+    told = np.array([row for _, row in found], dtype=np.float64).reshape(len(found), len(ANSWERS), 5)
+    return after, told[..., 0].astype(int), told[..., 1].astype(int), told[..., 2], told[..., 3], told[..., 4]
 
 
 def clipped(value, present, low, high):
@@ -612,31 +755,184 @@ def situation(used, near, target, stands):
 
 '''
 
+_TRUST = '''
+def settled(number, value, outcome, mode, margin, guess, x):
+    """Value, outcome and mode of a prediction, once it is known how right such ones were, and how sure that is."""
+    if TRUST[number] is None:
+        return value if math.isfinite(value) else guess, outcome, mode, (math.nan, math.nan)
+    beliefs, lawful, latest, squares = TRUST[number]
+    present = x[NEXT + ANSWERS[number][1]]
+    last = latest[1](x) if latest else math.nan
+    linear, products = regressed(x, *squares) if squares else (math.nan, math.nan)
+    values = value, guess, linear, products, last, present
+    able = sum(1 << k for k, each in enumerate(values[:5]) if math.isfinite(each))
+    winner = -mode if lawful else mode
+    lead = 0
+    if margin > 0.0:
+        lead = 7 if margin == math.inf else min(max(math.frexp(margin)[1] + 2, 1), 6)
+    kind = PREDICTED if mode else outcome
+    known = beliefs.get((kind, winner, lead, able)) or beliefs.get((kind, winner, -1, able))
+    known = known or beliefs[kind, (winner > 0) - (winner < 0), -2, able]
+    speaker, probability, interval, claimed = known
+    if not claimed:
+        outcome = UNSURE if outcome == PREDICTED else outcome
+    elif outcome == UNEXPLAINED and winner:
+        outcome = PREDICTED
+    if EXPERTS[speaker] == "latest" and winner:
+        mode = latest[0]
+    return values[speaker], outcome, mode, (probability, interval)
+
+'''
+
+_REGRESSION = '''
+def regressed(x, present, columns, weights, least, most):
+    """The next value by least squares on some numbers, and on these and their products; NaN where there is none."""
+    z = [(x[c] - centre) / scale for c, centre, scale in columns]
+    both = z, z + [z[i] * z[j] for i in range(len(z)) for j in range(i, len(z))]
+    found = [float((np.array([1.0, *shown]) * np.array(row)).sum()) for shown, row in zip(both, weights)]
+    return ([x[present] + min(max(change, least), most) for change in found] + [math.nan, math.nan])[:2]
+
+'''
+
+_ROLES = '''
+def players(described, roles, lenient, target, scene):
+    """The bodies that fill all roles best, together; None where there are none, or others fill them as well."""
+    order, shown, options = lined_up(scene, target), (1 << len(BODIES)) - 1, []
+    for whom, likely, common, places in described:
+        some = []
+        for at, each in enumerate(order):
+            score = likely(target, each, shown, scene.stands) if whom >> each & 1 else math.nan
+            if score == score:
+                some.append((score, typical(common, each, target, scene.stands), at, each))
+        some.sort(key=lambda one: (-one[0], -one[1]))
+        options.append(list(itertools.combinations(some[: roles + 1], len(places))))
+    best, single = None, True
+    for way in itertools.product(*options):
+        chosen = [one for part in way for one in part]
+        if len({one[3] for one in chosen}) < len(chosen):
+            continue
+        score, common = 0.0, 0
+        for one in chosen:
+            score, common = score + one[0], common + one[1]
+        worth = float(np.round(score * 1e9)), common
+        if best is not None and worth == best[0]:
+            single = False
+        if best is None or worth > best[0]:
+            best, single = (worth, way), True
+    if best is None or not (lenient or (single and best[0][1] == roles)):
+        return None
+    found = [None] * roles
+    for (_, _, _, places), part in zip(described, best[1]):
+        for place, one in zip(places, sorted(part, key=lambda one: one[2])):
+            found[place] = one[3]
+    return found
+
+
+def nobody(target, scene):
+    """Nothing is known of who is bound to the roles."""
+    return None
+
+
+def typical(common, each, target, stands):
+    """Whether a body has all that players so far had in common: relations both ways, and kinds."""
+    if common is None:
+        return False
+    towards, back, among = common
+    return (
+        bool(among >> each & 1)
+        and all(stands(RELATIONS[r], each, target) for r in towards)
+        and all(stands(RELATIONS[r], target, each) for r in back)
+    )
+
+
+def lined_up(scene, t):
+    """The other bodies as t sees them: by type, by what they are to t, to the others, then nearer ones first."""
+    if ("order", t) in scene.seen:
+        return scene.seen["order", t]
+    others = [k for k in range(len(BODIES)) if k != t]
+    kind = [body[3] for body in BODIES]
+    toward = {k: both_ways(scene, k, t) for k in others}
+    keys = {k: (kind[k], -toward[k]) for k in others}
+    if len(set(keys.values())) < len(others):  # some are alike
+        kinds = sorted({kind[k] for k in others})
+        for k in others:
+            around = 0
+            for j in others:
+                if j != k:
+                    bits = both_ways(scene, k, j) + ((kinds.index(kind[j]) + 1) << 2 * len(RELATIONS))
+                    around += mixed((mixed((bits + GOLDEN) & WHOLE) + toward[j] + GOLDEN) & WHOLE)
+            near = float(np.round(scene.measured(min(k, t), max(k, t))[0] / 1e-9))
+            keys[k] = (*keys[k], around & WHOLE, near, *(scene.x[c] for c in POSES[k]))
+    scene.seen["order", t] = sorted(others, key=keys.__getitem__)
+    return scene.seen["order", t]
+
+
+def both_ways(scene, a, b):
+    """Which relations hold between two bodies either way round, as bits."""
+    bits = 0
+    for r in RELATIONS:
+        bits = bits << 2 | scene.stands(r, a, b) << 1 | scene.stands(r, b, a)
+    return bits
+
+'''
+
 _SCENE = '''
+def dot(a, b):
+    """The inner product of two vectors."""
+    found = a[0] * b[0]
+    for p, q in zip(a[1:], b[1:]):
+        found += p * q
+    return found
+
+
+def solids(offset, reach, spheres):
+    """Signed distance and normal of two spheres, or of two boxes that aren't turned, in space."""
+    if spheres:
+        length = math.sqrt(dot(offset, offset))
+        if not length > 0.0:
+            return length - reach[0], *offset[:2], 1.0
+        return length - reach[0], *(each / length for each in offset)
+    gaps = [abs(a) - r for a, r in zip(offset, reach)]
+    depth = max(gaps)
+    if depth > 0.0:
+        apart = [max(gap, 0.0) for gap in gaps]
+        depth = math.sqrt(dot(apart, apart))
+        normal = [each / depth for each in apart]
+    else:
+        normal = [float(k == gaps.index(depth)) for k in range(3)]
+    return depth, *(-n if a < 0.0 else n for a, n in zip(offset, normal))
+
+
 class Scene:
     """The bodies of a scene: who touches whom, and how they lie to each other; worked out when asked for."""
 
     def __init__(self, x):
         self.x, self.known, self.lines, self.seen = x, {}, {}, {}
-        self.box, self.place = [], []
+        self.low, self.high, self.place = [], [], []
         for k, (name, shape, outline, _, columns, _, _) in enumerate(BODIES):
-            px, py, _, width, height, _, angle, *_ = (x[c] for c in columns)
-            if not (width > 0.0 and height > 0.0) or (shape == "round" and abs(height - width) > 1e-9 * width):
-                raise ValueError(f"{name}: extents must be positive, and of what is round equal; got {width}, {height}")
-            self.place.append((px, py))
-            if shape == "round":
-                self.box.append((-0.5 * width, -0.5 * width, 0.5 * width, 0.5 * width))
+            self.place.append([x[c] for c in columns[:DIMENSIONS]])
+            extents, angle = [x[c] for c in columns[3 : 3 + DIMENSIONS]], x[columns[6]]
+            uneven = shape == "round" and max(abs(e - extents[0]) for e in extents) > 1e-9 * extents[0]
+            if uneven or not all(e > 0.0 for e in extents):
+                raise ValueError(f"{name}: extents must be positive, and of what is round equal; got {extents}")
+            if DIMENSIONS == 3 and shape != "round" and any(x[c] != 0.0 for c in POSES[k][3:6]):
+                raise ValueError(f"{name}: boxes in space must not be turned")
+            if shape == "round" or DIMENSIONS == 3:
+                halves = [0.5 * (extents[0] if shape == "round" else e) for e in extents]
+                low, high = [-half for half in halves], halves
             elif angle == 0.0:
-                across, up = [a * width for a, _ in outline], [b * height for _, b in outline]
-                self.box.append((min(across), min(up), max(across), max(up)))
+                corners = [[a * e for a in axis] for axis, e in zip(zip(*outline), extents)]
+                low, high = [min(axis) for axis in corners], [max(axis) for axis in corners]
             else:
                 starts = self.edges(k)[:2, 0]
-                self.box.append((*starts.min(axis=1).tolist(), *starts.max(axis=1).tolist()))
+                low, high = starts.min(axis=1).tolist(), starts.max(axis=1).tolist()
+            self.low.append(low)
+            self.high.append(high)
         if MOVES:
             move(self)
 
     def column(self, body, number):
-        """A number of a body: 0-2 place, 3-5 extents, 6 angle, 7-8 velocity, 9 spin."""
+        """A number of a body: 0-2 place, 3-5 extents, 6 angle, 7-9 velocity, 10 spin."""
         return self.x[BODIES[body][4][number]]
 
     def edges(self, k):
@@ -662,8 +958,11 @@ class Scene:
         return self.known[i, j]
 
     def _measured(self, i, j):
-        (px, py), (qx, qy) = self.place[i], self.place[j]
-        x, y, kinds = px - qx, py - qy, (BODIES[i][1], BODIES[j][1])
+        kinds, offset = (BODIES[i][1], BODIES[j][1]), [p - q for p, q in zip(self.place[i], self.place[j])]
+        if DIMENSIONS == 3:
+            reach = [a + b for a, b in zip(self.high[i], self.high[j])]
+            return solids(offset, reach, kinds[0] == "round")
+        x, y = offset
         wide_i, wide_j, tall_i, tall_j = *(self.column(k, 3) for k in (i, j)), *(self.column(k, 4) for k in (i, j))
         if kinds == ("round", "round"):
             return discs(x, y, 0.5 * wide_i + 0.5 * wide_j)
@@ -681,8 +980,8 @@ class Scene:
 
     def normal(self, a, b):
         """Unit vector from b to a."""
-        _, nx, ny = self.measured(min(a, b), max(a, b))
-        return (nx, ny) if a < b else (-nx, -ny)
+        _, *normal = self.measured(min(a, b), max(a, b))
+        return normal if a < b else [-n for n in normal]
 
     def limit(self, a, b, least, numbers):
         """Distance up to which two bodies touch, or speed up to which they don't part."""
@@ -698,16 +997,19 @@ class Scene:
 
     def velocity(self, a, b):
         """Relative velocity of two bodies."""
-        return self.column(a, 7) - self.column(b, 7), self.column(a, 8) - self.column(b, 8)
+        return [self.column(a, 7 + d) - self.column(b, 7 + d) for d in range(DIMENSIONS)]
+
+    def parting(self, a, b):
+        """Normal speed beyond which two bodies part."""
+        return self.limit(a, b, PART, (7, 8, 9))
 
     def closing(self, a, b):
         """Normal speed of two bodies that touch and don't part; infinite of others."""
         a, b = min(a, b), max(a, b)
         if not (BODIES[a][5] or BODIES[b][5]) or not self.touching(a, b):
             return math.inf
-        (vx, vy), (nx, ny) = self.velocity(a, b), self.normal(a, b)
-        speed = vx * nx + vy * ny
-        return speed if speed <= self.limit(a, b, PART, (7, 8)) else math.inf
+        speed = dot(self.velocity(a, b), self.normal(a, b))
+        return speed if speed <= self.parting(a, b) else math.inf
 
     def stands(self, relation, a, b):
         """Whether a relation holds of two bodies."""
@@ -726,25 +1028,29 @@ class Scene:
             if relation == "approaching" or own == math.inf:
                 return own < math.inf
             others = (self.closing(a, k) for k in range(len(BODIES)) if k not in (a, b))
-            return all(own <= other + self.limit(a, b, PART, (7, 8)) for other in others)
+            return all(own <= other + self.parting(a, b) for other in others)
+        wide = [[high - low for low, high in zip(self.low[k], self.high[k])] for k in (a, b)]
         if relation == "smaller-than":
-            size = [math.sqrt((x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)) for x0, y0, x1, y1 in
-                    (self.box[a], self.box[b])]
-            return 1.1 * size[0] < size[1]
+            return 1.1 * math.sqrt(dot(wide[0], wide[0])) < math.sqrt(dot(wide[1], wide[1]))
         if relation == "on-top":
-            if not (self.beside(b, a, 1) and self.touching(a, b)):
-                return False
-            (low, _, high, _), (left, _, right, _) = self.box[a], self.box[b]
-            offset = self.place[a][0] - self.place[b][0]
-            return min(high + offset, right) - max(low + offset, left) >= 0.1 * (high - low)
+            return self.touching(a, b) and all(
+                self.beside(b, a, d) if d == UP else self.overlap(a, b, d) >= 0.1 * wide[0][d]
+                for d in range(DIMENSIONS)
+            )
         axis, _, kind = relation.partition("-")
         axis = AXES.index(axis)
         less, greater = self.beside(a, b, axis), self.beside(b, a, axis)
         return {"less-than": less, "greater-than": greater, "aligned": not (less or greater)}[kind]
 
+    def overlap(self, a, b, axis):
+        """How far the extents of two bodies overlap along an axis."""
+        offset = self.place[a][axis] - self.place[b][axis]
+        low, high = self.low[a][axis] + offset, self.high[a][axis] + offset
+        return min(high, self.high[b][axis]) - max(low, self.low[b][axis])
+
     def beside(self, a, b, axis):
         """Whether a lies on the low side of b along an axis, up to a twentieth of the smaller extent."""
-        low_a, high_a, low_b, high_b = (self.box[k][n] for k in (a, b) for n in (axis, axis + 2))
+        (low_a, high_a), (low_b, high_b) = ((self.low[k][axis], self.high[k][axis]) for k in (a, b))
         offset = self.place[a][axis] - self.place[b][axis]
         return (low_b - high_a) - offset >= -(0.05 * min(high_a - low_a, high_b - low_b))
 
@@ -758,27 +1064,32 @@ class Scene:
             if k == t:
                 continue
             near = self.touching(t, k)
-            pair[k] |= {5 + 2 * OFFSETS + f: self.x[c] for f, c in enumerate(OTHERS[k])}
+            pair[k] |= {FACTS + f: self.x[c] for f, c in enumerate(OTHERS[k])}
             if not near and not OFFSETS:
                 continue
-            (vx, vy), (nx, ny) = self.velocity(t, k), self.normal(t, k)
-            distance, approach = self.measured(min(t, k), max(t, k))[0], vx * nx + vy * ny
+            v, n = self.velocity(t, k), self.normal(t, k)
+            distance, approach = self.measured(min(t, k), max(t, k))[0], dot(v, n)
             if near:
                 touched.append(k)
-                pair[k][3] = speeds[k] = approach
-                if approach > self.limit(t, k, PART, (7, 8)):
+                pair[k][DIMENSIONS + 1] = speeds[k] = approach
+                if approach > self.parting(t, k):
                     leaving.add(k)
                 else:
-                    pair[k] |= {0: distance, 1: nx, 2: ny, 4: nx * vy - ny * vx}
+                    pair[k] |= {0: distance, **{1 + d: each for d, each in enumerate(n)}}
+                    if DIMENSIONS == 2:
+                        pair[k][DIMENSIONS + 2] = n[0] * v[1] - n[1] * v[0]
+                    else:
+                        across = [a - approach * b for a, b in zip(v, n)]
+                        pair[k][DIMENSIONS + 2] = math.sqrt(dot(across, across))
             if OFFSETS:
-                (px, py), (qx, qy) = self.place[t], self.place[k]
-                pair[k] |= {0: distance, 3: approach, 5: px - qx, 6: py - qy}
+                pair[k] |= {0: distance, DIMENSIONS + 1: approach}
+                pair[k] |= {DIMENSIONS + 3 + d: self.place[t][d] - self.place[k][d] for d in range(DIMENSIONS)}
         others = [k for k in range(count) if k != t]
         close = touched or [min(others, key=lambda k: self.measured(min(t, k), max(t, k))[0])] if others else []
         kept = [k for k in close if k not in leaving] if PARTING else close
         held = [k for k in touched if k not in leaving]
         fastest = min((speeds[k] for k in held), default=math.inf)
-        struck = [k for k in held if speeds[k] <= fastest + self.limit(t, k, PART, (7, 8))] if PARTING else close
+        struck = [k for k in held if speeds[k] <= fastest + self.parting(t, k)] if PARTING else close
         bits = [sum(1 << k for k in {t, *some}) for some in (struck, kept or close, range(count))]
         self.seen[t] = bits, t, pair
         return self.seen[t]
@@ -923,7 +1234,7 @@ def contacts_of(scene):
 def move(scene):
     """Next velocities of all movers, and whether they are known: `scene.motion` and `scene.told`."""
     count = len(BODIES)
-    now = [[scene.column(k, n) for k in range(count)] for n in (7, 8, 9)]
+    now = [[scene.column(k, n) for k in range(count)] for n in (7, 8, 10)]
     free, known = [list(row) for row in now], [False] * count
     for body, law, governed, moving in MOVERS:
         values = [*law(scene.x), *[math.nan] * 3][:moving]

@@ -16,7 +16,7 @@ from relgym.program import records as ir
 
 __all__ = ["Tape", "encoded"]
 
-HEADER = 30
+HEADER = 28
 (
     WIDTH,
     REGISTERS,
@@ -32,7 +32,7 @@ HEADER = 30
     AT_LAWS,
 ) = range(12)
 (KINEMATICS, AT_KINEMATICS, ANGLES, AT_ANGLES, RELATIONS, FACTS, OTHERS) = range(12, 19)
-(OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP, READS, AT_READS, NEXTS, AT_NEXTS) = range(19, 29)
+(OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP, NEXTS, AT_NEXTS) = range(19, 27)
 """Entries of the header."""
 
 (TURN, TOUCH, PART, PRECISION, SLACK) = range(5)
@@ -62,13 +62,16 @@ MOST_CODE, MOST_NUMBERS, MOST_ANSWERS = 65536, 16384, 512
 REMEMBERED, REMEMBERED_MODES, REMEMBERED_ROLES = 512, 8, 6
 """Relational states that a kernel remembers answers of (a power of two), and of how many modes and roles."""
 
+NOBODY = -(1 << 62)
+"""No kind of predictions."""
+
 _K = ir.MOST_BODIES
 SPACE = np.dtype(
     [
         ("code", np.int64, (MOST_CODE,)),  # the tape
         ("numbers", np.float64, (MOST_NUMBERS,)),
         ("x", np.float64, (MOST_REGISTERS,)),  # registers
-        ("body", np.float64, (_K, 11)),  # place, bounding box, sizes for coarse numbers
+        ("body", np.float64, (_K, 12)),  # place, bounding box, sizes for coarse numbers, size of the box
         ("placed", np.int64, (_K,)),  # whether a body's edges are worked out
         ("edge", np.float64, (5, _K, MOST_CORNERS)),  # starts, outward normals, lengths
         ("gap", np.float64, (4, _K, _K)),  # distance and normal, first < second
@@ -79,11 +82,9 @@ SPACE = np.dtype(
         ("features", np.float64, (6,)),  # what laws read of a contact
         ("body_flags", np.int64, (4, _K)),  # stated, known, involved, stated by the law in force
         ("told", np.float64, (_K, MOST_FEATURES)),  # pair features of a target
-        (
-            "masks",
-            np.int64,
-            (6,),
-        ),  # contexts of a target; whose they are; among whom relations are known; the time
+        # Contexts of a target; whose they are; among whom relations are known; the time; whether they are written out.
+        ("masks", np.int64, (7,)),
+        ("kinds", np.int64, (_K, _K)),  # how bodies stand to each other: bits of kinds of relations
         ("rows", np.int64, (MOST_RELATIONS, _K)),  # to whom an object stands in a relation
         ("columns", np.int64, (MOST_RELATIONS, _K)),  # who stands in a relation to an object
         ("value", np.int64, (MOST_VARIABLES,)),  # objects of variables
@@ -100,6 +101,12 @@ SPACE = np.dtype(
         ("modes", np.int64, (MOST_ANSWERS,)),
         ("margins", np.float64, (MOST_ANSWERS,)),
         ("players", np.int64, (MOST_ANSWERS, MOST_ROLES)),  # bodies bound to its roles
+        (
+            "believed",
+            np.int64,
+            (MOST_ANSWERS, 2),
+        ),  # the last kind of an answer's predictions, and what is made of it
+        ("sure", np.float64, (MOST_ANSWERS, 2)),  # probability and interval of each answer
         ("touched", np.int64, (MOST_ANSWERS,)),  # whom a mover touches; or the mode that gave a value
         ("state", np.uint64, (1,)),  # all relations that are known, as a number
         ("memory_keys", np.uint64, (REMEMBERED,)),
@@ -122,17 +129,26 @@ class Tape:
         Shape ``(m,)``.
     roles
         Most roles of a mode that are cast, 1 at least.
+    votes
+        Of every answer that is voted for, in order: where the votes of each contest begin in the code, and where its
+        modes stand in the order in which they win ties.
     """
 
     code: NDArray[np.int64]
     numbers: NDArray[np.float64]
     roles: int
+    votes: tuple[tuple[tuple[int, ...], int], ...] = ()
 
     def space(self) -> NDArray[np.void]:
         """A work space with the tape in it, shape ``(1,)``."""
         found = np.zeros(1, dtype=SPACE)
-        found["code"][0, : len(self.code)], found["numbers"][0, : len(self.numbers)] = self.code, self.numbers
+        self.lay(found)
         return found
+
+    def lay(self, space: NDArray[np.void]) -> None:
+        """Put the tape into a work space, in place of another one; nothing of that is remembered."""
+        space["code"][0, : len(self.code)], space["numbers"][0, : len(self.numbers)] = self.code, self.numbers
+        space["memory_keys"], space["believed"] = 0, NOBODY
 
 
 def encoded(program: ir.Program) -> Tape:
@@ -179,6 +195,7 @@ class _Writer:
         self.roles = 1
         self.variables = 1
         self.reads: set[int] = set()
+        self.votes: list[tuple[tuple[int, ...], int]] = []
 
     def put(self, *values: int) -> int:
         """Append whole numbers; where they begin."""
@@ -222,21 +239,17 @@ class _Writer:
             *(v for k, (place, _, rate) in enumerate(p.kinematics) for v in (place, *self.col(rate), at + k))
         )
         head[ANGLES], head[AT_ANGLES] = len(p.angles), self.put(*p.angles)
-        self._note_reads()
-        return Tape(np.array(self.code, dtype=np.int64), np.array(self.numbers), self.roles)
+        self._note_nexts()
+        return Tape(
+            np.array(self.code, dtype=np.int64), np.array(self.numbers), self.roles, tuple(self.votes)
+        )
 
-    def _note_reads(self) -> None:
-        """Which present values a step reads, and which next values it reads or writes."""
+    def _note_nexts(self) -> None:
+        """Which next values a step reads or writes."""
         p, head = self.program, self.code
         written = {a.column for a in p.answers} | {place for place, _, _ in p.kinematics} | set(p.angles)
         nexts = sorted(written | {c - p.width for c in self.reads if p.width <= c < 2 * p.width})
-        reads = sorted({c for c in self.reads if 0 <= c < p.width} | set(nexts))
-        head[READS], head[AT_READS] = len(reads), self.put(*reads)
         head[NEXTS], head[AT_NEXTS] = len(nexts), self.put(*nexts)
-
-    @property
-    def _casts(self) -> bool:
-        return any(mode.roles for a in self.program.answers for mode in a.modes)
 
     def _relation(self, name: str) -> int:
         if name in RELATION_KINDS:
@@ -254,7 +267,7 @@ class _Writer:
         self.col(*b.position[:2], *b.extent[:2], b.angle, *b.velocity, b.spin)
         if self.program.precision or self.program.dimensions == 3:
             self.col(*b.position, *b.extent)
-        if self.program.dimensions == 3 or self._casts:
+        if self.program.dimensions == 3 or self.program.casts:
             self.col(*b.pose)
         return [
             shape,
@@ -366,12 +379,13 @@ class _Writer:
     def _vote(self, vote: ir.Vote | None) -> int:
         if vote is None:
             return 0
-        contests = []
+        contests, places = [], []
         for c in vote.contests:
             stages = [self._stage(stage) for stage in c.stages]
-            votes = self.put(*(v for pair in c.votes for v in pair))
+            places.append(votes := self.put(*(v for pair in c.votes for v in pair)))
             contests.append(self.put(c.first, c.second, c.context, votes, len(stages), *stages))
         by_tie = self.put(*vote.by_tie)
+        self.votes.append((tuple(places), by_tie))
         experience = 0
         if (known := vote.experience) is not None:
             seen = np.array(known.seen, dtype=np.uint64).view(np.int64).tolist()
@@ -451,7 +465,21 @@ class _Writer:
             int(any(mode.roles for mode in a.modes)),
             int(a.vote is not None and _relational(a.vote)),
             int(a.vote is not None and _narrow(a.vote)),
+            self._trust(a.trust),  # 25
         )
+
+    def _trust(self, trust: ir.Trust | None) -> int:
+        """Beliefs in the order of their kinds' numbers: kinds, who speaks and whether that is claimed, and how sure."""
+        if trust is None:
+            return 0
+        if trust.regression is not None:
+            raise ir.BeyondError("values that regressions may give")
+        some = sorted(trust.beliefs, key=_kind)
+        kinds = self.put(*map(_kind, some))
+        said = self.put(*(v for each in some for v in (each.speaker, each.claimed)))
+        at = self.num(*(v for each in some for v in (each.probability, each.interval)))
+        mode, function = (0, 0) if trust.latest is None else (trust.latest[0], self._sum(trust.latest[1]))
+        return self.put(len(some), kinds, said, at, trust.lawful, mode, function)
 
     def _feature(self, feature: ir.Feature) -> int:
         kinds = {"": 0, "sin": 1, "cos": 2}
@@ -463,6 +491,11 @@ class _Writer:
             at = self.num(each.value, each.step, each.bound, each.side)
             return self.put(0, each.mode, *self.col(each.column), at)
         return self.put(1, each.mode, *self.col(each.column), self.num(each.value, each.at, each.slack))
+
+
+def _kind(belief: ir.Belief) -> int:
+    """The number of a kind of predictions, as the kernel works it out."""
+    return ((belief.winner * 16 + belief.lead + 2) * 8 + belief.outcome) * 32 + belief.able
 
 
 def _variables(literal: ir.Literal) -> set[int]:

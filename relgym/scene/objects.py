@@ -82,6 +82,21 @@ class SceneLayout:
     def _index(self) -> dict[str, int]:
         return {name: i for i, name in enumerate(self.names)}
 
+    @cached_property
+    def places(self) -> Mapping[tuple[str, str], int]:
+        """Column of each (object, property)."""
+        names = (
+            (name, prop) for name, t in zip(self.names, self.types, strict=True) for prop in t.properties
+        )
+        return {key: column for column, key in enumerate(names)}
+
+    @cached_property
+    def angles(self) -> frozenset[int]:
+        """Columns that hold angles, in radians."""
+        return frozenset(
+            self.places[n, p] for n, t in zip(self.names, self.types, strict=True) for p in t.angles
+        )
+
     @refusing(QueryError)
     def index(self, name: str) -> int:
         """Position of the object of that name; `QueryError` when it is not in the scene."""
@@ -200,9 +215,11 @@ class Scene:
     @refusing(ObservationError)
     def replace(self, changes: Mapping[tuple[str, str], float]) -> Scene:
         """A scene with ``{(object, property): value}`` changed."""
-        vector = self.vector.copy()
-        for (name, prop), value in changes.items():
-            vector[self.layout.column(self.layout.index(name), prop)] = value
+        vector, places = self.vector.copy(), self.layout.places
+        for key, value in changes.items():
+            if (place := places.get(key)) is None:
+                place = self.layout.column(self.layout.index(key[0]), key[1])  # which says what is wrong
+            vector[place] = value
         return Scene(self.schema, self.layout, vector)
 
     def pose(self) -> Float2D:

@@ -178,8 +178,16 @@ class SceneSchema:
             An unknown object, a wrong length, NaN or infinity; the message names object and property.
         """
         layout = self.layout(values)
-        parts = [_checked(name, t, values[name]) for name, t in zip(layout.names, layout.types, strict=True)]
-        return Scene(self, layout, np.concatenate(parts) if parts else np.empty(0))
+        parts = [values[name] for name in layout.names]
+        if not _plain(parts, layout.types):
+            parts = [
+                _checked(name, t, p) for name, t, p in zip(layout.names, layout.types, parts, strict=True)
+            ]
+        vector = np.concatenate(parts) if parts else np.empty(0)
+        if not np.isfinite(vector).all():
+            for name, t, part in zip(layout.names, layout.types, parts, strict=True):
+                _checked(name, t, part)
+        return Scene(self, layout, vector)
 
     def __getstate__(self) -> dict[str, Any]:
         # Cached layouts are rebuilt on demand; leaving them out keeps pickles small and equal.
@@ -187,6 +195,14 @@ class SceneSchema:
 
     def __hash__(self) -> int:
         return hash((self.objects, self.up, self.planar))
+
+
+def _plain(parts: Sequence[Any], types: Sequence[ObjectType]) -> bool:
+    """Whether all are arrays of float64, as long as the types say; `_checked` says what else they are."""
+    return all(
+        type(part) is np.ndarray and part.dtype == np.float64 and part.shape == (len(t.properties),)
+        for part, t in zip(parts, types, strict=True)
+    )
 
 
 def _checked(name: str, t: ObjectType, values: Sequence[float] | Float1D) -> Float1D:

@@ -57,14 +57,40 @@ def test_nothing_is_known_of_what_nobody_looked_back_at() -> None:
 
 
 def test_the_probability_is_the_posterior_mean() -> None:
-    # The whole: (4 + 1/2) / (4 + 1); the cell: (4 + that) / (4 + 1).
-    assert right(4).assess(KEY, values(own=1.0)).probability == pytest.approx((4 + 4.5 / 5) / 5)
+    # All modes: (4 + 1/2) / (4 + 1); the cell: (4 + that) / (4 + 1), if hits come in a share, which has 4 hits with a
+    # probability of 1/2 3/4 5/6 7/8; otherwise, which is as likely to begin with, it is always right.
+    share, chance = (4 + 4.5 / 5) / 5, 35 / 128
+    expected = (share * chance + 1.0) / (chance + 1.0)
+    known = right(4)
+    assert known.assess(KEY, values(own=1.0)).probability == pytest.approx(expected)
+    seen(known, values(own=1.0), 2.0)  # not always right
+    assert known.assess(KEY, values(own=1.0)).probability == pytest.approx((4 + 4.5 / 6) / 6)
+
+
+def test_laws_are_believed_as_far_as_they_describe_what_came_in_fewer_bits() -> None:
+    law, known = Key(0, -1, 7), right(4)
+    assert known.assess(law, values(own=1.0)).probability == 0.5
+    known.vouch(3.0)  # always right by 8 to 1
+    told = known.assess(law, values(own=1.0))
+    assert told.probability == pytest.approx(1.0 - 0.5 / 9.0)
+    assert known.claims(law, told)
+    seen(known, values(own=1.0), 2.0, key=law)
+    assert known.assess(law, values(own=1.0)).probability == pytest.approx(0.25 / 2.0)
 
 
 def test_a_new_kind_of_prediction_begins_with_what_the_others_tell() -> None:
     known = right(50)
     assert known.assess(Key(0, 2, 3), values(own=1.0)).probability == pytest.approx(50.5 / 51)
+    assert known.assess(Key(0, -1, 7), values(own=1.0)).probability == 0.5  # modes say nothing of laws
     assert known.assess(Key(3, 0, 0), values(own=1.0)).probability == 0.5  # nor is another outcome's known
+
+
+def test_a_new_mode_speaks_whoever_was_better_than_those_before_it() -> None:
+    known = Calibration()
+    for k in range(40):
+        seen(known, values(own=5.0 * (-1) ** k, now=0.0), 0.1)
+    assert known.assess(KEY, values(own=5.0)).speaker == PERSISTENCE
+    assert known.assess(Key(0, 2, 3), values(own=5.0)).speaker == OWN
 
 
 @pytest.mark.parametrize(("hits", "misses"), [(100, 3), (500, 2)])
@@ -182,6 +208,34 @@ def test_slips_are_claims_that_were_off() -> None:
     assert known.slips == pytest.approx(1 / 300)
 
 
+def test_claims_are_the_surest_kinds_that_together_are_hardly_ever_off() -> None:
+    known = Calibration(slips=0.01)
+    rng = np.random.default_rng(3)
+    often, seldom = Key(0, 1, 3), Key(0, 2, 3)
+    for k in range(1_000):
+        key = seldom if k % 50 == 0 else often
+        off = rng.random() < (0.05 if key == often else 0.1)
+        seen(known, values(own=1.0), 2.0 if off else 1.0, key=key)
+    sure, rare, common = Key(0, 3, 3), seldom, often
+    for _ in range(10):
+        seen(known, values(own=1.0), 1.0, key=sure)
+    told = {key: known.assess(key, values(own=1.0)) for key in (sure, rare, common)}
+    assert known.claims(sure, told[sure])
+    assert told[common].probability > 0.9
+    assert not known.claims(common, told[common])  # of 1,000 predictions 50 would be off
+    assert not known.claims(sure, told[sure]._replace(speaker=PERSISTENCE))
+
+
+def test_what_does_not_speak_any_more_is_not_held_against_who_does() -> None:
+    known = Calibration(slips=0.001)
+    for k in range(500):
+        seen(known, values(own=1.0), 2.0 if k % 20 == 0 else 1.0)
+    law = Key(0, -1, 7)
+    for _ in range(5):
+        seen(known, values(own=1.0), 1.0, key=law)
+    assert known.claims(law, known.assess(law, values(own=1.0)))
+
+
 def test_angles_are_off_the_short_way_round() -> None:
     known = Calibration()
     for _ in range(20):
@@ -221,7 +275,7 @@ def test_modes_that_are_gone_are_forgotten() -> None:
     for _ in range(20):
         seen(known, values(own=1.0), 1.0, key=Key(0, -2, 7))
     known.keep((2, 3))
-    assert {key.winner for key in known._cells} == {-2, -1}
+    assert {key.winner for key in known._cells if key.lead >= 0} == {-2}
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.1, 0.25, 1.0, 7.9, 1e9, math.inf])

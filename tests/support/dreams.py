@@ -109,6 +109,19 @@ def lost_model() -> WorldModel:
     return recorded(model, [CART_SCHEMA.scene({"cart": [0.0, 1.0]})], spaces.Box(-1.0, 1.0, (1,), np.float32))
 
 
+@cache
+def rough_model() -> WorldModel:
+    """A cart whose velocity no few functions describe: guesses and regressions say what comes."""
+    rng = np.random.default_rng(0)
+    model = WorldModel(CART_SCHEMA, targets=CART_SCHEMA.targets[:2])  # type: ignore[index]
+    for x, v in rng.uniform(-5.0, 5.0, (300, 2)):
+        after = 3.0 * np.sin(v) + 0.1 * x * v
+        before = CART_SCHEMA.scene({"cart": [x, v], ACTION: [0.0], TASK: [0.0, 0.0]})
+        model.learn_one(Transition(before, before.replace({("cart", "x"): x + after, ("cart", "v"): after})))
+    model.finish()
+    return recorded(model, [CART_SCHEMA.scene({"cart": [0.0, 1.0]})], spaces.Box(-1.0, 1.0, (1,), np.float32))
+
+
 class FlatCart(gym.Env[Any, Any]):
     """The cart with flat numbers, x and v."""
 

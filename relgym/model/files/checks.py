@@ -133,9 +133,9 @@ def _check_calibration(body: Body, known: set[str], experts: int) -> None:
             whole = len(cell.squares) == experts > max([cell.speaker, *(who for who, *_ in cell.records)])
             _require(whole, "calibration", f"expected {experts} experts: six, and config.hypotheses")
         _require(
-            all(hits <= trials for _, trials, hits, _, _ in records), "calibration", "more hits than trials"
+            all(hits <= trials for _, trials, hits, *_ in records), "calibration", "more hits than trials"
         )
-        for bins in (calibration.changes, *(record[-1] for record in records)):
+        for bins in (calibration.changes, *(record[4] for record in records)):
             _distinct([place for place, _ in bins], "calibration")
             _require(all(-(1 << 14) <= place < 1 << 12 for place, _ in bins), "calibration", "no such size")
 

@@ -436,13 +436,15 @@ Bins: TypeAlias = list[tuple[int, Weight]]
 class CellRecord(Record):
     """How one kind of predictions came out: its key, who speaks, and of every expert what it left.
 
-    A record is an expert, trials, hits, the run under way and bins of errors; squares are trials, the expert's own and
-    those of saying that nothing changes.
+    A record is an expert, trials, hits, the run under way, bins of errors, and of runs that are over the trials in
+    those of misses and of hits, and how many there were; squares are trials, the expert's own and those of saying that
+    nothing changes.
     """
 
     key: tuple[int, int, int]
     speaker: Expert
-    records: list[tuple[Expert, Weight, Weight, int, Bins]]
+    heard: Weight
+    records: list[tuple[Expert, Weight, Weight, int, Bins, tuple[Weight, Weight, Weight, Weight]]]
     squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6)]
 
 
@@ -451,6 +453,7 @@ class CalibrationRecord(Record):
 
     trials: Count
     slips: tuple[Weight, Weight]
+    vouched: Weight
     changes: Bins
     cells: list[CellRecord]
 

@@ -172,8 +172,8 @@ def _record(part: PropertyModel) -> str:
     if not known.trials or not part.config.abstain:
         return ""
     kinds = list(known.kinds(_PREDICTED))
-    trials = sum(count for count, _ in kinds)
-    sure = sum(count for count, told in kinds if part.claims(told))
+    trials = sum(count for _, count, _ in kinds)
+    sure = sum(count for key, count, told in kinds if part.claims(key, told))
     share = 100.0 * sure / trials if trials else 0.0
     return (
         f"{share:.3g} % of what modes predicted lately is of a kind that is claimed; "

@@ -58,6 +58,8 @@ class Conditions:
 
     def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """The next values on regression rows ``(n, d)``, shape ``(n, len(pairs))``; NaN where an object is missing."""
+        if not self.pairs:
+            return np.empty((len(x), 0))
         columns = self._columns.get(id(signature))
         if columns is None:
             places = [self._place(signature, name, prop) for name, prop in self.pairs]

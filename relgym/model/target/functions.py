@@ -137,6 +137,23 @@ class ModeFunctions:
             played[part] = np.take_along_axis(table.bodies[rows[part]], slots, axis=1)
         return played
 
+    def played_one(self, table: ExampleTable, number: int, mode: int) -> list[int]:
+        """`played` of one example."""
+        if mode == NOISE or not table.signatures[0].types[0].has_body:
+            return []
+        embodied = self.casting.embodied(self.mode(mode))
+        if not embodied:
+            return []
+        row, y = int(self.clusterer.rows[number]), float(self.clusterer.y[number])
+        cluster = self.clusterer.clusters[mode]
+        binding = cluster.binding(table, int(table.signature_ids[row]))
+        chosen = [k for k, role in enumerate(self.mode(mode).open_roles) if role in embodied]
+        if binding is None:
+            return [-1] * len(chosen)
+        _, assignment = cluster.closest_one(table, row, y, self.clusterer.scale)
+        slots = binding.roles_of(assignment)
+        return [int(table.bodies[row, slots[k]]) for k in chosen]
+
     def recast(self, table: ExampleTable, exemplars: Exemplars) -> None:
         """Bind objects anew to the roles of the remembered examples' modes."""
         numbers = exemplars.rows.astype(np.intp)

@@ -118,21 +118,22 @@ def look_back(
     What rests on another property's next value that was off isn't evaluated, since the fault is that one's.
     """
     layout = prediction.scene.layout
+    types = dict(zip(layout.names, layout.types, strict=True))
     targets = {(t.type, t.property): t for t in parts.targets}
+    error, noise = parts.config.claim_error, parts.config.clustering.noise_std
     counts: dict[tuple[str, str], list[int]] = {}
     off: set[tuple[str, str]] = set()
     for part in prediction.parts:
         residual = residuals.get((part.object, part.property))
-        pair = (layout.types[layout.index(part.object)].name, part.property)
+        pair = (types[part.object].name, part.property)
         target = targets.get(pair)
         if residual is None or target is None:
             continue
         came = part.value + residual
         rounding = max(WRONG, precision * max(1.0, abs(came)))
-        turn = 2.0 * math.pi if part.property in layout.types[layout.index(part.object)].angles else 0.0
+        turn = 2.0 * math.pi if part.property in types[part.object].angles else 0.0
         model = parts.models[target]
         if part.audit is not None:
-            error, noise = parts.config.claim_error, parts.config.clustering.noise_std
             if not isinstance(noise, str):  # who says how large the noise is takes it for granted
                 rounding = max(rounding, parts.config.clustering.inlier_stds * noise)
             model.calibration.look_back(
@@ -179,5 +180,8 @@ def restore_calibration(parts: Parts, data: Mapping[str, Any]) -> None:
     for target in parts.targets:
         if str(target) in data:
             parts.models[target].calibration = Calibration.from_json(
-                data[str(target)], parts.config.claim_probability, len(parts.config.hypotheses)
+                data[str(target)],
+                parts.config.claim_probability,
+                parts.config.claim_slips,
+                len(parts.config.hypotheses),
             )

@@ -20,7 +20,7 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
 from relgym.config.constants import HOPELESS
-from relgym.model.calibration import EXPERTS, LATEST, OWN, Assessment, Calibration, Key
+from relgym.model.calibration import EXPERTS, OWN, Assessment, Calibration, Key
 from relgym.model.grouping import distinct, members
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
@@ -116,7 +116,7 @@ class PropertyModel:
         self.stops = Stops()
         self.hindsight = Hindsight()
         self.candidates = Candidates(config.hypotheses)
-        self.calibration = Calibration(config.claim_probability, len(config.hypotheses))
+        self.calibration = Calibration(config.claim_probability, config.claim_slips, len(config.hypotheses))
         self.latest = NOISE
         self.surmise = False
         self.leaned_on = False
@@ -135,7 +135,7 @@ class PropertyModel:
         seen = self.clusterer.seen
         if not self.clusterer.clusters:
             return seen >= HOPELESS
-        return seen >= DOUBTFUL and bool((self.clusterer.labels[-DOUBTFUL:] == NOISE).mean() > 0.5)
+        return seen >= DOUBTFUL and _noisy(self.clusterer.labels[-DOUBTFUL:]) > 0.5
 
     @property
     def needs(self) -> frozenset[tuple[str, str]]:
@@ -168,7 +168,7 @@ class PropertyModel:
         """
         self._compare(situation, example, table.x[row], y)
         report = self.clusterer.learn_one(table, row, y, budget)
-        self._unsettled = float((self.clusterer.labels[-RECENT:] == NOISE).mean()) > LEFT
+        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
@@ -180,13 +180,13 @@ class PropertyModel:
             self._follow(table)
         number = len(self.clusterer.y) - 1
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
-        seen = replace(example, row=number, own=own)
+        seen = example.with_own(own, number)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(
             self.functions.values_one(situation.signature, x[0].tolist(), self.classifier.modes)
         )
         assigned = UNKNOWN if report.mode == NOISE or self.bounds(report.mode) else report.mode
-        played = self.functions.played(table, np.array([number]), report.mode)[0].tolist()
+        played = self.functions.played_one(table, number, report.mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played)
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
@@ -202,7 +202,7 @@ class PropertyModel:
             return
         values = self.functions.values_one(situation.signature, row, self.classifier.modes)
         own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])
-        first = self.classifier.rank(replace(example, own=own), values).modes[0]
+        first = self.classifier.rank(example.with_own(own), values).modes[0]
         said = values[self.classifier.modes.index(first)]
         if np.isfinite(said):
             self.fallback.guesses.compare(said - y, binding.value(row) - y)
@@ -386,31 +386,31 @@ class PropertyModel:
         """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
         return self.record.assess_many(key, values)
 
-    def claims(self, told: Assessment) -> bool:
+    def claims(self, key: Key, told: Assessment) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
-        if self.surmise or (told.speaker not in (OWN, LATEST) and told.speaker < len(EXPERTS)):
-            return False
-        least, slips = self.config.claim_probability, self.config.claim_slips
-        if self.record.slips > slips:
-            least = max(least, 1.0 - slips)
-        return told.probability >= least or not self.record.trials
+        return not self.surmise and self.record.claims(key, told)
 
     @property
     def doubtful(self) -> bool:
         """Whether no kind of its modes' predictions came true often enough to be claimed."""
-        kinds = [told for _, told in self.record.kinds(_PREDICTED)]
-        return bool(kinds) and not any(map(self.claims, kinds))
+        kinds = [(key, told) for key, _, told in self.record.kinds(_PREDICTED)]
+        return bool(kinds) and not any(self.claims(key, told) for key, told in kinds)
+
+    @property
+    def asks_latest(self) -> bool:
+        """Whether the mode that held last is asked: not where the vote's winners are mostly right."""
+        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
+        asked = self.rough or self.record.doubts(_PREDICTED)
+        return known and asked and len(self.classifier.modes) >= 2
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
         """What the mode that held last says of one object of n scenes, shape ``(n,)``; None where nobody asks it.
 
-        Nobody does where the vote's winners are mostly right. NaN where its roles are open.
+        NaN where its roles are open.
         """
-        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
-        asked = self.rough or self.record.doubts(_PREDICTED, self.config.claim_probability)
-        if not known or not asked or len(self.classifier.modes) < 2:
+        if not self.asks_latest:
             return None
         x = percept.rows(index, following, ordered=False)
         return self.functions.values(percept.situation(index).signature, x, (self.latest,))[:, 0]
@@ -453,7 +453,7 @@ class PropertyModel:
         if not self.conditions.pairs:
             return first
         ahead = self.conditions.values(situation.signature, x)[0]
-        return replace(first, own=np.concatenate([first.own, ahead]))
+        return first.with_own(np.concatenate([first.own, ahead]))
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
@@ -676,3 +676,8 @@ class PropertyModel:
         self.stops = Stops.from_json(data.get("stops", {}))
         self.functions.bound.clear()
         self.fallback.bound.clear()
+
+
+def _noisy(labels: NDArray[np.int32]) -> float:
+    """Share of some examples, one at least, that no mode explains."""
+    return float(np.count_nonzero(labels == NOISE)) / len(labels)

@@ -130,6 +130,8 @@ class Stops:
 
     def contradicted(self, assigned: int, signature: SlotSignature, x: NDArray[np.float64]) -> bool:
         """Whether an example, its mode and its regression row ``(d,)``, refutes one of them."""
+        if not self.every:
+            return False
         following = {each.property: _next(signature, x, each.property) for each in self.every}
         if any(each.contradicted(following[each.property]) for each in self.stops):
             return True

@@ -1,0 +1,91 @@
+"""How right a program's predictions were: calibration, written down as a table that kernels and exported Python read.
+
+`relgym.model.calibration` knows the cells that predictions fell into; of each of them, and of every set of experts that
+may have a value there, the table says who speaks, how probably that is right, and whether it is claimed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from relgym.model.parts import Parts
+from relgym.model.perception import Percept, Situation
+from relgym.model.regression import Regression
+from relgym.model.target.property_model import PropertyModel
+from relgym.program import records as ir
+from relgym.scene.objects import SceneLayout
+
+__all__ = ["trusting"]
+
+KINDS = 6
+"""Outcomes before what is known of them is asked: all but `Outcome.UNSURE`."""
+
+
+def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Program:
+    """A program that knows how right its predictions were; the same one where nobody ever looked back.
+
+    Raises
+    ------
+    BeyondError
+        Laws of `ModelConfig.hypotheses` may give values.
+
+    Notes
+    -----
+    Cost: some 10 µs for each cell of each target.
+    """
+    beliefs: dict[tuple[str, str], tuple[ir.Belief, ...]] = {}
+    answers = []
+    for a in program.answers:
+        index = layout.index(a.object)
+        model = parts.property_model(layout.types[index].name, a.property)
+        if not model.calibration.trials:
+            answers.append(a)
+            continue
+        if model.candidates:
+            raise ir.BeyondError("laws of hypothesis classes that were added")
+        latest = _latest(model, a)
+        regression = _regression(parts, layout, index, a) if model.rough and a.component < 0 else None
+        able = 1 | (2 if a.guess is not None or a.beyond is not None else 0)
+        able |= (12 if regression is not None else 0) | (16 if latest is not None else 0)
+        key = layout.types[index].name, a.property
+        if key not in beliefs:
+            beliefs[key] = tuple(_beliefs(model, able))
+        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest, regression)))
+    return replace(program, answers=tuple(answers))
+
+
+def _beliefs(model: PropertyModel, able: int) -> list[ir.Belief]:
+    """What is made of all kinds of predictions, whoever of those who may have a value has one."""
+    some = [bits for bits in range(able + 1) if bits & ~able == 0]
+    return [
+        ir.Belief(*key, bits, told.speaker, told.probability, told.interval, claimed)
+        for key, bits, told, claimed in model.record.table(KINDS, some)
+    ]
+
+
+def _latest(model: PropertyModel, a: ir.Answer) -> tuple[int, ir.Sum] | None:
+    """The mode that held last, if it is asked; None where some role of it is open."""
+    if a.component >= 0 or not model.asks_latest:
+        return None
+    known = next((mode for mode in a.modes if mode.id == model.latest), None)
+    if known is None or known.function is None or known.roles:
+        return None
+    return known.id, known.function
+
+
+def _regression(parts: Parts, layout: SceneLayout, index: int, a: ir.Answer) -> ir.Regression | None:
+    """Least squares of an answer's changes; None while there is nothing."""
+    known: Regression = parts.regressions[layout.types[index].name]
+    if a.property not in known.targets:
+        return None
+    situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)
+    signature = situation.signature
+    gather = parts.perception.gather(layout, signature, tuple(situation.plain.tolist())).tolist()
+    said = known.sums(signature, a.property)
+    if said is None:
+        return None
+    places, centre, scale, weights, bounds = said
+    columns = tuple((gather[p], c, s) for p, c, s in zip(places, centre, scale, strict=True))
+    return ir.Regression(a.column, columns, weights, *bounds)
