@@ -162,6 +162,8 @@ class LawBook:
 
     def _push(self, contacts: Contacts, points: Points, now: FloatArray, motion: Motion) -> None:
         """Let contacts at points act, island by island, in place."""
+        if not len(points):
+            return
         cast = contacts.cast
         moves = np.zeros(len(cast.layout.bodies), dtype=bool)
         moves[list(cast.movers)] = True

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EVIDENCE, LEFT_OPEN
+from relgym.config.constants import LEFT_OPEN
+from relgym.laws.ledger import doubtful
 from relgym.laws.pieces import AxisExamples
 from relgym.laws.records import AxisLaw, Kind, Operator, Piece
 from relgym.laws.selection import AxisFit, fit_axis, refitted
@@ -142,7 +143,11 @@ def _law(fit: AxisFit, examples: AxisExamples, kinds: NDArray[np.intp], names: S
     # Contacts that let go as they should tell nothing of what a contact does.
     free = examples.x[:, examples.names.index(examples.free)]
     acts = ~fit.explained | (np.abs(examples.y - free) > examples.tolerance)
-    doubted = tuple(names[k] for k in present if _doubtful(~fit.explained[acts & (kinds == k)]))
+    doubted = tuple(
+        names[k]
+        for k in present
+        if doubtful(int((~fit.explained[kinds == k]).sum()), int((acts & (kinds == k)).sum()), LEFT_OPEN)
+    )
     # Sides of 0 on which no velocity was ever seen: what ends there would be outside experience.
     signs = (bool((examples.y < -examples.tolerance).any()), bool((examples.y > examples.tolerance).any()))
     unexplained = int((~fit.explained).sum())
@@ -157,12 +162,3 @@ def _law(fit: AxisFit, examples: AxisExamples, kinds: NDArray[np.intp], names: S
         fit.bits,
         doubted,
     )
-
-
-def _doubtful(wrong: NDArray[np.bool_]) -> bool:
-    """Whether so many contacts are unexplained that `EVIDENCE` bits speak against a share of `LEFT_OPEN`."""
-    share = float(wrong.mean()) if len(wrong) else 0.0
-    if share <= LEFT_OPEN:
-        return False
-    right = 0.0 if share == 1.0 else (1.0 - share) * np.log2((1.0 - share) / (1.0 - LEFT_OPEN))
-    return bool(len(wrong) * (share * np.log2(share / LEFT_OPEN) + right) >= EVIDENCE)

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from relgym.config.constants import LEFT_OPEN
+from relgym.config.constants import EVIDENCE, LEFT_OPEN
 
-__all__ = ["SETTLED", "Ledger"]
+__all__ = ["SETTLED", "Ledger", "doubtful"]
+
+
+def doubtful(wrong: int, count: int, share: float) -> bool:
+    """Whether so many of them are wrong that `EVIDENCE` bits speak against a share of at most so much."""
+    if wrong <= share * count:
+        return False
+    missed = wrong / count
+    right = 0.0 if wrong == count else (1.0 - missed) * math.log2((1.0 - missed) / (1.0 - share))
+    return count * (missed * math.log2(missed / share) + right) >= EVIDENCE
+
 
 SETTLED = 500
 """Transitions, with hardly a surprise, after which laws count as settled."""

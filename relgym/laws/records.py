@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -217,6 +217,15 @@ class PairLaw:
         """What the law states: equal for laws that differ in examples and in rounding only."""
         axes = (tuple((law.says(), law.kinds if len(laws) > 1 else ()) for law in laws) for laws in self.axes)
         return self.frame, *axes, *((kind, f"{grip:.9g}") for kind, grip in self.grips)
+
+    def doubting(self, kinds: Collection[Kind]) -> PairLaw:
+        """The same, but that it says nothing of some kinds of contacts."""
+
+        def doubted(law: AxisLaw) -> AxisLaw:
+            more = tuple(kind for kind in law.kinds if kind in kinds and kind not in law.doubted)
+            return replace(law, doubted=law.doubted + more) if more else law
+
+        return replace(self, axes=tuple(tuple(map(doubted, laws)) for laws in self.axes))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""

@@ -64,10 +64,18 @@ class Yields:
 
 
 def eases(inertia: Inertia, contacts: Contacts, columns: Mapping[int, FloatArray]) -> Yields:
-    """How easy bodies are to move and to turn; `columns` are what the laws read of each mover (`Motion`)."""
-    cast, pose = contacts.cast, contacts.pose
+    """How easy bodies are to move and to turn; `columns` are what the laws read of each mover (`Motion`).
+
+    0 for bodies that nothing touches in any scene: nobody asks.
+    """
+    cast, pose, points = contacts.cast, contacts.pose, contacts.points
     light, nimble = np.zeros((2, *pose.shape[:2]))
+    assert points is not None, "only bodies that turn have points"
+    touched = np.zeros(pose.shape[1], dtype=bool)
+    touched[cast.first[points.pair]] = touched[cast.second[points.pair]] = True
     for body in cast.movers:
+        if not touched[body]:
+            continue
         sources = cast.sources[body][0]
         own = {name: columns[body][k] for k, name in enumerate(sources.names) if _inert(sources, name)}
         features = {**own, **shape_features(cast, pose, body)}

@@ -6,7 +6,7 @@ import numpy as np
 
 from relgym.laws.kinds import fit_together
 from relgym.laws.pieces import AxisExamples
-from relgym.laws.records import AxisLaw
+from relgym.laws.records import AxisLaw, PairLaw
 
 
 def test_a_rare_kind_that_a_law_has_wrong_is_doubted(rng: np.random.Generator) -> None:
@@ -22,3 +22,12 @@ def test_a_rare_kind_that_a_law_has_wrong_is_doubted(rng: np.random.Generator) -
     y[201:] = x[201:, 0]  # one exception alone tells nothing of its kind
     (law,) = fit_together(examples, kinds, [("box", "wall"), ("box", "belt")], rng=rng).laws
     assert law.doubted == ()
+
+
+def test_a_law_that_says_nothing_of_a_kind() -> None:
+    law = AxisLaw((), "max", (("box", "wall"), ("box", "belt")), examples=100)
+    pair = PairLaw("point", ((law,), (law,)), 0.0).doubting({("box", "belt"), ("disc", "belt")})
+    for axis in (0, 1):
+        found = pair.law_of(axis, ("box", "belt"))
+        assert found is not None and found.trusted() and not found.trusted(("box", "belt"))
+    assert pair.doubting({("box", "belt")}) == pair
