@@ -15,6 +15,7 @@ from pathlib import Path
 from time import process_time
 from typing import Final
 
+import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +23,7 @@ from relgym.experiments.body_worlds import Setting, body_rooms
 from relgym.experiments.criterion import Measure, measured, one_of, report
 from relgym.experiments.law_score import Section
 from relgym.experiments.law_score import taught as model_of
+from relgym.experiments.plan import Course, Tests
 from relgym.experiments.rooms import Room
 from relgym.laws.book import LawBook
 from relgym.laws.learner import LawLearner
@@ -30,6 +32,7 @@ from relgym.laws.touching import Contacts
 from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
+from relgym.planning import CrossEntropy, PlanningAgent
 from relgym.scene.objects import Float2D, SceneLayout, Transition
 from relgym.scene.relations import Extractor
 
@@ -345,6 +348,29 @@ def _models(seeds: Sequence[int], episodes: int) -> Section:
     return "the whole model", measures, []
 
 
+REAL: Final = 5_000
+"""Real steps from which ``relgym/BoxPush-v0`` is learned, with random actions."""
+
+DELIVERY: Final = Course("push", "BoxPush", "relgym/BoxPush-v0", repeat=10, limit=100)
+"""Where they are delivered: a decision lasts ten steps."""
+
+SEARCH: Final = CrossEntropy(horizon=12, candidates=128, rounds=3)
+"""How plans are made there."""
+
+
+def _planned(seeds: Sequence[int], episodes: int) -> Section:
+    """Parcels delivered by plans in a model that was learned from random actions."""
+    shares = []
+    for seed in seeds:
+        env = gym.make(DELIVERY.env_id, disable_env_checker=True)
+        agent = PlanningAgent(
+            env, task="given", search=SEARCH, repeat=DELIVERY.repeat, random_steps=REAL, seed=seed
+        )
+        agent.learn(REAL)
+        shares.append(100.0 * Tests(DELIVERY, min(100, episodes)).successes(agent) / min(100, episodes))
+    return "planned deliveries", [measured("delivered, % of episodes", 80.0, shares, ">=")], []
+
+
 def _off(
     layout: SceneLayout, parts: Iterable[tuple[str, str]], found: Float2D, after: Float2D
 ) -> NDArray[np.bool_]:
@@ -362,6 +388,7 @@ _SECTIONS: Final[dict[str, Callable[[Sequence[int], int], Section]]] = {
     "forces": _forces,
     "forced": _forced,
     "models": _models,
+    "planned": _planned,
 }
 
 
