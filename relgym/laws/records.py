@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -182,18 +182,34 @@ class PairLaw:
     grips
         In the frame of the points that touch: for each kind with a body that spins, which part of a change along the
         slip direction velocities take. Spins take the rest.
+    surfaces
+        Of bodies that turn: kinds of contacts at which surfaces run, as a conveyor's, and how fast: the velocity along
+        the turned normal at which the first body rests on the second one.
     """
 
     frame: str
     axes: tuple[tuple[AxisLaw, ...], ...]
     bits: float
     grips: tuple[tuple[Kind, float], ...] = ()
+    surfaces: tuple[tuple[Kind, float], ...] = ()
 
     def law_of(self, axis: int, kind: Kind) -> AxisLaw | None:
         """The law for a kind of contact; that of all kinds, if they agree, for one never seen."""
         laws = self.axes[axis]
         known = next((law for law in laws if kind in law.kinds), None)
         return laws[0] if known is None and len(laws) == 1 else known
+
+    def running(self, kinds: Sequence[Kind]) -> NDArray[np.float64]:
+        """Speed of the surfaces at each kind of contacts, shape ``(len(kinds),)``.
+
+        Of a kind never seen to run it is that at which others run on the same body, if they agree; else NaN.
+        """
+        known, found = dict(self.surfaces), []
+        for kind in kinds:
+            same = [known[kind]] if kind in known else [v for (_, b), v in self.surfaces if b == kind[1]]
+            alike = not same or max(same) - min(same) <= ALIKE * abs(same[0])
+            found.append((same[0] if same else 0.0) if alike else math.nan)
+        return np.array(found)
 
     @property
     def examples(self) -> int:
@@ -216,7 +232,10 @@ class PairLaw:
     def says(self) -> tuple[Any, ...]:
         """What the law states: equal for laws that differ in examples and in rounding only."""
         axes = (tuple((law.says(), law.kinds if len(laws) > 1 else ()) for law in laws) for laws in self.axes)
-        return self.frame, *axes, *((kind, f"{grip:.9g}") for kind, grip in self.grips)
+        grips, surfaces = (
+            tuple((kind, f"{value:.9g}") for kind, value in pairs) for pairs in (self.grips, self.surfaces)
+        )
+        return self.frame, *axes, *grips, surfaces
 
     def doubting(self, kinds: Collection[Kind]) -> PairLaw:
         """The same, but that it says nothing of some kinds of contacts."""
@@ -231,14 +250,19 @@ class PairLaw:
         """Plain data that `from_json` reads back."""
         axes = [[law.to_json() for law in laws] for laws in self.axes]
         grips = [[*kind, grip] for kind, grip in self.grips]
-        return {"frame": self.frame, "axes": axes, "bits": self.bits, "grips": grips}
+        data = {"frame": self.frame, "axes": axes, "bits": self.bits, "grips": grips}
+        surfaces = [[*kind, speed] for kind, speed in self.surfaces]
+        return data | ({"surfaces": surfaces} if surfaces else {})
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> PairLaw:
         """Read what `to_json` wrote."""
         axes = tuple(tuple(AxisLaw.from_json(law) for law in laws) for laws in data["axes"])
-        grips = tuple(((str(a), str(b)), float(grip)) for a, b, grip in data["grips"])
-        return cls(str(data["frame"]), axes, float(data["bits"]), grips)
+        grips, surfaces = (
+            tuple(((str(a), str(b)), float(value)) for a, b, value in data.get(name, ()))
+            for name in ("grips", "surfaces")
+        )
+        return cls(str(data["frame"]), axes, float(data["bits"]), grips, surfaces)
 
 
 @dataclass(frozen=True, slots=True)

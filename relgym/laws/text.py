@@ -99,6 +99,9 @@ def law_rows(book: LawBook, types: Iterable[str], digits: int = DIGITS) -> tuple
             sentence.partition(": ") if "over mass" in sentence else sentence.partition(" go as ")
         )
         rows.append(LawRow(subject, statement, book.pair.frame, 0, 0))
+    for (a, b), speed in book.pair.surfaces:
+        statement = f"surfaces run at {speed:.{digits}g} along the turned normal"
+        rows.append(LawRow(f"{a} touching {b}", statement, book.pair.frame, 0, 0))
     for grip, kinds in _grips(book.pair).items():
         statement = f"velocities take {grip:.{digits}g} of the change along t, spins the rest"
         rows.append(LawRow(f"touching {kinds}", statement, book.pair.frame, 0, 0))

@@ -96,6 +96,8 @@ class MotionRules:
             lines.append(
                 f"  of a change along t between {a} and {b}, velocities take {grip:.{digits}g}, spins the rest"
             )
+        for (a, b), speed in self.pair.surfaces if self.pair else ():
+            lines.append(f"  surfaces of {a} on {b} run at {speed:.{digits}g} along the turned normal")
         lines += [f"  {sentence}" for sentence in self.inertia.sentences(digits)]
         if self.pair is not None:
             lines.append(f"  frame: {self.pair.frame}")
@@ -198,6 +200,7 @@ _TURN = re.compile(r"    where that turns the motion to v'_\w (?P<side>[<>]) 0: 
 _DOUBT = re.compile(r"    where (?P<a>\S+) touches (?P<b>\S+): no prediction")
 _SHARE = re.compile(r"  of a change between (\S+) A and (\S+) B, A takes (.*), B the rest")
 _GRIP = re.compile(r"  of a change along t between (\S+) and (\S+), velocities take (\S+), spins the rest")
+_SURFACE = re.compile(r"  surfaces of (\S+) on (\S+) run at (\S+) along the turned normal")
 _MASS = re.compile(r"  masses go as (?P<factors>.*?)(?:; by (?P<by>type|object), times (?P<constants>.*))?")
 _GYRATION = re.compile(r"  moment over mass(?: of (?P<types>.*?))?: (?P<piece>.*)")
 _POWER = re.compile(r"(?P<name>\w+)_B(?:\^(?P<power>\d))? / \(.*\)")
@@ -213,6 +216,7 @@ class _Draft:
     axes: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     shares: list[tuple[Kind, Share]] = field(default_factory=list)
     grips: list[tuple[Kind, float]] = field(default_factory=list)
+    surfaces: list[tuple[Kind, float]] = field(default_factory=list)
     mass: Mass | None = None
     gyrations: list[Gyration] = field(default_factory=list)
     frame: str = "contact"
@@ -264,6 +268,8 @@ class _Draft:
             self.shares.append(((match[1], match[2]), _share(match[3])))
         elif match := _GRIP.fullmatch(line):
             self.grips.append(((match[1], match[2]), number_of(match[3])))
+        elif match := _SURFACE.fullmatch(line):
+            self.surfaces.append(((match[1], match[2]), number_of(match[3])))
         elif match := _MASS.fullmatch(line):
             pairs = [part.rpartition(": ") for part in (match["constants"] or "").split(", ") if part]
             constants = tuple((name, number_of(value)) for name, _, value in pairs)
@@ -302,7 +308,7 @@ def parse_motion(lines: list[str]) -> MotionRules:
     pair = None
     if draft.axes:
         laws = tuple(tuple(_axis_law(each) for each in found) for found in draft.axes.values())
-        pair = PairLaw(draft.frame, laws, 0.0, tuple(draft.grips))
+        pair = PairLaw(draft.frame, laws, 0.0, tuple(draft.grips), tuple(draft.surfaces))
     free = draft.free.items()
     return MotionRules(
         tuple(

@@ -31,3 +31,12 @@ def test_a_law_that_says_nothing_of_a_kind() -> None:
         found = pair.law_of(axis, ("box", "belt"))
         assert found is not None and found.trusted() and not found.trusted(("box", "belt"))
     assert pair.doubting({("box", "belt")}) == pair
+
+
+def test_surfaces_run_alike_for_whoever_touches_them() -> None:
+    belt = PairLaw("point", (), 0.0, surfaces=((("box", "belt"), 0.25), (("disc", "belt"), 0.25)))
+    kinds = [("box", "belt"), ("tee", "belt"), ("box", "wall")]
+    assert belt.running(kinds).tolist() == [0.25, 0.25, 0.0]
+    other = PairLaw("point", (), 0.0, surfaces=((("box", "belt"), 0.25), (("disc", "belt"), 0.5)))
+    assert np.isnan(other.running(kinds)[1])
+    assert PairLaw.from_json(belt.to_json()) == belt

@@ -616,6 +616,9 @@ def _check_pair_law(laws: LearnedLawsRecord, learner: LawLearner) -> None:
             _check_axis(law, known, bodies)
         kinds = [kind for law in each for kind in law.kinds]
         _distinct(kinds, "laws.pair.axes")
+    _require(not pair.surfaces or pair.frame == "point", "laws.pair.surfaces", "expected the frame 'point'")
+    for a, b, _ in pair.surfaces:
+        _require(a in bodies and b in bodies, "laws.pair.surfaces", f"there are no bodies {a!r} and {b!r}")
     for a, b, _ in pair.grips:
         _require(a in bodies and b in bodies, "laws.pair.grips", f"there are no bodies {a!r} and {b!r}")
     if pair.frame == "point":

@@ -528,6 +528,7 @@ class PairLawRecord(Record):
     ]
     bits: Spread
     grips: list[tuple[Name, Name, Finite]]
+    surfaces: list[tuple[Name, Name, Finite]] = []
 
 
 class MassRecord(Record):
