@@ -321,7 +321,7 @@ class LawLearner:
         """
         slack = SPREAD * self.book.tolerance
         with np.errstate(invalid="ignore"):
-            off = ~(np.abs(motion.velocity[:, 0] - after) <= slack).all(axis=0)
+            off = np.asarray(~(np.abs(motion.velocity[:, 0] - after) <= slack).all(axis=0))
         found: set[Kind] = set()
         for pair in touching.tolist():
             bodies = [

@@ -390,7 +390,9 @@ class PushStore:
         if not len(part):
             return None
         seen = _Seen(
-            *(np.stack([a[part] for a in each]) for each in (u, now, after)),
+            np.stack([a[part] for a in u]),
+            np.stack([a[part] for a in now]),
+            np.stack([a[part] for a in after]),
             (gains[1] * impulse[0])[part],
             kinds[part],
             ERRORS * tolerance,
