@@ -187,9 +187,10 @@ class Contacts:
     @classmethod
     def of(cls, cast: Cast, relations: Relations, vectors: NDArray[np.float64]) -> Contacts:
         """Find the contacts of n scenes."""
-        hits, pose = relations.touching(cast.first, cast.second), poses(cast.layout, vectors)
+        pose = poses(cast.layout, vectors)
         if cast.manifolds is None:
-            return cls(cast, relations, pose, hits)
+            return cls(cast, relations, pose, relations.touching(cast.first, cast.second))
+        hits = relations.near(cast.first, cast.second)
         points = find_points(cast.manifolds, pose, hits, cast.first, cast.second)
         met = np.zeros_like(hits)
         met[points.scene, points.pair] = True
