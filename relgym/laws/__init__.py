@@ -32,7 +32,7 @@ is left unsaid. What no free law explains is noise only if it is anew in every s
 pull isn't, and is left unsaid as well.
 
 Bodies that turn may move freely by other laws in other regions (`relgym.laws.regions`): where wind blows, though
-nothing marks the place. Laws are found in blocks of neighbouring examples, and a tree over positions tells where each
+nothing marks the place. Laws are found in stretches of neighbouring examples, and a tree over positions tells where each
 holds; between the last example on one side and the first one on the other nothing is claimed. Their velocity times its
 magnitude is among what free laws read, for drag. What modes say of bodies that turn is never claimed while no law
 governs them: what contacts do to them is no function along the world's axes, and no clause tells when they are touched

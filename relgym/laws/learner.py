@@ -173,7 +173,7 @@ class LawLearner:
         if changed:
             self._restate()
         elif contacts.points is not None:
-            changed |= self._judge(cast, touching, motion, after, stays)
+            changed |= self._check_claims(cast, touching, motion, after, stays)
         single = self._single(cast, touching.tolist(), degree, stays, contacts.points)
         self._count(cast, right, degree, single)
         news = [self._meet(contacts, pair, vector, after, right) for pair in single]
@@ -307,7 +307,7 @@ class LawLearner:
         self._store.add(contacts, pair, vector, after, wrong=wrong)
         return wrong
 
-    def _judge(
+    def _check_claims(
         self,
         cast: Cast,
         touching: NDArray[np.intp],

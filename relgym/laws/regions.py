@@ -1,7 +1,7 @@
 """Free motion that differs from region to region: where wind blows, the same law holds with another constant.
 
 What a body does that touches nothing may depend on where it is, though nothing marks the place. In a region one linear
-law explains everything; which laws there are is found in blocks of neighbouring examples, of which some lie in a single
+law explains everything; which laws there are is found in stretches of neighbouring examples, of which some lie in a single
 region. Then a decision tree over positions tells the regions apart. Between the last example on one side of a boundary
 and the first one on the other nothing is known.
 """
@@ -21,8 +21,8 @@ __all__ = ["find_laws", "find_regions"]
 MOST_LAWS = 4
 
 PARTS = (2, 4, 8)
-"""Numbers of blocks into which examples are cut along an axis. Narrower regions are found once others are explained:
-blocks are cut anew from what is left."""
+"""Numbers of stretches into which examples are cut along an axis. Narrower regions are found once others are explained:
+stretches are cut anew from what is left."""
 
 _Laws = Sequence[tuple[Piece, ...]]
 
@@ -34,7 +34,7 @@ def find_laws(
     *,
     fewest: int,
 ) -> list[tuple[Piece, ...]]:
-    """Laws of which each explains some block of neighbouring examples, those that explain most first.
+    """Laws of which each explains some stretch of neighbouring examples, those that explain most first.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def find_laws(
     place
         Positions, shape ``(n, d)``.
     fewest
-        Examples in a block at least.
+        Examples in a stretch at least.
 
     Notes
     -----
@@ -69,9 +69,9 @@ def _most_telling(
     left: NDArray[np.bool_],
     fewest: int,
 ) -> tuple[Piece, ...] | None:
-    """The law of a block that explains most of what is left."""
+    """The law of a stretch that explains most of what is left."""
     best: tuple[int, tuple[Piece, ...]] | None = None
-    for rows in _blocks(place, np.flatnonzero(left), fewest):
+    for rows in _stretches(place, np.flatnonzero(left), fewest):
         law = fit(rows)
         if law is None:
             continue
@@ -83,11 +83,11 @@ def _most_telling(
     return None if best is None else best[1]
 
 
-def _blocks(place: NDArray[np.float64], rows: NDArray[np.intp], fewest: int) -> Iterator[NDArray[np.intp]]:
+def _stretches(place: NDArray[np.float64], rows: NDArray[np.intp], fewest: int) -> Iterator[NDArray[np.intp]]:
     for parts in PARTS:
         for column in range(place.shape[1]):
             order = rows[np.argsort(place[rows, column], kind="stable")]
-            yield from (block for block in np.array_split(order, parts) if len(block) >= fewest)
+            yield from (stretch for stretch in np.array_split(order, parts) if len(stretch) >= fewest)
 
 
 def find_regions(
