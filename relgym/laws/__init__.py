@@ -32,12 +32,12 @@ is left unsaid. What no free law explains is noise only if it is anew in every s
 pull isn't, and is left unsaid as well.
 
 Bodies that turn may move freely by other laws in other regions (`relgym.laws.regions`): where wind blows, though
-nothing marks the place. Laws are found in stretches of neighbouring examples, and a tree over positions tells where each
-holds; between the last example on one side and the first one on the other nothing is claimed. Their velocity times its
-magnitude is among what free laws read, for drag. What modes say of bodies that turn is never claimed while no law
-governs them: what contacts do to them is no function along the world's axes, and no clause tells when they are touched
-where. Surfaces may run, as a conveyor's: what is stuck to one moves at its speed, and less that speed its contacts
-obey the law of all others.
+nothing marks the place. Laws are found in stretches of neighbouring examples, and a tree over positions tells where
+each holds; between the last example on one side and the first one on the other nothing is claimed. Their velocity
+times its magnitude is among what free laws read, for drag. What modes say of bodies that turn is never claimed while
+no law governs them: what contacts do to them is no function along the world's axes, and no clause tells when they are
+touched where. Surfaces may run, as a conveyor's: what is stuck to one moves at its speed, and less that speed its
+contacts obey the law of all others.
 
 *Composition.* Every contact sees the free motion and what all others do to it; sweeps repeat until nothing changes. A
 ball jammed in a rough wedge would need thousands; they are extrapolated, and where nothing settles nothing is

@@ -1,9 +1,9 @@
 """Free motion that differs from region to region: where wind blows, the same law holds with another constant.
 
-What a body does that touches nothing may depend on where it is, though nothing marks the place. In a region one linear
-law explains everything; which laws there are is found in stretches of neighbouring examples, of which some lie in a single
-region. Then a decision tree over positions tells the regions apart. Between the last example on one side of a boundary
-and the first one on the other nothing is known.
+What a body does that touches nothing may depend on where it is, though nothing marks the place. In a region one
+linear law explains everything; which laws there are is found in stretches of neighbouring examples, of which some lie
+in a single region. Then a decision tree over positions tells the regions apart. Between the last example on one side
+of a boundary and the first one on the other nothing is known.
 """
 
 from __future__ import annotations
