@@ -105,6 +105,11 @@ class LawLearner:
         """
         return type_name in self.book.free and (self.book.pair is not None or self.book.turning)
 
+    @property
+    def contacts_seen(self) -> int:
+        """Number of contacts from which laws could be learned so far."""
+        return self._store.seen
+
     def seen(self, type_name: str) -> int:
         """Number of a type's transitions."""
         return self._ledger.seen(type_name)

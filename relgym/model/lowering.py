@@ -108,8 +108,8 @@ class _Lowering:
         bodies = tuple(self._body(k) for k in range(len(layout.bodies)))
         names = sorted({layout.types[i].name for i in layout.bodies})
         groups = tuple(names.index(layout.types[i].name) for i in layout.bodies)
-        if parts.laws is not None and parts.laws.learner.book.turning:
-            raise ir.BeyondError("bodies that turn: laws at points, and modes that are never claimed")
+        if any(model.surmise for model in parts.models.values()):
+            raise ir.BeyondError("modes that are never claimed")
         motion = self._motion() if parts.laws is not None and parts.laws.governed else None
         answers = tuple(
             self._answer(target, index) for target in parts.targets for index in layout.of_type(target.type)
@@ -202,6 +202,8 @@ class _Lowering:
         if not self.axes.planar:
             raise ir.BeyondError("laws of motion in space")
         book: LawBook = laws.learner.book
+        if book.turning:
+            raise ir.BeyondError("laws at points of bodies that turn")
         cast = book.cast(self.layout)
         movers = tuple(self._mover(book, cast, body) for body in cast.movers)
         engaged = book._engaged_pairs(cast)

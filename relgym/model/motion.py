@@ -77,11 +77,11 @@ class Laws:
 
         What contacts do to bodies that turn depends on where they are touched: that is no function of properties along
         the world's axes, and no clause tells when there is a point of contact. Modes may guess what comes next; how
-        right they are changes with every contact.
+        right they are changes with every contact. Where none was ever seen, modes are as good as elsewhere.
         """
-        book = self.learner.book
-        own = book.sources.get(target.type)
-        return book.turning and own is not None and target.property in own.moving and not self.governs(target)
+        own = self.learner.sources.get(target.type)
+        meets = self.learner.book.turning and self.learner.contacts_seen > 0
+        return meets and own is not None and target.property in own.moving and not self.governs(target)
 
     def mark(self, models: Mapping[Target, PropertyModel]) -> None:
         """Say which models' predictions are not to be claimed (`beyond_modes`)."""

@@ -388,7 +388,9 @@ class PropertyModel:
 
     def claims(self, key: Key, told: Assessment) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
-        return not self.surmise and self.record.claims(key, told)
+        if self.surmise and self.config.abstain:
+            return False
+        return self.record.claims(key, told)
 
     @property
     def doubtful(self) -> bool:
