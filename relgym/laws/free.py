@@ -222,11 +222,13 @@ class FreeLearner:
         x, y = self.store.rows[:, : -self._d], self.store.rows[:, -self._d :]
         left = []
         for k in range(self._d):
+            if not y[:, k].any():
+                continue  # what never moved scatters by nothing
             columns = x[:, list(self.sources.preference(k))]
             start = float(np.abs(y[:, k]).max(initial=0.0)) * 1e-12 + 1e-300
             fit = forward_stepwise(columns, y[:, k], sigma=start, max_terms=MOST_TERMS, eliminate=False)
             left.append(1.4826 * float(np.median(np.abs(y[:, k] - fit.predict(columns)))))
-        return max(left)
+        return max(left, default=0.0)
 
     def to_json(self) -> list[Any]:
         """What further learning needs, but the law and the examples."""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import LEFT_OPEN, ROUNDINGS, STDS
+from relgym.config.constants import LEFT_OPEN, ROUNDINGS, STDS, TOLD
 from relgym.laws.book import SPREAD, LawBook, Motion
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
@@ -178,7 +178,7 @@ class LawLearner:
         if changed:
             self._restate()
         elif contacts.points is not None:
-            changed |= self._check_claims(cast, touching, motion, after, stays)
+            changed |= self._check_claims(cast, touching, motion, vector, after, stays)
         single = self._single(cast, touching.tolist(), degree, stays, contacts.points)
         self._count(cast, right, degree, single)
         news = [self._meet(contacts, pair, vector, after, right) for pair in single]
@@ -317,16 +317,22 @@ class LawLearner:
         cast: Cast,
         touching: NDArray[np.intp],
         motion: Motion,
+        vector: NDArray[np.float64],
         after: NDArray[np.float64],
         stays: Mapping[int, bool],
     ) -> bool:
         """Doubt kinds of contacts of which too many claims were wrong; whether there are more of them now.
 
-        Laws are learned from contacts in one point. How they do where bodies lie flat, or touch others, shows here.
+        Laws are learned from contacts in one point. How they do where bodies lie flat, or touch others, shows here. An
+        engine that hasn't settled is off by little: laws are wrong that are off by a hundredth of what contacts did.
         """
         slack = SPREAD * self.book.tolerance
         with np.errstate(invalid="ignore"):
-            off = np.asarray(~(np.abs(motion.velocity[:, 0] - after) <= slack).all(axis=0))
+            error = np.abs(motion.velocity[:, 0] - after).max(axis=0)
+            off = ~(error <= slack)
+            if off[list(cast.movers)].any():
+                done = np.abs(after - self.book.free_motion(cast, vector[None])[1][:, 0]).max(axis=0)
+                off &= ~(error <= done / TOLD)
         found: set[Kind] = set()
         for pair in touching.tolist():
             bodies = [
