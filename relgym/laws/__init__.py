@@ -31,21 +31,29 @@ settles, nothing is claimed. Without a law of pairs, types that turn are governe
 is left unsaid. What no free law explains is noise only if it is anew in every step (`relgym.laws.drift`): a magnet's
 pull isn't, and is left unsaid as well.
 
+Bodies that turn may move freely by other laws in other regions (`relgym.laws.regions`): where wind blows, though
+nothing marks the place. Laws are found in stretches of neighbouring examples, and a tree over positions tells where
+each holds; between the last example on one side and the first one on the other nothing is claimed. Their velocity
+times its magnitude is among what free laws read, for drag. What modes say of bodies that turn is never claimed while
+no law governs them: what contacts do to them is no function along the world's axes, and no clause tells when they are
+touched where. Surfaces may run, as a conveyor's: what is stuck to one moves at its speed, and less that speed its
+contacts obey the law of all others.
+
 *Composition.* Every contact sees the free motion and what all others do to it; sweeps repeat until nothing changes. A
 ball jammed in a rough wedge would need thousands; they are extrapolated, and where nothing settles nothing is
 claimed. Single contacts teach, the others check.
 
 *Selection.* Frame, pieces, operator and features are those of the shortest description. Types of bodies get laws of
 their own only where that is shorter (materials). Other laws that explain all examples as briefly stay as
-*alternatives*: where they disagree, nothing is predicted. So it is where a law fails on its own examples, and where
-an impulse would turn a body back in a sense in which none was seen to. A law that has no piece for letting go pays
-extra.
+*alternatives*: where they disagree, nothing is predicted. So it is where a law fails on its own examples, or surely on
+those of one kind of contacts (a conveyor among walls), and where an impulse would turn a body back in a sense in which
+none was seen to. A law that has no piece for letting go pays extra.
 
 *Revision.* Contacts are kept raw, at most 3,000; what was news when it came stays longest. When a free law turns out
 to have been over-specific, all that rests on it is derived again.
 
 *Laws or modes?* The model weighs both by description length, each unexplained number once, and lets laws govern a
 type where they are shorter: laws that leave all bounces open may win, and then say nothing of bounces. Without
-contacts there is no law of pairs, and nothing changes. While laws govern and are never wrong, the type's modes rest;
-the first wrong prediction wakes them. ``frames="world"`` is the learner of the thesis.
+contacts there is no law of pairs, and nothing changes. While laws govern and are hardly ever wrong, the type's modes
+rest; wrong predictions in more than 2 % wake them. ``frames="world"`` is the learner of the thesis.
 """

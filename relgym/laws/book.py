@@ -17,7 +17,7 @@ from relgym.laws.impulses import Solved, solve
 from relgym.laws.inertia import Inertia
 from relgym.laws.joints import Joints
 from relgym.laws.points import Points
-from relgym.laws.records import ONE, FreeLaw, Kind, PairLaw, Share
+from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
 from relgym.laws.shares import EXTENT, share_values
 from relgym.laws.text import law_rows
 from relgym.laws.touching import Cast, Contacts, Group
@@ -162,6 +162,8 @@ class LawBook:
 
     def _push(self, contacts: Contacts, points: Points, now: FloatArray, motion: Motion) -> None:
         """Let contacts at points act, island by island, in place."""
+        if not len(points):
+            return
         cast = contacts.cast
         moves = np.zeros(len(cast.layout.bodies), dtype=bool)
         moves[list(cast.movers)] = True
@@ -226,9 +228,8 @@ class LawBook:
             for t in self.schema.types
             if t.parent == parent and (law := self.free.get(t.name)) is not None
         ]
-        stated = {tuple(piece.formula(9) for piece in law.components) for law in kin}
-        read = {name for law in kin for piece in law.components for name, _ in piece.terms if name != ONE}
-        known = read <= set(self.sources[type_name].names)
+        stated = {law.says() for law in kin}
+        known = all(law.reads() <= set(self.sources[type_name].names) for law in kin)
         return kin[0] if parent is not None and len(stated) == 1 and known else None
 
     def on(self, schema: SceneSchema, targets: tuple[Target, ...]) -> LawBook:
@@ -331,7 +332,7 @@ def _chosen(law: PairLaw, kinds: tuple[Kind, ...]) -> NDArray[np.intp]:
     for k, laws in enumerate(law.axes):
         for pair, kind in enumerate(kinds):
             found = law.law_of(k, kind)
-            if found is not None and found.trusted():
+            if found is not None and found.trusted(kind):
                 numbers[k, pair] = laws.index(found)
     return numbers
 

@@ -57,13 +57,20 @@ class Sources:
         Name of the property that is the angular velocity (`spin_of`), if there is one.
     names
         Names of all columns: velocity and spin first, then the type's other properties (the pose left out: laws
-        hold everywhere), then those of bodiless objects, as ``type.property``.
+        hold everywhere), then those of bodiless objects, as ``type.property``; `drag` and `where` last.
+    drag
+        Names of the velocity's components times its magnitude: resistance of the air goes with them. As `where`.
+    where
+        Names of the position's components, by which laws of free motion may differ from region to region. Only where
+        bodies turn: of others modes know regions by their clauses.
     """
 
     type: ObjectType
     velocity: tuple[str, ...]
     spin: str | None
     names: tuple[str, ...]
+    drag: tuple[str, ...] = ()
+    where: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, schema: SceneSchema, t: ObjectType, targets: tuple[Target, ...] = ()) -> Sources:
@@ -75,22 +82,36 @@ class Sources:
         others = [p for p in t.properties if p not in posed and p not in moving]
         single = [b for b in schema.types if not b.has_body and _count(schema, b) == 1]
         outside = [f"{b.name}.{p}" for b in sorted(single, key=_by_name) for p in b.properties]
-        return cls(t, velocity, spin, (*moving, *others, *outside))
+        drag: tuple[str, ...] = ()
+        where: tuple[str, ...] = ()
+        if any(_turns(o, spin_of(schema, o, targets)) for o in vector_types(schema, targets)):
+            columns = t.pose_columns()
+            where = tuple(t.properties[columns[axis]] for axis in Axes.of(schema).used if columns[axis] >= 0)
+            drag = tuple(f"|v|*{name}" for name in velocity)
+        return cls(t, velocity, spin, (*moving, *others, *outside, *drag, *where), drag, where)
 
     @property
     def turns(self) -> bool:
         """Whether the type spins and isn't round: where it is touched depends on how it is turned."""
-        return self.spin is not None and not isinstance(self.type.shape, Sphere)
+        return _turns(self.type, self.spin)
+
+    @property
+    def readable(self) -> tuple[str, ...]:
+        """Columns that functions may read: all but where the body is."""
+        return self.names[: len(self.names) - len(self.where)]
 
     @property
     def moving(self) -> tuple[str, ...]:
         """What laws of motion predict: the velocity's components, then the spin if there is one."""
         return self.velocity if self.spin is None else (*self.velocity, self.spin)
 
-    def places(self, layout: SceneLayout, index: int) -> NDArray[np.intp]:
-        """Where the columns of an object lie in a state vector with NaN appended."""
+    def places(self, layout: SceneLayout, index: int, drag: int = 0) -> NDArray[np.intp]:
+        """Where the columns of an object lie in a state vector with NaN appended, those of `drag` from a place on."""
         places = []
         for name in self.names:
+            if name in self.drag:
+                places.append(drag + self.drag.index(name))
+                continue
             owner, _, prop = name.rpartition(".")
             if not owner:
                 places.append(layout.column(index, name))
@@ -101,7 +122,11 @@ class Sources:
 
     def preference(self, component: int) -> tuple[int, ...]:
         """Columns in the order in which a component's law prefers them: the component itself first."""
-        return (component, *(k for k in range(len(self.names)) if k != component))
+        return (component, *(k for k in range(len(self.readable)) if k != component))
+
+
+def _turns(t: ObjectType, spin: str | None) -> bool:
+    return spin is not None and not isinstance(t.shape, Sphere)
 
 
 def _by_name(t: ObjectType) -> str:

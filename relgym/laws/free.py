@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import LEFT_OPEN
 from relgym.laws.columns import Sources
-from relgym.laws.description import EXCEPTION_BITS, function_bits, piece_bits
-from relgym.laws.records import ONE, FreeLaw, Piece
+from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits
+from relgym.laws.records import ONE, FreeLaw, Piece, Region
+from relgym.laws.regions import find_laws, find_regions
 from relgym.laws.store import Store
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit, forward_stepwise
@@ -32,9 +35,17 @@ _FEW = 3
 
 
 def free_motion(law: FreeLaw, names: tuple[str, ...], x: FloatArray) -> FloatArray:
-    """Next velocities of free objects, shape ``(d, ...)``, from columns ``(len(names), ...)``."""
+    """Next velocities of free objects, shape ``(d, ...)``, from columns ``(len(names), ...)``.
+
+    NaN where two regions meet, as far as that isn't known.
+    """
     columns = dict(zip(names, x, strict=True))
-    return np.stack([piece.values(columns, x[0]) for piece in law.components])
+    found = np.stack([piece.values(columns, x[0]) for piece in law.components])
+    for region in reversed(law.regions):
+        inside, outside = region.where(columns)
+        there = np.stack([piece.values(columns, x[0]) for piece in region.components])
+        found = np.where(inside | (there == found), there, np.where(outside, found, np.nan))
+    return found
 
 
 class FreeLearner:
@@ -105,7 +116,7 @@ class FreeLearner:
         """Learn the law anew from the examples kept; whether it changed."""
         found = self._fitted(tolerance)
         before, self.law = self.law, found
-        return _says(before) != _says(found)
+        return (before and before.says()) != (found and found.says())
 
     def _fitted(self, tolerance: float) -> FreeLaw | None:
         rows = self.store.rows
@@ -115,23 +126,72 @@ class FreeLearner:
         components = tuple(self._component(x, y[:, k], k, tolerance) for k in range(self._d))
         # A spin that follows no law is no reason to have none of the velocity.
         for count in dict.fromkeys((self._d, len(self.sources.velocity))):
-            law = self._law(components[:count], x, y[:, :count], tolerance)
+            law = self._law(components[:count], (), x, y[:, :count], tolerance)
+            # What few constants say of a region, many may say of the bodies that happened to be there.
+            if self.sources.where and law.bits > EXCEPTION_BITS * _FEW:
+                law = min(law, self._regional(x, y[:, :count], tolerance) or law, key=_law_bits)
             if law.unexplained <= (1.0 - EXPLAINS) * len(rows):
                 return law
         return None
 
     def _law(
-        self, components: tuple[Piece, ...], x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float
+        self,
+        components: tuple[Piece, ...],
+        regions: tuple[Region, ...],
+        x: NDArray[np.float64],
+        y: NDArray[np.float64],
+        tolerance: float,
     ) -> FreeLaw:
-        columns = dict(zip(self.sources.names, x.T, strict=True))
-        values = np.stack([piece.values(columns, y[:, 0]) for piece in components], axis=1)
-        wrong = int((np.abs(values - y) > tolerance).any(axis=1).sum())
-        bits = function_bits(components, len(self.sources.names) + 1, len(y))
+        law = FreeLaw(self.sources.type.name, components, regions=regions)
+        off = np.abs(free_motion(law, self.sources.names, x.T).T - y)
+        wrong = int((~(off <= tolerance).all(axis=1)).sum())
+        features = len(self.sources.readable) + 1
+        bits = function_bits(components, features, len(y))
+        for region in regions:
+            bits += function_bits(region.components, features, len(y))
+            bits += len(region.bounds) * (1.0 + np.log2(len(self.sources.where)) + CONSTANT_BITS)
         bits += len(components) * EXCEPTION_BITS * wrong
-        return FreeLaw(self.sources.type.name, components, len(y), wrong, bits)
+        return replace(law, examples=len(y), unexplained=wrong, bits=float(bits))
 
-    def _component(self, x: NDArray[np.float64], y: NDArray[np.float64], k: int, tolerance: float) -> Piece:
+    def _regional(self, x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float) -> FreeLaw | None:
+        """Laws that hold in different regions, if they explain nearly everything."""
+        columns = dict(zip(self.sources.names, x.T, strict=True))
+        count = y.shape[1]
+
+        def fit(rows: NDArray[np.intp]) -> tuple[Piece, ...] | None:
+            pieces = []
+            own = {name: values[rows] for name, values in columns.items()}
+            for k in range(count):
+                piece = self._component(x[rows], y[rows, k], k, tolerance, mixed=False)
+                off = np.abs(piece.values(own, y[rows, k]) - y[rows, k])
+                if (off > tolerance).mean() > LEFT_OPEN:
+                    return None
+                pieces.append(piece)
+            return tuple(pieces)
+
+        def obeys(pieces: tuple[Piece, ...]) -> NDArray[np.bool_]:
+            values = np.stack([piece.values(columns, y[:, 0]) for piece in pieces], axis=1)
+            right = np.asarray((np.abs(values - y) <= tolerance).all(axis=1))
+            return right
+
+        place = x[:, len(self.sources.readable) :]
+        known = [] if self.law is None else [self.law.components, *(r.components for r in self.law.regions)]
+        # What was found before is tried first: more examples mostly move the borders of regions only.
+        for laws in (list(dict.fromkeys(known)), find_laws(fit, obeys, place, fewest=FEWEST)):
+            if len(laws) < 2 or len(laws[0]) != count:
+                continue
+            regions = find_regions(laws, [obeys(law) for law in laws], place, self.sources.where)
+            found = self._law(laws[0], regions, x, y, tolerance)
+            if found.unexplained <= LEFT_OPEN * len(y):
+                return found
+        return None
+
+    def _component(
+        self, x: NDArray[np.float64], y: NDArray[np.float64], k: int, tolerance: float, *, mixed: bool = True
+    ) -> Piece:
         """One component's law: the shortest description among a few forms, the plainest first.
+
+        If examples may be mixed with others, they are told from those.
 
         A body that keeps its velocity, or changes it steadily, is described so as long as that holds; else
         whatever happened to be constant so far (a velocity, say) would stand in for the constant term.
@@ -147,7 +207,7 @@ class FreeLearner:
         least = min(_bits(piece, names, columns, y, tolerance) for piece in forms)
         if least > EXCEPTION_BITS * _FEW:
             fit = forward_stepwise(columns, y, sigma=sigma, max_terms=MOST_TERMS)
-            if np.abs(y - fit.predict(columns)).max() > tolerance:
+            if mixed and np.abs(y - fit.predict(columns)).max() > tolerance:
                 terms = min(len(order), MOST_TERMS)
                 found = consensus(
                     columns, y, sigma=sigma, tolerance=tolerance, terms=terms, size=terms + 3, draws=256,
@@ -162,11 +222,13 @@ class FreeLearner:
         x, y = self.store.rows[:, : -self._d], self.store.rows[:, -self._d :]
         left = []
         for k in range(self._d):
+            if not y[:, k].any():
+                continue  # what never moved scatters by nothing
             columns = x[:, list(self.sources.preference(k))]
             start = float(np.abs(y[:, k]).max(initial=0.0)) * 1e-12 + 1e-300
             fit = forward_stepwise(columns, y[:, k], sigma=start, max_terms=MOST_TERMS, eliminate=False)
             left.append(1.4826 * float(np.median(np.abs(y[:, k] - fit.predict(columns)))))
-        return max(left)
+        return max(left, default=0.0)
 
     def to_json(self) -> list[Any]:
         """What further learning needs, but the law and the examples."""
@@ -177,11 +239,6 @@ class FreeLearner:
         self._news = int(data[0])
         self._rng.bit_generator.state = data[1]
         self.store.restore(data[2], arrays)
-
-
-def _says(law: FreeLaw | None) -> tuple[str, ...] | None:
-    """What a law states, up to rounding."""
-    return None if law is None else tuple(piece.formula(9) for piece in law.components)
 
 
 def _simplest(
@@ -207,6 +264,10 @@ def _bits(
 ) -> float:
     wrong = np.abs(y - piece.values(dict(zip(names, x.T, strict=True)), y)) > tolerance
     return piece_bits(piece, len(names) + 1, len(y)) + EXCEPTION_BITS * float(wrong.sum())
+
+
+def _law_bits(law: FreeLaw) -> float:
+    return law.bits
 
 
 def _power_of_two(n: int) -> bool:

@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import DIGITS, POWERS, TOLD
+from relgym.config.constants import DIGITS, LEFT_OPEN, POWERS, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import ONE, Piece
 from relgym.scene.geometry.vectors import FloatArray, dot
@@ -44,9 +44,6 @@ SQUARE: Final = "shape.r2"
 
 FEWEST = 4
 """Contacts that found a statement about inertia."""
-
-EXPLAINS = 0.98
-"""A statement that explains a smaller share of its contacts is none."""
 
 ROUGHLY = 1e-4
 """Relative error up to which contacts count as obeying a first estimate: then all of them together sharpen it."""
@@ -265,7 +262,7 @@ def find_gyrations(pushes: Pushes, tolerance: float, *, rng: np.random.Generator
         together, cost = _gyration(pushes.of(np.isin(pushes.types, names)), names, tolerance, rng=rng)
         if cost < bits:
             apart = [together]
-    kept = [g for g in apart if g.unexplained <= (1.0 - EXPLAINS) * g.examples]
+    kept = [g for g in apart if g.unexplained <= LEFT_OPEN * g.examples]
     if len(kept) == 1 and len(apart) == 1 and kept[0].piece is not None:
         # Nothing says that it is a matter of the type, unless a constant is part of it.
         general = all(name != ONE for name, _ in kept[0].piece.terms)
@@ -387,7 +384,7 @@ def find_mass(a: Pushes, b: Pushes, tolerance: float) -> Mass | None:
             wrong = int((left > 4.0 * tolerance * np.maximum(*masses)).sum())
             bits = sum(np.log2(max(2, len(shared))) + 2.0 for _ in factors) + EXCEPTION_BITS * wrong
             bits += constant * max(0, len(constants) - 1) + float(bool(by))
-            if wrong <= (1.0 - EXPLAINS) * n and (best is None or bits < best[0] - 1e-6):
+            if wrong <= LEFT_OPEN * n and (best is None or bits < best[0] - 1e-6):
                 best = bits, Mass(factors, by, tuple(sorted(constants.items())), n, wrong)
     return None if best is None else best[1]
 

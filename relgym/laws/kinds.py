@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import LEFT_OPEN
+from relgym.laws.ledger import doubtful
 from relgym.laws.pieces import AxisExamples
 from relgym.laws.records import AxisLaw, Kind, Operator, Piece
 from relgym.laws.selection import AxisFit, fit_axis, refitted
@@ -46,8 +48,7 @@ def fit_together(
         Source of random samples.
     """
     whole = fit_axis(examples, rng=rng)
-    everyone = tuple(names[k] for k in np.unique(kinds).tolist())
-    return KindsFit((_law(whole, everyone, examples),), whole.explained)
+    return KindsFit((_law(whole, examples, kinds, names),), whole.explained)
 
 
 def fit_apart(
@@ -80,9 +81,9 @@ def fit_apart(
         return together
     explained = np.zeros(len(examples), dtype=bool)
     laws = []
-    for fit, members, rows in groups:
+    for fit, _, rows in groups:
         explained[rows] = fit.explained
-        laws.append(_law(fit, tuple(names[k] for k in members), examples.rows(rows)))
+        laws.append(_law(fit, examples.rows(rows), kinds[rows], names))
     apart = KindsFit(tuple(laws), explained)
     naming = float(len(present) * np.log2(len(groups)))
     return apart if apart.bits + naming < together.bits else together
@@ -137,10 +138,27 @@ def _form(operator: Operator, pieces: tuple[Piece, ...]) -> tuple[Operator, tupl
     return operator, tuple(sorted(tuple(name for name, _ in piece.terms) for piece in pieces))
 
 
-def _law(fit: AxisFit, kinds: tuple[Kind, ...], examples: AxisExamples) -> AxisLaw:
+def _law(fit: AxisFit, examples: AxisExamples, kinds: NDArray[np.intp], names: Sequence[Kind]) -> AxisLaw:
+    present = np.unique(kinds).tolist()
+    # Contacts that let go as they should tell nothing of what a contact does.
+    free = examples.x[:, examples.names.index(examples.free)]
+    acts = ~fit.explained | (np.abs(examples.y - free) > examples.tolerance)
+    doubted = tuple(
+        names[k]
+        for k in present
+        if doubtful(int((~fit.explained[kinds == k]).sum()), int((acts & (kinds == k)).sum()), LEFT_OPEN)
+    )
     # Sides of 0 on which no velocity was ever seen: what ends there would be outside experience.
     signs = (bool((examples.y < -examples.tolerance).any()), bool((examples.y > examples.tolerance).any()))
     unexplained = int((~fit.explained).sum())
     return AxisLaw(
-        fit.pieces, fit.operator, kinds, fit.alternatives, signs, len(examples), unexplained, fit.bits
+        fit.pieces,
+        fit.operator,
+        tuple(names[k] for k in present),
+        fit.alternatives,
+        signs,
+        len(examples),
+        unexplained,
+        fit.bits,
+        doubted,
     )

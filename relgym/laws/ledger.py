@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-__all__ = ["SETTLED", "Ledger"]
+from relgym.config.constants import EVIDENCE, LEFT_OPEN
+
+__all__ = ["SETTLED", "Ledger", "doubtful"]
+
+
+def doubtful(wrong: int, count: int, share: float) -> bool:
+    """Whether so many of them are wrong that `EVIDENCE` bits speak against a share of at most so much."""
+    if wrong <= share * count:
+        return False
+    missed = wrong / count
+    right = 0.0 if wrong == count else (1.0 - missed) * math.log2((1.0 - missed) / (1.0 - share))
+    return count * (missed * math.log2(missed / share) + right) >= EVIDENCE
+
 
 SETTLED = 500
-"""Transitions without a surprise after which laws count as settled."""
+"""Transitions, with hardly a surprise, after which laws count as settled."""
 
 
 @dataclass(slots=True)
@@ -65,9 +78,9 @@ class Ledger:
         return self._tallies[type_name].unlearned
 
     def settled(self, type_name: str) -> bool:
-        """Whether the laws have long been as they are, and never wrong since."""
+        """Whether the laws have long been as they are, and wrong no more often since than laws may be (`LEFT_OPEN`)."""
         tally = self._tallies[type_name]
-        return tally.wrong == 0 and tally.since >= SETTLED
+        return tally.since >= SETTLED and tally.wrong <= LEFT_OPEN * tally.since
 
     def to_json(self) -> list[list[str | int]]:
         """Plain data that `restore` reads back."""

@@ -3,17 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relgym.clustering.mode import sum_text
-from relgym.config.constants import DIGITS
+from relgym.config.constants import DIGITS, LEFT_OPEN
 from relgym.scene.geometry.vectors import FloatArray
 
-__all__ = ["ONE", "ZERO", "AxisLaw", "FreeLaw", "Kind", "Operator", "PairLaw", "Piece", "Share"]
+__all__ = [
+    "ONE",
+    "ZERO",
+    "AxisLaw",
+    "Bound",
+    "FreeLaw",
+    "Kind",
+    "Operator",
+    "PairLaw",
+    "Piece",
+    "Region",
+    "Share",
+]
 
 _KEY = "rivals"  # of alternatives in files
 ONE = "1"
@@ -84,6 +97,8 @@ class AxisLaw:
         Of these kinds, among the stored contacts.
     bits
         Description length, the unexplained examples included.
+    doubted
+        Kinds of contacts of which it leaves surely more unexplained than a law may: rare ones don't show among all.
     """
 
     pieces: tuple[Piece, ...]
@@ -94,6 +109,7 @@ class AxisLaw:
     examples: int = 0
     unexplained: int = 0
     bits: float = 0.0
+    doubted: tuple[Kind, ...] = ()
 
     def values(self, features: Mapping[str, FloatArray], like: FloatArray) -> FloatArray:
         """Velocity after the contact along the axis."""
@@ -108,11 +124,11 @@ class AxisLaw:
         """Operator and pieces of the law and of its alternatives, weights to nine digits, and what it has seen."""
         forms = ((self.operator, self.pieces), *self.alternatives)
         stated = tuple((o, tuple(piece.formula(9) for piece in pieces)) for o, pieces in forms)
-        return stated, self.signs, self.trusted()
+        return stated, self.signs, self.trusted(), self.doubted
 
-    def trusted(self) -> bool:
-        """Whether it explains nearly all of its own examples: what it doesn't, it must not claim."""
-        return self.unexplained <= 0.02 * self.examples
+    def trusted(self, kind: Kind | None = None) -> bool:
+        """Whether it explains nearly all of its own examples (of a kind): what it doesn't, it must not claim."""
+        return self.unexplained <= LEFT_OPEN * self.examples and kind not in self.doubted
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
@@ -125,7 +141,7 @@ class AxisLaw:
             "examples": self.examples,
             "unexplained": self.unexplained,
             "bits": self.bits,
-        }
+        } | ({"doubted": [list(kind) for kind in self.doubted]} if self.doubted else {})
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> AxisLaw:
@@ -139,6 +155,7 @@ class AxisLaw:
             int(data["examples"]),
             int(data["unexplained"]),
             float(data["bits"]),
+            tuple((str(a), str(b)) for a, b in data.get("doubted", ())),
         )
 
 
@@ -165,18 +182,34 @@ class PairLaw:
     grips
         In the frame of the points that touch: for each kind with a body that spins, which part of a change along the
         slip direction velocities take. Spins take the rest.
+    surfaces
+        Of bodies that turn: kinds of contacts at which surfaces run, as a conveyor's, and how fast: the velocity along
+        the turned normal at which the first body rests on the second one.
     """
 
     frame: str
     axes: tuple[tuple[AxisLaw, ...], ...]
     bits: float
     grips: tuple[tuple[Kind, float], ...] = ()
+    surfaces: tuple[tuple[Kind, float], ...] = ()
 
     def law_of(self, axis: int, kind: Kind) -> AxisLaw | None:
         """The law for a kind of contact; that of all kinds, if they agree, for one never seen."""
         laws = self.axes[axis]
         known = next((law for law in laws if kind in law.kinds), None)
         return laws[0] if known is None and len(laws) == 1 else known
+
+    def running(self, kinds: Sequence[Kind]) -> NDArray[np.float64]:
+        """Speed of the surfaces at each kind of contacts, shape ``(len(kinds),)``.
+
+        Of a kind never seen to run it is that at which others run on the same body, if they agree; else NaN.
+        """
+        known, found = dict(self.surfaces), []
+        for kind in kinds:
+            same = [known[kind]] if kind in known else [v for (_, b), v in self.surfaces if b == kind[1]]
+            alike = not same or max(same) - min(same) <= ALIKE * abs(same[0])
+            found.append((same[0] if same else 0.0) if alike else math.nan)
+        return np.array(found)
 
     @property
     def examples(self) -> int:
@@ -199,20 +232,37 @@ class PairLaw:
     def says(self) -> tuple[Any, ...]:
         """What the law states: equal for laws that differ in examples and in rounding only."""
         axes = (tuple((law.says(), law.kinds if len(laws) > 1 else ()) for law in laws) for laws in self.axes)
-        return self.frame, *axes, *((kind, f"{grip:.9g}") for kind, grip in self.grips)
+        grips, surfaces = (
+            tuple((kind, f"{value:.9g}") for kind, value in pairs) for pairs in (self.grips, self.surfaces)
+        )
+        return self.frame, *axes, *grips, surfaces
+
+    def doubting(self, kinds: Collection[Kind]) -> PairLaw:
+        """The same, but that it says nothing of some kinds of contacts."""
+
+        def doubted(law: AxisLaw) -> AxisLaw:
+            more = tuple(kind for kind in law.kinds if kind in kinds and kind not in law.doubted)
+            return replace(law, doubted=law.doubted + more) if more else law
+
+        return replace(self, axes=tuple(tuple(map(doubted, laws)) for laws in self.axes))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
         axes = [[law.to_json() for law in laws] for laws in self.axes]
         grips = [[*kind, grip] for kind, grip in self.grips]
-        return {"frame": self.frame, "axes": axes, "bits": self.bits, "grips": grips}
+        data = {"frame": self.frame, "axes": axes, "bits": self.bits, "grips": grips}
+        surfaces = [[*kind, speed] for kind, speed in self.surfaces]
+        return data | ({"surfaces": surfaces} if surfaces else {})
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> PairLaw:
         """Read what `to_json` wrote."""
         axes = tuple(tuple(AxisLaw.from_json(law) for law in laws) for laws in data["axes"])
-        grips = tuple(((str(a), str(b)), float(grip)) for a, b, grip in data["grips"])
-        return cls(str(data["frame"]), axes, float(data["bits"]), grips)
+        grips, surfaces = (
+            tuple(((str(a), str(b)), float(value)) for a, b, value in data.get(name, ()))
+            for name in ("grips", "surfaces")
+        )
+        return cls(str(data["frame"]), axes, float(data["bits"]), grips, surfaces)
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,14 +290,101 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True)
+class Bound:
+    """A test of one component of a position. Between `low` and `high` nothing was seen, and nothing is known.
+
+    Attributes
+    ----------
+    name
+        The component.
+    above
+        Whether it holds from `high` on, or else up to `low`.
+    low, high
+        The last number seen on the one side, and the first one on the other.
+    """
+
+    name: str
+    above: bool
+    low: float
+    high: float
+
+    def text(self, digits: int = DIGITS) -> str:
+        """Such as ``px >= 0.003 (else px <= -0.001)``."""
+        low, high = (
+            f"{self.name} {sign} {value:.{digits}g}" for sign, value in (("<=", self.low), (">=", self.high))
+        )
+        return f"{high} (else {low})" if self.above else f"{low} (else {high})"
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Where another free law holds: where all bounds do."""
+
+    bounds: tuple[Bound, ...]
+    components: tuple[Piece, ...]
+
+    def text(self, digits: int = DIGITS) -> str:
+        """Such as ``px >= 0.003 (else px <= -0.001)``, its bounds joined by ``and``."""
+        return " and ".join(bound.text(digits) for bound in self.bounds)
+
+    def where(self, columns: Mapping[str, FloatArray]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether bodies are surely inside, and surely outside."""
+        shape = columns[self.bounds[0].name].shape
+        inside, outside = np.ones(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
+        for bound in self.bounds:
+            value = columns[bound.name]
+            below, beyond = value <= bound.low, value >= bound.high
+            inside = inside & (beyond if bound.above else below)
+            outside = outside | (below if bound.above else beyond)
+        return inside, outside
+
+
+@dataclass(frozen=True, slots=True)
 class FreeLaw:
-    """The next velocity of an object that touches nothing, along each world axis."""
+    """The next velocity of an object that touches nothing, along each world axis.
+
+    Attributes
+    ----------
+    type
+        The type of the objects.
+    components
+        A function for each component of the velocity, and for the spin if it is known.
+    examples, unexplained, bits
+        Examples that it was learned from, those that it doesn't explain, and description length.
+    regions
+        Where others hold; the first one counts.
+    """
 
     type: str
     components: tuple[Piece, ...]
     examples: int = 0
     unexplained: int = 0
     bits: float = 0.0
+    regions: tuple[Region, ...] = ()
+
+    def first(self, count: int) -> FreeLaw:
+        """The law of the first components alone."""
+        regions = tuple(replace(region, components=region.components[:count]) for region in self.regions)
+        return replace(self, components=self.components[:count], regions=regions)
+
+    def at(self, columns: Mapping[str, FloatArray]) -> tuple[Piece, ...]:
+        """The functions that hold for a single body; those that hold elsewhere where that isn't known."""
+        there = (region.components for region in self.regions if region.where(columns)[0].all())
+        return next(there, self.components)
+
+    def says(self) -> tuple[Any, ...]:
+        """What is stated, up to rounding and to where exactly regions end."""
+        regions = tuple(
+            (tuple((b.name, b.above) for b in region.bounds), _formulas(region.components))
+            for region in self.regions
+        )
+        return _formulas(self.components), regions
+
+    def reads(self) -> frozenset[str]:
+        """Names of all columns that it reads."""
+        pieces = [*self.components, *(piece for region in self.regions for piece in region.components)]
+        bounds = (bound.name for region in self.regions for bound in region.bounds)
+        return frozenset({name for piece in pieces for name, _ in piece.terms if name != ONE}.union(bounds))
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
@@ -257,13 +394,28 @@ class FreeLaw:
             "examples": self.examples,
             "unexplained": self.unexplained,
             "bits": self.bits,
-        }
+        } | ({"regions": [_region_to_json(region) for region in self.regions]} if self.regions else {})
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> FreeLaw:
         """Read what `to_json` wrote."""
         numbers = (int(data["examples"]), int(data["unexplained"]), float(data["bits"]))
-        return cls(str(data["type"]), _pieces_from_json(data["components"]), *numbers)
+        regions = tuple(_region_from_json(region) for region in data.get("regions", ()))
+        return cls(str(data["type"]), _pieces_from_json(data["components"]), *numbers, regions)
+
+
+def _formulas(pieces: tuple[Piece, ...]) -> tuple[str, ...]:
+    return tuple(piece.formula(9) for piece in pieces)
+
+
+def _region_to_json(region: Region) -> dict[str, Any]:
+    bounds = [[b.name, b.above, b.low, b.high] for b in region.bounds]
+    return {"bounds": bounds, "components": _pieces_to_json(region.components)}
+
+
+def _region_from_json(data: Mapping[str, Any]) -> Region:
+    bounds = tuple(Bound(str(n), bool(a), float(low), float(high)) for n, a, low, high in data["bounds"])
+    return Region(bounds, _pieces_from_json(data["components"]))
 
 
 def _pieces_to_json(pieces: tuple[Piece, ...]) -> list[Any]:

@@ -99,6 +99,9 @@ def law_rows(book: LawBook, types: Iterable[str], digits: int = DIGITS) -> tuple
             sentence.partition(": ") if "over mass" in sentence else sentence.partition(" go as ")
         )
         rows.append(LawRow(subject, statement, book.pair.frame, 0, 0))
+    for (a, b), speed in book.pair.surfaces:
+        statement = f"surfaces run at {speed:.{digits}g} along the turned normal"
+        rows.append(LawRow(f"{a} touching {b}", statement, book.pair.frame, 0, 0))
     for grip, kinds in _grips(book.pair).items():
         statement = f"velocities take {grip:.{digits}g} of the change along t, spins the rest"
         rows.append(LawRow(f"touching {kinds}", statement, book.pair.frame, 0, 0))
@@ -117,9 +120,11 @@ def _grips(law: PairLaw) -> dict[float, str]:
 def _free_rows(book: LawBook, name: str, digits: int) -> Iterator[LawRow]:
     if (law := book.free.get(name)) is None:
         return
-    pairs = zip(book.components(name), law.components, strict=False)
-    statement = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
-    yield LawRow(f"{name} touching nothing", statement, "world", law.examples, law.unexplained)
+    for where, components in (("", law.components), *((r.text(digits), r.components) for r in law.regions)):
+        pairs = zip(book.components(name), components, strict=False)
+        statement = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
+        subject = f"{name} touching nothing" + (f", where {where}" if where else "")
+        yield LawRow(subject, statement, "world", law.examples, law.unexplained)
 
 
 def _names(kinds: tuple[Kind, ...]) -> str:

@@ -93,8 +93,13 @@ class Cast:
             layout,
             movers,
             {
-                k: (sources[types[k].name], sources[types[k].name].places(layout, layout.bodies[k]))
-                for k in movers
+                k: (
+                    sources[types[k].name],
+                    sources[types[k].name].places(
+                        layout, layout.bodies[k], layout.width + 2 + number * len(axes.used)
+                    ),
+                )
+                for number, k in enumerate(movers)
             },
             first,
             second,
@@ -112,9 +117,17 @@ class Cast:
         return len(self.axes.used)
 
     def padded(self, vectors: NDArray[np.float64]) -> FloatArray:
-        """State vectors, columns first, with NaN and 0 behind them, shape ``(width + 2, n)``."""
+        """State vectors, columns first, with NaN and 0 behind them, shape ``(width + 2, n)``.
+
+        Where bodies turn, each mover's velocity times its magnitude follows.
+        """
         n = len(vectors)
-        return np.concatenate([vectors.T, np.full((1, n), np.nan), np.zeros((1, n))])
+        whole = np.concatenate([vectors.T, np.full((1, n), np.nan), np.zeros((1, n))])
+        if self.manifolds is None:
+            return whole
+        velocity = whole[self.velocities[: self.dimensions, list(self.movers)]]  # (d, movers, n)
+        dragged = (norm(velocity) * velocity).transpose(1, 0, 2).reshape(-1, n)
+        return np.concatenate([whole, dragged])
 
 
 def _geometry(
@@ -174,9 +187,10 @@ class Contacts:
     @classmethod
     def of(cls, cast: Cast, relations: Relations, vectors: NDArray[np.float64]) -> Contacts:
         """Find the contacts of n scenes."""
-        hits, pose = relations.touching(cast.first, cast.second), poses(cast.layout, vectors)
+        pose = poses(cast.layout, vectors)
         if cast.manifolds is None:
-            return cls(cast, relations, pose, hits)
+            return cls(cast, relations, pose, relations.touching(cast.first, cast.second))
+        hits = relations.near(cast.first, cast.second)
         points = find_points(cast.manifolds, pose, hits, cast.first, cast.second)
         met = np.zeros_like(hits)
         met[points.scene, points.pair] = True

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CONTACTS_KEPT
+from relgym.config.constants import CONTACTS_KEPT, TOLD
 from relgym.laws.columns import Sources
-from relgym.laws.description import EXCEPTION_BITS
+from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.frames import POINT, axis_names, turned
 from relgym.laws.free import free_motion
 from relgym.laws.impulses import Rows, Solved, table_of
-from relgym.laws.inertia import AREA, SQUARE, Inertia, Pushes, find_gyrations, find_mass, ratios
+from relgym.laws.inertia import AREA, FEWEST, SQUARE, Inertia, Pushes, find_gyrations, find_mass, ratios
 from relgym.laws.kinds import fit_apart, fit_together
 from relgym.laws.pair import PairFit
 from relgym.laws.pieces import AxisExamples
@@ -64,10 +64,18 @@ class Yields:
 
 
 def eases(inertia: Inertia, contacts: Contacts, columns: Mapping[int, FloatArray]) -> Yields:
-    """How easy bodies are to move and to turn; `columns` are what the laws read of each mover (`Motion`)."""
-    cast, pose = contacts.cast, contacts.pose
+    """How easy bodies are to move and to turn; `columns` are what the laws read of each mover (`Motion`).
+
+    0 for bodies that nothing touches in any scene: nobody asks.
+    """
+    cast, pose, points = contacts.cast, contacts.pose, contacts.points
     light, nimble = np.zeros((2, *pose.shape[:2]))
+    assert points is not None, "only bodies that turn have points"
+    touched = np.zeros(pose.shape[1], dtype=bool)
+    touched[cast.first[points.pair]] = touched[cast.second[points.pair]] = True
     for body in cast.movers:
+        if not touched[body]:
+            continue
         sources = cast.sources[body][0]
         own = {name: columns[body][k] for k, name in enumerate(sources.names) if _inert(sources, name)}
         features = {**own, **shape_features(cast, pose, body)}
@@ -102,7 +110,7 @@ def _squared(features: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 
 def _inert(sources: Sources, name: str) -> bool:
     """Whether a column is a body's own and no velocity."""
-    return "." not in name and name not in sources.moving
+    return "." not in name and name not in (*sources.moving, *sources.drag, *sources.where)
 
 
 # ------------------------------------------------------------------ what points do
@@ -154,6 +162,9 @@ def rows_of(
         velocities.append(
             np.concatenate([dot(relative, points.normal), dot(relative, turned(points.normal))], axis=1)
         )
+    if law.surfaces:
+        running = np.concatenate([np.zeros((m, c)), law.running(cast.kinds)[points.pair]], axis=1)
+        velocities = [each - running for each in velocities]
     numbers = chosen[:, points.pair]
     tables, signs = _tables(law, numbers)
     known = (numbers >= 0).all(axis=(0, 2)) & np.isfinite(gain).all(axis=(1, 2))
@@ -378,28 +389,50 @@ class PushStore:
         part = np.flatnonzero(np.isfinite(np.stack([*u, *after, *now, *gains])).all(axis=0))
         if not len(part):
             return None
+        seen = _Seen(
+            np.stack([a[part] for a in u]),
+            np.stack([a[part] for a in now]),
+            np.stack([a[part] for a in after]),
+            (gains[1] * impulse[0])[part],
+            kinds[part],
+            ERRORS * tolerance,
+        )
+        found = self._stated(seen, {}, rng=rng)
+        moving = {} if found.explained.all() else _running(seen, found.explained, self.kinds)
+        if moving:
+            other = self._stated(seen, moving, rng=rng)
+            cost = len(moving) * (CONSTANT_BITS + 0.5 * float(np.log2(len(part))))
+            if other.law.bits + cost < found.law.bits:
+                surfaces = tuple((self.kinds[k], speed) for k, speed in sorted(moving.items()))
+                law = replace(other.law, bits=other.law.bits + cost, surfaces=surfaces)
+                found = PairFit(law, other.explained)
+        whole = np.zeros(len(kinds), dtype=bool)
+        whole[part] = found.explained
+        bits = found.law.bits + EXCEPTION_BITS * 2.0 * (len(kinds) - len(part))
+        return PairFit(replace(found.law, bits=bits), whole)
+
+    def _stated(self, seen: _Seen, moving: Mapping[int, float], *, rng: np.random.Generator) -> PairFit:
+        """The laws of both axes, where the surfaces of some kinds of contacts run at some speed."""
+        speed = np.zeros(len(seen.kinds))
+        for kind, value in moving.items():
+            speed[seen.kinds == kind] = value
+        u, now, after = (np.stack([a[0], a[1] - speed]) for a in (seen.free, seen.now, seen.after))
         sense = np.where(u[1] < 0.0, -1.0, 1.0)
-        values = {
+        rows = {
             "u_n": u[0], "v_n": now[0], "u_t": sense * u[1], "v_t": sense * now[1],
-            "J_n": gains[1] * impulse[0], ONE: np.ones(len(kinds)),
+            "J_n": seen.push, ONE: np.ones(len(speed)),
         }  # fmt: skip
-        rows = {name: value[part] for name, value in values.items()}
         order = (("u_n", "v_n", "u_t", "v_t", ONE), ("u_t", "v_t", "u_n", "v_n", "J_n", ONE))
-        wanted = (after[0][part], (sense * after[1])[part])
-        laws, explained, bits = [], np.ones(len(part), dtype=bool), 0.0
-        for names, y in zip(order, wanted, strict=True):
-            examples = AxisExamples(
-                names, np.stack([rows[n] for n in names], axis=1), y, names[0], ERRORS * tolerance
-            )
-            together = fit_together(examples, kinds[part], self.kinds, rng=rng)
-            fit = fit_apart(examples, kinds[part], self.kinds, together, np.inf, rng=rng)
+        laws, explained, bits = [], np.ones(len(speed), dtype=bool), 0.0
+        for names, y in zip(order, (after[0], sense * after[1]), strict=True):
+            x = np.stack([rows[n] for n in names], axis=1)
+            examples = AxisExamples(names, x, y, names[0], seen.tolerance)
+            together = fit_together(examples, seen.kinds, self.kinds, rng=rng)
+            fit = fit_apart(examples, seen.kinds, self.kinds, together, np.inf, rng=rng)
             laws.append(fit.laws)
             explained &= fit.explained
             bits += fit.bits
-        whole = np.zeros(len(kinds), dtype=bool)
-        whole[part] = explained
-        bits += EXCEPTION_BITS * 2.0 * (len(kinds) - len(part))
-        return PairFit(PairLaw(POINT, tuple(laws), bits), whole)
+        return PairFit(PairLaw(POINT, tuple(laws), bits), explained)
 
     def _sides(
         self, free: Mapping[str, FreeLaw], inertia: Inertia, kinds: NDArray[np.intp]
@@ -472,6 +505,49 @@ class PushStore:
         self.kinds = [(str(a), str(b)) for a, b in data["kinds"]]
         self.objects = [str(name) for name in data.get("objects", [])]
         self._store.restore(data["store"], arrays)
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Contacts as laws see them: velocities along normal and tangent, shape ``(2, n)``, and what the normal push does.
+
+    Attributes
+    ----------
+    free, now, after
+        Without each row's own impulse, before, and after; the tangent isn't turned to the slip.
+    push
+        What the normal impulse would change along the tangent, shape ``(n,)``.
+    kinds
+        Number of each contact's kind, shape ``(n,)``.
+    tolerance
+        Largest residual of an explained velocity.
+    """
+
+    free: FloatArray
+    now: FloatArray
+    after: FloatArray
+    push: FloatArray
+    kinds: NDArray[np.intp]
+    tolerance: float
+
+
+def _running(seen: _Seen, explained: NDArray[np.bool_], names: Sequence[Kind]) -> dict[int, float]:
+    """Speeds at which the surfaces of some kinds of contacts seem to run: what sticks to them moves at that speed.
+
+    Where contacts with a type of bodies are unexplained it is the velocity along the tangent that most of them end at.
+    """
+    found: dict[int, float] = {}
+    for surface in sorted({names[k][1] for k in np.unique(seen.kinds[~explained]).tolist()}):
+        own = [k for k in np.unique(seen.kinds).tolist() if names[k][1] == surface]
+        ends = np.sort(seen.after[1][np.isin(seen.kinds, own) & (np.abs(seen.push) > seen.tolerance)])
+        if not len(ends):
+            continue
+        alike = np.searchsorted(ends, ends + seen.tolerance, side="right") - np.arange(len(ends))
+        first, count = int(alike.argmax()), int(alike.max())
+        speed = float(np.median(ends[first : first + count]))
+        if count >= FEWEST and abs(speed) > TOLD * seen.tolerance:
+            found |= dict.fromkeys(own, speed)
+    return found
 
 
 def _joined(parts: Sequence[Pushes]) -> Pushes:

@@ -62,7 +62,7 @@ def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes:
     things += (known.scope, model.limits, model.stops, model.spreads, model.conditions, known.guess)
     things += (known.guess_beyond, classifier.vocabulary, *classifier.classifiers)
     things += [cluster.mode for cluster in clusterer.clusters.values()]
-    numbers += (tuple(clusterer.clusters), classifier.modes, clusterer.approximate)
+    numbers += (tuple(clusterer.clusters), classifier.modes, clusterer.approximate, model.surmise)
     if not votes:
         return
     numbers += (model.undecided, model.lost, model.latest if model.lost else NOISE)

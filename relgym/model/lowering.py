@@ -108,6 +108,8 @@ class _Lowering:
         bodies = tuple(self._body(k) for k in range(len(layout.bodies)))
         names = sorted({layout.types[i].name for i in layout.bodies})
         groups = tuple(names.index(layout.types[i].name) for i in layout.bodies)
+        if any(model.surmise for model in parts.models.values()):
+            raise ir.BeyondError("modes that are never claimed")
         motion = self._motion() if parts.laws is not None and parts.laws.governed else None
         answers = tuple(
             self._answer(target, index) for target in parts.targets for index in layout.of_type(target.type)

@@ -57,7 +57,9 @@ def merge(parts: Parts, other: Parts, *, follow_laws: bool) -> None:
     for name, table in parts.tables.items():
         forget(table, [m for t, m in parts.models.items() if t.type == name], parts.config.history)
     if follow_laws and parts.laws is not None:
-        parts.laws = copy.deepcopy(other.laws)
+        parts.laws = laws = copy.deepcopy(other.laws)
+        if laws is not None:
+            laws.mark(parts.models)
 
 
 def _check(parts: Parts, other: Parts) -> None:

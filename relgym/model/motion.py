@@ -72,10 +72,26 @@ class Laws:
         known = target.type in self.governed and (target.type, target.property) in self._components
         return known and target.property in self.learner.book.components(target.type)
 
+    def beyond_modes(self, target: Target) -> bool:
+        """Whether a target is for laws alone to claim, and they don't govern it.
+
+        What contacts do to bodies that turn depends on where they are touched: that is no function of properties along
+        the world's axes, and no clause tells when there is a point of contact. Modes may guess what comes next; how
+        right they are changes with every contact. Where none was ever seen, modes are as good as elsewhere.
+        """
+        own = self.learner.sources.get(target.type)
+        meets = self.learner.book.turning and self.learner.contacts_seen > 0
+        return meets and own is not None and target.property in own.moving and not self.governs(target)
+
+    def mark(self, models: Mapping[Target, PropertyModel]) -> None:
+        """Say which models' predictions are not to be claimed (`beyond_modes`)."""
+        for target, part in models.items():
+            part.surmise = self.beyond_modes(target)
+
     def suffice(self, type_name: str, targets: Sequence[Target]) -> bool:
         """Whether the laws predict all targets of a type and have long been right: its modes may rest.
 
-        Modes rest until the laws are wrong for the first time, and go on learning then.
+        Modes rest until the laws are wrong more often than laws may be, and go on learning then.
         """
         own = [t for t in targets if t.type == type_name]
         return all(self.governs(t) for t in own) and self.learner.settled(type_name)
@@ -150,13 +166,19 @@ class Laws:
         )
 
     def _weigh(self, models: Mapping[Target, PropertyModel]) -> None:
-        """Laws that describe what came in fewer bits than modes come in force, and are believed accordingly."""
+        """Laws that describe what came in fewer bits than modes come in force, and are believed accordingly.
+
+        What modes would say is not known while they rest: laws that have long been right stay in force.
+        """
         leads = {name: self._lead(name, models) for name in self.learner.types}
-        governed = frozenset(name for name, lead in leads.items() if lead > 0.0)
+        targets = tuple(models)
+        resting = {name for name in self.governed if self.suffice(name, targets)}
+        governed = frozenset(name for name, lead in leads.items() if lead > 0.0 or name in resting)
         for target, part in models.items():
             if target.type in governed - self.governed:
                 part.calibration.vouch(leads[target.type])
         self.governed = governed
+        self.mark(models)
 
     def _lead(self, type_name: str, models: Mapping[Target, PropertyModel]) -> float:
         """Bits by which laws describe a type's motion better than modes of every component; 0 without laws."""
@@ -166,7 +188,8 @@ class Laws:
         parts = [part for t, part in models.items() if t.type == type_name and t.property in governed]
         if len(parts) < len(governed):
             return 0.0
-        return sum(mode_bits(part, self._columns) for part in parts) - self.learner.bits(type_name)
+        seen = self.learner.seen(type_name)
+        return sum(mode_bits(part, self._columns, seen) for part in parts) - self.learner.bits(type_name)
 
     # ------------------------------------------------------------------ prediction
     def speak(self, percept: Percept) -> Motion | None:
@@ -218,7 +241,11 @@ class Laws:
         free = book.free.get(name)
         if free is None:
             return ()
-        pairs = zip(book.components(name), free.components, strict=False)
+        body = layout.bodies.index(index)
+        sources, places = book.cast(layout).sources[body]
+        state = book.cast(layout).padded(percept.vectors)[places]
+        inside = free.at(dict(zip(sources.names, state, strict=True)))
+        pairs = zip(book.components(name), inside, strict=False)
         first = ", ".join(f"{v}' = {piece.formula(digits)}" for v, piece in pairs)
         contacts = Contacts.of(book.cast(layout), percept.relations, percept.vectors)
         told = [
@@ -240,7 +267,7 @@ class Laws:
         self._seen = int(data["seen"])
 
 
-def mode_bits(part: PropertyModel, columns: int) -> float:
+def mode_bits(part: PropertyModel, columns: int, seen: int) -> float:
     """Description length of a target's examples by modes: functions, which mode holds when, and noise.
 
     Parameters
@@ -249,6 +276,8 @@ def mode_bits(part: PropertyModel, columns: int) -> float:
         The target's model.
     columns
         Number of columns that a function may use.
+    seen
+        Number of the type's examples. Those that came while modes rested they would describe as they do others.
     """
     noise = part.clusterer.noise_examples
     counts = [mode.examples for mode in part.modes]
@@ -260,7 +289,8 @@ def mode_bits(part: PropertyModel, columns: int) -> float:
         stated += 1.0 + len(weights) * math.log2(columns)
         stated += constant * (sum(abs(w) != 1.0 for w in weights) + (mode.intercept != 0.0))
     labels = sum(-c * math.log2(c / n) for c in (*counts, noise) if c)
-    return stated + labels + EXCEPTION_BITS * noise
+    missed = max(1.0, seen / max(1, part.clusterer.seen))
+    return stated + missed * (labels + EXCEPTION_BITS * noise)
 
 
 def possible_targets(schema: SceneSchema) -> tuple[Target, ...]:

@@ -186,6 +186,8 @@ class Parts:
         if self.open and t.name == TASK:
             target = replace(target, given=self._bearing_on(target))
         self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config, self.schema)
+        if self.laws is not None:
+            self.laws.mark(self.models)
         targets = (*self.targets, target)
         self._set_targets(in_order(targets) if self.open else targets)
         self.tables.setdefault(target.type, ExampleTable())

@@ -14,7 +14,18 @@ from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
 from relgym.laws.frames import FRAMES, POINT
 from relgym.laws.inertia import AREA, NOTHING, SQUARE, By, Gyration, Inertia, Mass
-from relgym.laws.records import ONE, AxisLaw, FreeLaw, Kind, Operator, PairLaw, Piece, Share
+from relgym.laws.records import (
+    ONE,
+    AxisLaw,
+    Bound,
+    FreeLaw,
+    Kind,
+    Operator,
+    PairLaw,
+    Piece,
+    Region,
+    Share,
+)
 from relgym.laws.text import DIRECTIONS
 from relgym.reporting.functions import number_of, parse_sum, whole_of
 from relgym.scene.objects import Target
@@ -65,9 +76,14 @@ class MotionRules:
         rows: list[tuple[str, str, str]] = []
         for law in self.free:
             count = self._stats(law.examples, law.unexplained)
-            for number, (name, piece) in enumerate(zip(names[law.type], law.components, strict=False)):
-                head = f"{law.type} touching nothing:" if not number else ""
-                rows.append((head, f"{name}' = {piece.formula(digits)}", count if not number else ""))
+            for where, components in (
+                ("", law.components),
+                *((f", where {r.text(digits)}", r.components) for r in law.regions),
+            ):
+                for number, (name, piece) in enumerate(zip(names[law.type], components, strict=False)):
+                    head = f"{law.type} touching nothing{where}:" if not number else ""
+                    stats = count if not number and not where else ""
+                    rows.append((head, f"{name}' = {piece.formula(digits)}", stats))
         for letter, laws in zip(self.letters, self.pair.axes if self.pair else (), strict=False):
             for each in laws:
                 rows += self._axis(letter, each, digits, alone=len(laws) == 1)
@@ -80,6 +96,8 @@ class MotionRules:
             lines.append(
                 f"  of a change along t between {a} and {b}, velocities take {grip:.{digits}g}, spins the rest"
             )
+        for (a, b), speed in self.pair.surfaces if self.pair else ():
+            lines.append(f"  surfaces of {a} on {b} run at {speed:.{digits}g} along the turned normal")
         lines += [f"  {sentence}" for sentence in self.inertia.sentences(digits)]
         if self.pair is not None:
             lines.append(f"  frame: {self.pair.frame}")
@@ -106,6 +124,8 @@ class MotionRules:
         for operator, pieces in law.alternatives:
             form = f"{operator}({', '.join(piece.formula(digits) for piece in pieces)})"
             yield f"  or, as good: v'_{letter} = {form}; where they differ, no prediction", "", ""
+        for a, b in law.doubted:
+            yield f"  where {a} touches {b}: no prediction", "", ""
         for known, side in zip(law.signs, "<>", strict=True):
             if not known:
                 yield f"  where that turns the motion to v'_{letter} {side} 0: no prediction", "", ""
@@ -163,7 +183,10 @@ def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
 
 # ------------------------------------------------------------------ from text
 _STATS = r"(?: {2,}(?P<n>[\d,]+) steps?(?:, (?P<bad>[\d,]+) unexplained)?  ± (?P<tol>\S+))?"
-_FREE = re.compile(rf"  (?:(?P<type>\S+) touching nothing:)? +(?P<name>[^\s']+)' = (?P<piece>.*?){_STATS}")
+_FREE = re.compile(
+    rf"  (?:(?P<type>\S+) touching nothing(?:, where (?P<where>[^:]+))?:)? +(?P<name>[^\s']+)' = (?P<piece>.*?){_STATS}"
+)
+_BOUND = re.compile(r"(?P<name>\S+) (?P<sign><=|>=) (?P<here>\S+) \(else \S+ (?:<=|>=) (?P<there>\S+)\)")
 _AXIS = re.compile(
     rf"  touching(?: \((?P<kinds>.*?)\))?, (?P<where>.*?)(?: \(of the points that touch\))?:{_STATS}"
 )
@@ -174,8 +197,10 @@ _OTHER = re.compile(
     r"    or, as good: v'_\w = (?P<operator>max|min)\((?P<pieces>.*)\); where they differ, .*"
 )
 _TURN = re.compile(r"    where that turns the motion to v'_\w (?P<side>[<>]) 0: no prediction")
+_DOUBT = re.compile(r"    where (?P<a>\S+) touches (?P<b>\S+): no prediction")
 _SHARE = re.compile(r"  of a change between (\S+) A and (\S+) B, A takes (.*), B the rest")
 _GRIP = re.compile(r"  of a change along t between (\S+) and (\S+), velocities take (\S+), spins the rest")
+_SURFACE = re.compile(r"  surfaces of (\S+) on (\S+) run at (\S+) along the turned normal")
 _MASS = re.compile(r"  masses go as (?P<factors>.*?)(?:; by (?P<by>type|object), times (?P<constants>.*))?")
 _GYRATION = re.compile(r"  moment over mass(?: of (?P<types>.*?))?: (?P<piece>.*)")
 _POWER = re.compile(r"(?P<name>\w+)_B(?:\^(?P<power>\d))? / \(.*\)")
@@ -186,10 +211,12 @@ class _Draft:
     """Laws as far as they were read."""
 
     free: dict[str, list[tuple[str, Piece]]] = field(default_factory=dict)
+    regions: dict[str, list[tuple[tuple[Bound, ...], list[Piece]]]] = field(default_factory=dict)
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)
     axes: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     shares: list[tuple[Kind, Share]] = field(default_factory=list)
     grips: list[tuple[Kind, float]] = field(default_factory=list)
+    surfaces: list[tuple[Kind, float]] = field(default_factory=list)
     mass: Mass | None = None
     gyrations: list[Gyration] = field(default_factory=list)
     frame: str = "contact"
@@ -208,7 +235,14 @@ class _Draft:
         if match := _AXIS.fullmatch(line):
             letter = next((c for c, text in DIRECTIONS.items() if text == match["where"]), match["where"][-1])
             kinds = tuple(_kind(k) for k in match["kinds"].split(", ")) if match["kinds"] else ()
-            self.law = {"pieces": [], "operator": "max", "kinds": kinds, "others": [], "signs": [True, True]}
+            self.law = {
+                "pieces": [],
+                "operator": "max",
+                "kinds": kinds,
+                "others": [],
+                "signs": [True, True],
+                "doubted": [],
+            }
             self.law |= {
                 "examples": whole_of(match["n"] or "0"),
                 "unexplained": whole_of(match["bad"] or "0"),
@@ -221,6 +255,8 @@ class _Draft:
         elif self.law and (match := _OTHER.fullmatch(line)):
             pieces = tuple(map(_piece, match["pieces"].split(", ")))
             self.law["others"].append((match["operator"], pieces))
+        elif self.law and (match := _DOUBT.fullmatch(line)):
+            self.law["doubted"].append((match["a"], match["b"]))
         elif self.law and (match := _TURN.fullmatch(line)):
             self.law["signs"]["<>".index(match["side"])] = False
         else:
@@ -232,6 +268,8 @@ class _Draft:
             self.shares.append(((match[1], match[2]), _share(match[3])))
         elif match := _GRIP.fullmatch(line):
             self.grips.append(((match[1], match[2]), number_of(match[3])))
+        elif match := _SURFACE.fullmatch(line):
+            self.surfaces.append(((match[1], match[2]), number_of(match[3])))
         elif match := _MASS.fullmatch(line):
             pairs = [part.rpartition(": ") for part in (match["constants"] or "").split(", ") if part]
             constants = tuple((name, number_of(value)) for name, _, value in pairs)
@@ -246,7 +284,13 @@ class _Draft:
     def _of_free(self, line: str) -> bool:
         if match := _FREE.fullmatch(line):
             self.kind = match["type"] or self.kind
-            self.free.setdefault(self.kind, []).append((match["name"], _piece(match["piece"])))
+            if match["where"]:
+                bounds = tuple(map(_bound, match["where"].split(" and ")))
+                self.regions.setdefault(self.kind, []).append((bounds, [_piece(match["piece"])]))
+            elif self.kind in self.regions and not match["type"]:
+                self.regions[self.kind][-1][1].append(_piece(match["piece"]))
+            else:
+                self.free.setdefault(self.kind, []).append((match["name"], _piece(match["piece"])))
             if match["n"]:
                 self.counts[self.kind] = whole_of(match["n"] or "0"), whole_of(match["bad"] or "0")
                 self.tolerance = number_of(match["tol"])
@@ -264,10 +308,18 @@ def parse_motion(lines: list[str]) -> MotionRules:
     pair = None
     if draft.axes:
         laws = tuple(tuple(_axis_law(each) for each in found) for found in draft.axes.values())
-        pair = PairLaw(draft.frame, laws, 0.0, tuple(draft.grips))
+        pair = PairLaw(draft.frame, laws, 0.0, tuple(draft.grips), tuple(draft.surfaces))
     free = draft.free.items()
     return MotionRules(
-        tuple(FreeLaw(t, tuple(p for _, p in found), *draft.counts.get(t, (0, 0))) for t, found in free),
+        tuple(
+            FreeLaw(
+                t,
+                tuple(p for _, p in found),
+                *draft.counts.get(t, (0, 0)),
+                regions=tuple(Region(bounds, tuple(pieces)) for bounds, pieces in draft.regions.get(t, ())),
+            )
+            for t, found in free
+        ),
         tuple((t, tuple(name for name, _ in found)) for t, found in free),
         pair,
         "".join(draft.axes),
@@ -290,6 +342,7 @@ def _axis_law(data: Mapping[str, Any]) -> AxisLaw:
         tuple(data["signs"]),
         data["examples"],
         data["unexplained"],
+        doubted=tuple(data["doubted"]),
     )
 
 
@@ -302,6 +355,17 @@ def _piece(text: str) -> Piece:
     found = parse_sum(text)
     constant = ((ONE, found.constant),) if found.constant != 0.0 else ()
     return Piece((*((name, weight) for weight, name in found.terms), *constant))
+
+
+def _bound(text: str) -> Bound:
+    match = _BOUND.fullmatch(text)
+    if match is None:
+        raise ConfigError(
+            f"laws of motion: expected a bound, such as 'px >= 0.1 (else px <= 0)', got {text!r}"
+        )
+    here, there = number_of(match["here"]), number_of(match["there"])
+    above = match["sign"] == ">="
+    return Bound(match["name"], above, there if above else here, here if above else there)
 
 
 def _share(text: str) -> Share:

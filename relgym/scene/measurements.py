@@ -164,6 +164,17 @@ class Measurements:
         self._told |= missing
         return self._touches
 
+    def near(self, pairs: _Bools) -> _Bools:
+        """Whether bodies may touch, shape ``(P, n)``: where bounding boxes don't meet they surely don't.
+
+        Pairs that the mask doesn't mark may hold anything.
+        """
+        if self._arrays is None:
+            return self._measured.distance <= self.touch
+        found, chosen = np.zeros_like(self._touches), np.flatnonzero(pairs)
+        found[chosen] = self._meet(chosen)
+        return found
+
     def touching(self) -> _Bools:
         """Which bodies touch, shape ``(K, K, n)``; none touches itself."""
         if self._touching is None:

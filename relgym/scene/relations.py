@@ -146,6 +146,13 @@ class Relations:
         parts = [chunk.touches(mask).take(numbers, axis=0) for chunk in self._chunks]
         return np.ascontiguousarray(_joined(parts).T)
 
+    def near(self, first: NDArray[np.intp], second: NDArray[np.intp]) -> _Table:
+        """Whether the bodies of some pairs may touch, as `touching`: sure where it says no, and cheaper."""
+        pairs = self._plan.pairs
+        mask, numbers = pairs.among(first, second), pairs.number[first, second]
+        parts = [chunk.near(mask).take(numbers, axis=0) for chunk in self._chunks]
+        return np.ascontiguousarray(_joined(parts).T)
+
     def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Relations:
         """Relations of some of the scenes."""
         vectors = np.concatenate([chunk.vectors for chunk in self._chunks])[chosen]

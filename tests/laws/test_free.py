@@ -88,3 +88,10 @@ def test_spread_estimates_the_noise(rng: np.random.Generator) -> None:
         for x, e in zip(rng.normal(size=(400, 5)), rng.normal(size=400), strict=True)
     ]
     assert taught(rows).spread() == pytest.approx(1e-3, rel=0.2)
+
+
+def test_what_never_moved_scatters_by_nothing(rng: np.random.Generator) -> None:
+    learner = taught([(x.tolist(), [0.0, float(np.sin(9 * x[0]))]) for x in rng.normal(size=(80, 5))])
+    assert learner.law is None
+    assert 0.1 < learner.spread() < 2.0
+    assert taught([([0.0] * 5, [0.0, 0.0])] * 10).spread() == 0.0

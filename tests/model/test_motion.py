@@ -11,6 +11,7 @@ from relgym.config import ModelConfig
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
 from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import ConfigError
+from relgym.experiments.body_worlds import Setting, body_rooms
 from relgym.experiments.data import ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.law_score import taught
@@ -111,6 +112,17 @@ def test_laws_that_fail_wake_the_modes() -> None:
     odd = Episode(strange.schema, strange.layout, vectors, strange.truth, strange.configuration)
     reports = [model.learn_one(each) for each in list(odd.transitions())[:30]]
     assert any(("ball", "vx") in r.parts for r in reports[1:])
+
+
+def test_what_modes_say_of_bodies_that_turn_is_no_claim(tmp_path: Path) -> None:
+    room = body_rooms(Setting(("box",), magnet=0.3), 1, seed=412, steps=150)[0]
+    model = taught([room])
+    assert not model.governed and any(part.modes for part in model._parts.models.values())
+    model.save(tmp_path / "magnet.json", history=True)
+    for each in (model, WorldModel.load(tmp_path / "magnet.json")):
+        told = each.predict_batch(room.layout, room.vectors[:-1])
+        assert not told.ok.any()
+        assert not any(part.ok for part in each.predict_one(next(room.transitions()).before).parts)
 
 
 def test_a_world_the_laws_never_met_is_not_guessed(unseen: list[Episode]) -> None:

@@ -97,6 +97,7 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
         parts.screen.restore(data["screen"])
     if parts.laws is not None:
         parts.laws.restore(data["laws"], _of(arrays, "laws."))
+        parts.laws.mark(parts.models)
     return parts
 
 

@@ -539,7 +539,20 @@ def _check_laws(record: LawsRecord, learner: LawLearner, arrays: _Arrays | None)
             f"expected {sorted(counts)} components of {law.type!r}",
         )
         for terms in law.components:
-            _check_terms(terms, {*own.names, ONE}, "laws.free")
+            _check_terms(terms, {*own.readable, ONE}, "laws.free")
+        for region in law.regions:
+            _require(
+                len(region.components) == len(law.components),
+                "laws.free",
+                "expected as many components everywhere",
+            )
+            for terms in region.components:
+                _check_terms(terms, {*own.readable, ONE}, "laws.free")
+            _require(
+                all(name in own.where and low <= high for name, _, low, high in region.bounds),
+                "laws.free",
+                f"expected bounds of {list(own.where)}, low before high",
+            )
     _distinct(record.governed, "laws.governed")
     ready = set(free) if laws.pair is not None or learner.book.turning else set()
     _require(ready.issuperset(record.governed), "laws.governed", f"expected some of {sorted(ready)}")
@@ -603,6 +616,9 @@ def _check_pair_law(laws: LearnedLawsRecord, learner: LawLearner) -> None:
             _check_axis(law, known, bodies)
         kinds = [kind for law in each for kind in law.kinds]
         _distinct(kinds, "laws.pair.axes")
+    _require(not pair.surfaces or pair.frame == "point", "laws.pair.surfaces", "expected the frame 'point'")
+    for a, b, _ in pair.surfaces:
+        _require(a in bodies and b in bodies, "laws.pair.surfaces", f"there are no bodies {a!r} and {b!r}")
     for a, b, _ in pair.grips:
         _require(a in bodies and b in bodies, "laws.pair.grips", f"there are no bodies {a!r} and {b!r}")
     if pair.frame == "point":
@@ -613,6 +629,9 @@ def _check_pair_law(laws: LearnedLawsRecord, learner: LawLearner) -> None:
 def _check_axis(law: AxisLawRecord, known: Collection[str], bodies: Collection[str]) -> None:
     for a, b in law.kinds:
         _require(a in bodies and b in bodies, "laws.pair.axes", f"there are no bodies {a!r} and {b!r}")
+    _require(
+        set(law.doubted) <= set(law.kinds), "laws.pair.axes", "expected doubts of kinds that a law is of"
+    )
     for pieces in (law.pieces, *(pieces for _, pieces in law.alternatives)):
         for terms in pieces:
             _check_terms(terms, known, "laws.pair.axes")

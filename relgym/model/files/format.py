@@ -486,14 +486,22 @@ _KEY = "rivals"
 Pieces: TypeAlias = Annotated[list[Terms], Meta(min_length=1, max_length=16)]
 
 
+class RegionRecord(Record):
+    """Where other functions hold: bounds of positions (name, whether above, last number below, first one above)."""
+
+    bounds: Annotated[list[tuple[Name, bool, Finite, Finite]], Meta(min_length=1, max_length=16)]
+    components: Annotated[list[Terms], Meta(min_length=1, max_length=4)]
+
+
 class FreeLawRecord(Record):
-    """How objects of a type move that touch nothing: a function for each component of the velocity."""
+    """How objects of a type move that touch nothing: a function for each component, and where others hold."""
 
     type: Name
     components: Annotated[list[Terms], Meta(min_length=1, max_length=4)]
     examples: Count
     unexplained: Count
     bits: Spread
+    regions: Annotated[list[RegionRecord], Meta(max_length=64)] = []
 
 
 class AxisLawRecord(Record):
@@ -507,6 +515,7 @@ class AxisLawRecord(Record):
     examples: Count
     unexplained: Count
     bits: Spread
+    doubted: list[Pair] = []
 
 
 class PairLawRecord(Record):
@@ -519,6 +528,7 @@ class PairLawRecord(Record):
     ]
     bits: Spread
     grips: list[tuple[Name, Name, Finite]]
+    surfaces: list[tuple[Name, Name, Finite]] = []
 
 
 class MassRecord(Record):

@@ -174,7 +174,7 @@ def _motion(model: WorldModel) -> MotionRules | None:
     # A free law may speak of spins, too; where contacts don't act on surfaces, nothing is said of those.
     free = ((name, book.free[name]) for name in names if name in book.free)
     return MotionRules(
-        tuple(replace(law, components=law.components[: len(said[name])]) for name, law in free),
+        tuple(law.first(len(said[name])) for name, law in free),
         tuple(said.items()),
         book.pair,
         "".join(letters),

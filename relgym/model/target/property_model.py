@@ -91,6 +91,8 @@ class PropertyModel:
         How right predictions of every kind were, if somebody looked back at them, and who gives their values.
     latest
         Id of the mode that explained the latest example that any mode did.
+    surmise
+        Whether what modes say is never claimed, since only laws of motion can know (`Laws.beyond_modes`).
     leaned_on
         Whether laws of other properties read this one's next value. Then its modes answer as long as it has any: what a
         guess leaves would be magnified in those laws.
@@ -116,6 +118,7 @@ class PropertyModel:
         self.candidates = Candidates(config.hypotheses)
         self.calibration = Calibration(config.claim_probability, config.claim_slips, len(config.hypotheses))
         self.latest = NOISE
+        self.surmise = False
         self.leaned_on = False
         self._unsettled = True
 
@@ -385,6 +388,8 @@ class PropertyModel:
 
     def claims(self, key: Key, told: Assessment) -> bool:
         """Whether a prediction of a mode or a law is claimed; what nobody ever looked back at isn't doubted."""
+        if self.surmise and self.config.abstain:
+            return False
         return self.record.claims(key, told)
 
     @property
