@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,6 +106,11 @@ class Cast:
             tuple(pairs),
             *_geometry(axes, types, sources),
         )
+
+    @cached_property
+    def bodies(self) -> dict[str, int]:
+        """Number of each body, by name."""
+        return {self.layout.names[index]: body for body, index in enumerate(self.layout.bodies)}
 
     @property
     def dimensions(self) -> int:

@@ -117,28 +117,26 @@ class Laws:
         if told.scene.layout is not layout or not all(stays.values()):
             return False
         cast = self.learner.book.cast(layout)
-        bodies = {layout.names[index]: body for body, index in enumerate(layout.bodies)}
+        bodies = cast.bodies
+        wanted = {
+            body: self.learner.book.components(source.type.name) if source.type.name in self.governed else ()
+            for body, (source, _) in cast.sources.items()
+        }
         said: dict[int, int] = {}
         off: dict[int, float] = {}
         touched: dict[int, list[int]] = {}
         for one in told.parts:
             body = bodies.get(one.object, -1)
-            if body not in cast.sources:
-                continue
-            kind = layout.types[layout.bodies[body]].name
-            if kind not in self.governed or one.property not in self.learner.book.components(kind):
+            if one.property not in wanted.get(body, ()):
                 continue
             if not one.ok or len(one.roles) < one.mode or one.mode not in (FREE, TOUCHING):
                 return False  # a batch tells no roles
-            column = layout.column(layout.bodies[body], one.property)
-            error = abs(one.value - float(following[column]))
+            error = abs(one.value - float(following[layout.places[one.object, one.property]]))
             said[body] = said.get(body, 0) + 1
             off[body] = max(off.get(body, 0.0), error)
             touched[body] = [bodies[name] for name in one.roles[1:]]
-        for body in cast.movers:
-            kind = layout.types[layout.bodies[body]].name
-            if said.get(body, 0) != len(self.learner.book.components(kind)):
-                return False
+        if any(not components or said.get(body, 0) != len(components) for body, components in wanted.items()):
+            return False
         perception = percept.perception
         return self.learner.confirm(
             cast,

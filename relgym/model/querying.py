@@ -137,10 +137,10 @@ def _experts_one(
     found[LATEST] = math.nan if latest is None else float(latest[0])
     changes = parts.regressed(percept, index, target.property) if model.rough else None
     if changes is not None:
-        found[LINEAR : LINEAR + KINDS] = [present + float(change) for change in changes[0]]
+        found[LINEAR : LINEAR + KINDS] = [present + change for change in changes[0].tolist()]
     if model.candidates:
         found[len(EXPERTS) :] = _hypothesised(parts, target, percept, index)[0].tolist()
-    return tuple(value if math.isfinite(value) else math.nan for value in found)
+    return tuple([value if math.isfinite(value) else math.nan for value in found])
 
 
 def _outcome(one: Prediction, speaker: int, *, claimed: bool, known: bool) -> Outcome:

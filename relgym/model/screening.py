@@ -82,16 +82,18 @@ class Screen:
         places = self._places(layout)
         sizes = np.maximum(np.abs(before), np.abs(after))
         limits = self._limit()[places]
-        if (sizes <= limits).all():
+        within = bool((sizes <= limits).all())
+        if within:
             self._run.clear()
         else:
             self._suspect(places, np.where(np.abs(before) < np.abs(after), after, before), sizes > limits)
             limits = self._limit()[places]
-        within = bool((sizes <= limits).all())
-        for vector in (before, after):
-            magnitudes = np.abs(vector)
-            fine = slice(None) if within else magnitudes <= limits
-            self._note(places[fine], magnitudes[fine])
+            within = bool((sizes <= limits).all())
+        if (sizes > self._largest[places, 0]).any():  # one of both has news
+            for vector in (before, after):
+                magnitudes = np.abs(vector)
+                fine = slice(None) if within else magnitudes <= limits
+                self._note(places[fine], magnitudes[fine])
         young = self._scenes[places] < START
         if young.any():
             self._scenes[np.unique(places[young])] += 1

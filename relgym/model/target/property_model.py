@@ -396,9 +396,9 @@ class PropertyModel:
     @property
     def asks_latest(self) -> bool:
         """Whether the mode that held last is asked: not where the vote's winners are mostly right."""
-        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
-        asked = self.rough or self.record.doubts(_PREDICTED)
-        return known and asked and len(self.classifier.modes) >= 2
+        if len(self.classifier.modes) < 2 or self.latest not in self.clusterer.clusters:
+            return False
+        return not self.bounds(self.latest) and (self.rough or self.record.doubts(_PREDICTED))
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]
@@ -420,7 +420,7 @@ class PropertyModel:
     @property
     def rough(self) -> bool:
         """Whether so much is unexplained, or explained only roughly, that regressions may know better."""
-        return self.fallback.guessable or self._unsettled
+        return self._unsettled or self.fallback.guessable
 
     @property
     def lost(self) -> bool:
