@@ -223,8 +223,8 @@ class LawLearner:
             or any(cast.kinds[pair] not in self._store.kinds for pair in single)
         ):
             return False
-        after = cast.padded(following[None])[cast.velocities][..., 0]
-        state = cast.padded(vector[None])[:, 0]
+        after = cast.padded_one(following)[cast.velocities]
+        state = cast.padded_one(vector)
         for body in free:
             sources, places = cast.sources[body]
             d = len(sources.velocity)

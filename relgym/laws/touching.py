@@ -122,6 +122,12 @@ class Cast:
         n = len(vectors)
         return np.concatenate([vectors.T, np.full((1, n), np.nan), np.zeros((1, n))])
 
+    def padded_one(self, vector: NDArray[np.float64]) -> FloatArray:
+        """`padded` of a single scene, shape ``(width + 2,)``."""
+        found = np.empty(len(vector) + 2)
+        found[:-2], found[-2], found[-1] = vector, np.nan, 0.0
+        return found
+
 
 def _geometry(
     axes: Axes, types: list[ObjectType], sources: Mapping[str, Sources]

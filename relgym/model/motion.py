@@ -14,6 +14,7 @@ from relgym.laws.account import accounts
 from relgym.laws.book import Motion
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.learner import LawLearner
+from relgym.laws.records import PairLaw
 from relgym.laws.touching import Contacts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
@@ -62,15 +63,23 @@ class Laws:
         }
         self._columns = max(2, sum(len(schema.type(t).properties) for _, t in schema.objects))
         self._seen = 0
+        self._governs: tuple[frozenset[str] | None, PairLaw | None, set[tuple[str, str]]] = (
+            None,
+            None,
+            set(),
+        )
         self._last: tuple[Percept, Contacts, Motion] | None = None  # predicted last, and often learned next
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_last": None}
+        return self.__dict__ | {"_last": None, "_governs": (None, None, set())}
 
     def governs(self, target: Target) -> bool:
         """Whether the laws predict a target."""
-        known = target.type in self.governed and (target.type, target.property) in self._components
-        return known and target.property in self.learner.book.components(target.type)
+        pair = self.learner.book.pair
+        if self._governs[0] is not self.governed or self._governs[1] is not pair:
+            own = {(t, p) for t in self.governed for p in self.learner.book.components(t)}
+            self._governs = self.governed, pair, own.intersection(self._components)
+        return (target.type, target.property) in self._governs[2]
 
     def suffice(self, type_name: str, targets: Sequence[Target]) -> bool:
         """Whether the laws predict all targets of a type and have long been right: its modes may rest.
