@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 SEARCH = 400
-"""At most this many rows are searched at a time."""
+"""At most this many rows are searched at a time, and half as many older ones."""
 
 NEAR, MOST_NEAR = 16.0, 0.5
 """Rows that miss a function by up to so many tails are near misses; so many per inlier are too many."""
@@ -303,8 +303,9 @@ def searched(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """The rows that are searched of so many: the newest and a random choice of older ones, ascending."""
     if n <= SEARCH:
         return np.arange(n)
-    # Fresh ones may outnumber the rows: some of them have become a mode's tail in the meantime.
-    newest = np.arange(max(n - max(fresh, SEARCH // 2), 0), n)
+    # Fresh ones may outnumber the rows: some of them have become a mode's tail in the meantime. And of very many, as
+    # where nothing is ever found, the newest are enough.
+    newest = np.arange(max(n - min(max(fresh, SEARCH // 2), SEARCH), 0), n)
     older = (
         rng.choice(newest[0], size=min(int(newest[0]), SEARCH // 2), replace=False)
         if newest[0]

@@ -37,6 +37,9 @@ TIGHT, CLOSE = 4.0, 0.01
 unless a few standard deviations are."""
 
 
+DRAWN = 250_000
+"""So many random numbers are drawn in a piece of work: some ten milliseconds."""
+
 CHUNK = 30_000
 """So many numbers of samples are worked on at a time: they fit into the processor's cache."""
 
@@ -54,6 +57,7 @@ class Consensus:
         return int(self.inliers.sum())
 
 
+@resumable
 def draw_samples(
     n: int,
     size: int,
@@ -63,7 +67,7 @@ def draw_samples(
     strata: NDArray[np.integer] | None = None,
     apart: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
-) -> NDArray[np.intp]:
+) -> Steps[NDArray[np.intp]]:
     """Row numbers of `draws` samples of `size` distinct rows, shape ``(draws, size)``.
 
     The first row of each sample comes from `anchors` (default: any row). A third of the samples takes the
@@ -73,19 +77,26 @@ def draw_samples(
     ``(n, n)``: among many objects hardly two rows are in the same one.
     """
     first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
-    keys = rng.random((draws, n))
     style = np.arange(draws) % 3
-    if strata is not None:
-        other = strata[None, :] != strata[first][:, None]
-        further = 2.0 * other
-        if apart is not None:
-            few = n - other.sum(axis=1) < size
-            further[few] = np.where(other[few], 1.0 + apart[first[few]], 0.0)
-        keys += np.where((style == 1)[:, None], further, 0.0)
-    age = np.abs(np.arange(n)[None, :] - first[:, None])
-    keys += np.where((style == 2)[:, None], age // (2 * size), 0.0)
-    keys[np.arange(draws), first] = -1.0
-    return np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
+    found = np.empty((draws, min(size, n)), dtype=np.intp)
+    step = max(16, DRAWN // n)
+    for begin in range(0, draws, step):
+        part = slice(begin, begin + step)
+        base, how = first[part], style[part, None]
+        keys = rng.random((len(base), n))
+        if strata is not None:
+            other = strata[None, :] != strata[base][:, None]
+            further = 2.0 * other
+            if apart is not None:
+                few = n - other.sum(axis=1) < size
+                further[few] = np.where(other[few], 1.0 + apart[base[few]], 0.0)
+            keys += np.where(how == 1, further, 0.0)
+        age = np.abs(np.arange(n)[None, :] - base[:, None])
+        keys += np.where(how == 2, age // (2 * size), 0.0)
+        keys[np.arange(len(base)), base] = -1.0
+        found[part] = np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
+        yield CALL + 2 * keys.size
+    return found
 
 
 @resumable
@@ -135,8 +146,9 @@ def consensus(
         return None
     loose = EXTRAPOLATED if misfit else min(EXTRAPOLATED, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
     columns = varying_columns(x)
-    samples = draw_samples(n, size, draws, rng=rng, strata=strata, apart=apart, anchors=anchors)
-    yield CALL + 2 * draws * n
+    samples = yield from draw_samples.steps(
+        n, size, draws, rng=rng, strata=strata, apart=apart, anchors=anchors
+    )
     chosen = yield from _forward_batch(x[:, columns], y, samples, terms=terms, sigma=sigma, loose=loose)
     best: Consensus | None = None
     tried: set[tuple[tuple[int, ...], bytes]] = set()  # what is refined depends on columns and inliers alone
