@@ -225,6 +225,7 @@ class Runner:
         self._settling: bool | None = None
         self._settled = False  # whether that is what is known now
         self._asked = 0  # scenes one by one, since then
+        self._believing = False  # whether of all answers it is known how right they were
         self._turn = Lock()
         tape = encoded(program)
         self._run = kernel.run
@@ -302,6 +303,7 @@ class Runner:
                     teller.trusts(answer.trust)
             except BeyondError:
                 self._settling = None
+        self._believing = bool(self._settling) and all(teller.spoken for teller in self._tellers)
         self._settled = True
         return self._settling
 
@@ -321,7 +323,7 @@ class Runner:
         if not self._settled and self._asked >= SETTLING:
             self._settles()
         self._asked += 1
-        return self._settled and bool(self._settling)
+        return self._settled and self._believing
 
     def _argued(self, scene: Scene, percept: Percept | None) -> ScenePrediction | None:
         """`one` where whose value counts is settled here."""
@@ -363,36 +365,38 @@ class Runner:
         told = self._told(now[None], settling=True, told=1)
         if told is None:
             return None
-        after, players = told.following[0], told.players[0]
+        after = told.following[0]
+        probable, widths = told.sure[:, 0].tolist()
         rows = zip(
             self._tellers,
             told.outcomes[0].tolist(),
             told.modes[0].tolist(),
             told.margins[0].tolist(),
             told.noted[0].tolist(),
-            told.sure[:, 0].T.tolist(),
+            told.players[0],
+            probable,
+            widths,
             told.believed.tolist(),
             strict=True,
         )
         found: list[Prediction] = []
-        for k, (teller, outcome, mode, margin, noted, sure, (number, place)) in enumerate(rows):
-            if teller.spoken is None:
-                return None
-            speaker, spread = teller.spoken[place]
+        for k, (teller, outcome, mode, margin, noted, players, probability, interval, believed) in enumerate(
+            rows
+        ):
+            speaker, spread = teller.spoken[believed[1]]
             value = float(after[teller.answer.column])
             if speaker == GUESS or teller.turned(value, now):
                 return None
-            roles, own, frame = teller.known(now, mode, noted, players[k])
+            roles, own, frame = teller.known(now, mode, noted, players)
             if speaker == LATEST and mode:
                 roles = roles[:1]
             if speaker != OWN:
                 own = math.nan if speaker == PERSISTENCE else spread
-            a = teller.answer
-            record = LateAudit(partial(_audit, self._parts, scene, k, Key(*kind_of(number)), speaker, value))
+            audit = LateAudit(partial(_audit, self._parts, scene, k, believed[0], speaker, value))
             found.append(
                 Prediction(
-                    a.object,
-                    a.property,
+                    teller.answer.object,
+                    teller.answer.property,
                     value,
                     OUTCOMES[outcome],
                     mode,
@@ -400,8 +404,9 @@ class Runner:
                     margin,
                     frame,
                     own,
-                    *sure,
-                    record,
+                    probability,
+                    interval,
+                    audit,
                 )
             )
         return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
@@ -435,7 +440,7 @@ class _Teller:
     target, index
         Which property of which object it is of.
     spoken
-        Who speaks in each belief, and what that one left lately, in the order on the tape; None: nothing is believed.
+        Who speaks in each belief, and what that one left lately, in the order on the tape; empty: nothing is believed.
     """
 
     __slots__ = (
@@ -445,7 +450,7 @@ class _Teller:
 
     def __init__(self, parts: Parts, layout: SceneLayout, answer: Answer, frame: str) -> None:
         self.answer, self._frame = answer, frame
-        self.spoken: list[tuple[int, float]] | None = None
+        self.spoken: list[tuple[int, float]] = []
         self._body_names = tuple(layout.names[i] for i in layout.bodies)
         self._modes = {mode.id: mode for mode in answer.modes}
         index = self.index = layout.index(answer.object)
@@ -485,7 +490,7 @@ class _Teller:
 
     def trusts(self, trust: Trust | None) -> None:
         """Take note of what is believed now."""
-        self.spoken = None if trust is None else [(b.speaker, b.spread) for b in ordered(trust.beliefs)]
+        self.spoken = [] if trust is None else [(b.speaker, b.spread) for b in ordered(trust.beliefs)]
 
     def turned(self, value: float, now: NDArray[np.float64]) -> bool:
         """Whether a turn was taken off a value: what it was before isn't told."""
@@ -518,14 +523,25 @@ class _Teller:
         return tuple(name for name in names if name is not None)
 
 
-def _audit(parts: Parts, scene: Scene, part: int, key: Key, speaker: int, value: float) -> Audit | None:
-    """What looking back needs of a prediction that a program settled: what the other experts said, too."""
-    said = predict(parts, parts.perception.percept(scene.layout, scene.vector[None]), scene).parts
+def _audit(parts: Parts, scene: Scene, part: int, kind: int, speaker: int, value: float) -> Audit | None:
+    """What looking back needs of a prediction that a program settled: what the other experts said, too.
+
+    Parameters
+    ----------
+    parts, scene, part
+        The model, what it was asked, and the number of the answer.
+    kind
+        Number of the kind of prediction.
+    speaker, value
+        Who spoke, and what was said.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        said = predict(parts, parts.perception.percept(scene.layout, scene.vector[None]), scene).parts
     known = said[part].audit if part < len(said) else None
     if known is None:
         return None
     values = tuple(value if k == speaker else each for k, each in enumerate(known.values))
-    return Audit(key, values, speaker)
+    return Audit(Key(*kind_of(kind)), values, speaker)
 
 
 def _spreads(

@@ -106,7 +106,7 @@ class Screen:
     def plausible(self, layout: SceneLayout, vector: NDArray[np.float64]) -> bool:
         """Whether a scene's numbers are as large as is known; takes note of nothing."""
         places = self._places(layout)
-        return np.count_nonzero(np.abs(vector) <= self._limit()[places]) == len(vector)
+        return bool(np.count_nonzero(np.abs(vector) <= self._limit()[places]) == len(vector))
 
     def _places(self, layout: SceneLayout) -> NDArray[np.intp]:
         """Number of the property of each column; cached."""
