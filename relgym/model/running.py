@@ -36,7 +36,7 @@ from relgym.model.prediction import (
     Prediction,
     ScenePrediction,
 )
-from relgym.model.querying import derive, predict, settled
+from relgym.model.querying import Said, derive, predict, settled
 from relgym.model.scenes import wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
@@ -471,7 +471,7 @@ class _Teller:
         margin: float,
         noted: int,
         players: _Bits,
-    ) -> Prediction | None:
+    ) -> Said | None:
         """What modes or laws say of a scene; `noted` is the mode that gave the value, or of laws whom the body touches.
 
         None where whether they have a value isn't told, or what it was before a turn was taken off.
@@ -486,7 +486,7 @@ class _Teller:
             if self.turned(value, now):
                 return None
         roles, spread, frame = self.known(now, mode, noted, players)
-        return Prediction("", "", value, OUTCOMES[outcome], mode, roles, margin, frame, spread)
+        return Said(value, OUTCOMES[outcome], mode, roles, margin, frame, spread)
 
     def trusts(self, trust: Trust | None) -> None:
         """Take note of what is believed now."""
