@@ -126,6 +126,10 @@ class Exemplars:
         self.version = 0
         self._cells: list[_Cell] = []
         self._index: dict[tuple[int, bytes], int] = {}
+        self._room_for: tuple[tuple[int, ...], int] = (
+            (),
+            0,
+        )  # examples that there is room for, by lengths of axes
 
     def __len__(self) -> int:
         return len(self.columns)
@@ -302,8 +306,12 @@ class Exemplars:
 
     def _most(self, bodies: int) -> int:
         """How many examples are kept once they have columns for so many bodies."""
-        size = self.columns.row_bytes({"K": bodies, "K2": bodies})
-        return min(self.config.max_exemplars, max(_FEWEST, self.config.exemplar_memory * 2**20 // size))
+        shape = (bodies, *self.columns.sizes.values())
+        if self._room_for[0] != shape:
+            size = self.columns.row_bytes({"K": bodies, "K2": bodies})
+            most = max(_FEWEST, self.config.exemplar_memory * 2**20 // size)
+            self._room_for = shape, min(self.config.max_exemplars, most)
+        return self._room_for[1]
 
     def _shed(self, most: int) -> None:
         """Give up examples, of the most crowded cells first: those of larger scenes to come take more memory."""

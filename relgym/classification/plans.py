@@ -131,11 +131,13 @@ class Planner:
         self._version = 0
         self._everything = False
         self._plans: dict[Key, Plan] = {}
+        self._latest: tuple[Example, Plan] | None = None  # one example is asked of several times
         self._memory = 0
 
     def set_pairs(self, classifiers: Sequence[BinaryClassifier]) -> None:
         """Set the pairs, in order; those that are the same objects as before keep what is known of them."""
         self._version += 1
+        self._latest = None
         known = {id(pair.classifier): pair for pair in self._pairs}
         self._pairs = [known.get(id(c)) or _Pair(c, self._compile(c), self._version) for c in classifiers]
         everything = any(c.context == "all" for c in classifiers)
@@ -169,6 +171,8 @@ class Planner:
 
     def plan(self, example: Example) -> Plan:
         """The plan of an example's relational state, objects in their order."""
+        if self._latest is not None and self._latest[0] is example:
+            return self._latest[1]
         close, table, unary = example.close, example.table, example.unary
         if not self._everything:
             table, unary = table & (close[:, None] & close), unary & close
@@ -184,6 +188,7 @@ class Planner:
             plan = self._plans[key] = self._new_plan(key, table, unary, (struck, close))
         if plan.version != self._version:
             self._update(plan)
+        self._latest = (example, plan)
         return plan
 
     def _new_plan(self, key: Key, table: Bools, unary: Bools, near: tuple[Bools, Bools]) -> Plan:

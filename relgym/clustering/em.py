@@ -92,6 +92,8 @@ def preferred(
     scale: Scale,
 ) -> int:
     """The mode an example is assigned to, among those that explain it (E-step)."""
+    if len(fitting) == 1:
+        return fitting[0]
 
     def key(i: int) -> tuple[float, int, int, int]:
         cluster = clusters[i]

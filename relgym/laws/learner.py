@@ -165,9 +165,10 @@ class LawLearner:
         motion = motion or self.book.motion(contacts, vector[None])
         after = cast.padded(following[None])[cast.velocities][..., 0]
         touching = np.flatnonzero(contacts.hits[0])
-        degree = np.zeros(len(cast.layout.bodies), dtype=np.int64)
-        np.add.at(degree, cast.first[touching], 1)
-        np.add.at(degree, cast.second[touching], 1)
+        counts = np.zeros(len(cast.layout.bodies), dtype=np.int64)
+        np.add.at(counts, cast.first[touching], 1)
+        np.add.at(counts, cast.second[touching], 1)
+        degree = counts.tolist()
         changed = False
         right = {}
         for body in cast.movers:
@@ -212,28 +213,29 @@ class LawLearner:
         self._rescale(cast, vector)
         if set(off) != set(cast.movers) or any(not error <= self.book.tolerance for error in off.values()):
             return False
-        degree = np.zeros(len(cast.layout.bodies), dtype=np.int64)
-        touching = [k for k, (a, b) in enumerate(cast.pairs) if b in touched[a]]
+        degree = [0] * len(cast.layout.bodies)
+        touching = (
+            [k for k, (a, b) in enumerate(cast.pairs) if b in touched[a]] if any(touched.values()) else []
+        )
         if touching and self.book.turning:
             return False  # whether they touch in one point is to be looked at
         for pair in touching:
-            degree[list(cast.pairs[pair])] += 1
+            for body in cast.pairs[pair]:
+                degree[body] += 1
         free = [body for body in cast.movers if not degree[body]]
-        names = Counter(cast.sources[body][0].type.name for body in free)
-        if any(
-            not self._free[name].confirms(more)
-            or any(self._free[name].seen + k + 1 in ESTIMATE_AT for k in range(more))
-            for name, more in names.items()
-        ):
-            return False
+        for name, more in Counter([cast.sources[body][0].type.name for body in free]).items():
+            learner = self._free[name]
+            due = [learner.seen + k + 1 in ESTIMATE_AT for k in range(more)]
+            if not learner.confirms(more) or any(due):
+                return False
         single = self._single(cast, touching, degree)
         if single and (
             _doubled(self._store.seen + len(single), len(single))
             or any(cast.kinds[pair] not in self._store.kinds for pair in single)
         ):
             return False
-        after = cast.padded(following[None])[cast.velocities][..., 0]
-        state = cast.padded(vector[None])[:, 0]
+        after = cast.padded_one(following)[cast.velocities]
+        state = cast.padded_one(vector)
         for body in free:
             sources, places = cast.sources[body]
             d = len(sources.velocity)
@@ -251,11 +253,9 @@ class LawLearner:
         off = np.abs(motion.velocity[:count, 0, body] - after[:count, body])
         return bool(motion.stated[0, body] and (off <= self.book.tolerance).all())
 
-    def _count(
-        self, cast: Cast, right: Mapping[int, bool], degree: NDArray[np.int64], single: list[int]
-    ) -> None:
+    def _count(self, cast: Cast, right: Mapping[int, bool], degree: Sequence[int], single: list[int]) -> None:
         """Enter every mover in the ledger; laws are learned from free ones and from single contacts."""
-        taught = {int(side[pair]) for pair in single for side in (cast.first, cast.second)}
+        taught = {body for pair in single for body in cast.pairs[pair]}
         for body, was in right.items():
             learned = degree[body] == 0 or body in taught
             self._ledger.count(cast.sources[body][0].type.name, right=was, learned=learned)
@@ -280,7 +280,7 @@ class LawLearner:
         self,
         cast: Cast,
         touching: Sequence[int],
-        degree: NDArray[np.int64],
+        degree: Sequence[int],
         stays: Mapping[int, bool] | None = None,
         points: Points | None = None,
     ) -> list[int]:
@@ -290,7 +290,7 @@ class LawLearner:
         """
         found = []
         for pair in touching:
-            a, b = int(cast.first[pair]), int(cast.second[pair])
+            a, b = cast.pairs[pair]
             alone = degree[a] == 1 and (degree[b] == 1 or not cast.both[pair])
             alone = alone and (points is None or int((points.pair == pair).sum()) == 1)
             if alone and (stays is None or (stays[cast.layout.bodies[a]] and stays[cast.layout.bodies[b]])):
@@ -416,7 +416,7 @@ class LawLearner:
         if self._noise is not None:
             self.book.tolerance = STDS * self._noise
             return
-        largest = float(np.abs(vector[self.book.rounded(cast)]).max(initial=0.0))
+        largest = max(map(abs, vector[self.book.rounded(cast)].tolist()), default=0.0)
         floor = STDS * ROUNDINGS * float(np.finfo(np.float64).eps) * largest
         self.book.tolerance = max(self.book.tolerance, floor)
 

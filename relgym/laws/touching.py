@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +112,11 @@ class Cast:
             *_geometry(axes, types, sources),
         )
 
+    @cached_property
+    def bodies(self) -> dict[str, int]:
+        """Number of each body, by name."""
+        return {self.layout.names[index]: body for body, index in enumerate(self.layout.bodies)}
+
     @property
     def dimensions(self) -> int:
         """Number of components of a velocity."""
@@ -128,6 +134,12 @@ class Cast:
         velocity = whole[self.velocities[: self.dimensions, list(self.movers)]]  # (d, movers, n)
         dragged = (norm(velocity) * velocity).transpose(1, 0, 2).reshape(-1, n)
         return np.concatenate([whole, dragged])
+
+    def padded_one(self, vector: NDArray[np.float64]) -> FloatArray:
+        """`padded` of a single scene, shape ``(width + 2,)``."""
+        found = np.empty(len(vector) + 2)
+        found[:-2], found[-2], found[-1] = vector, np.nan, 0.0
+        return found
 
 
 def _geometry(

@@ -14,6 +14,7 @@ from relgym.laws.account import accounts
 from relgym.laws.book import Motion
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.learner import LawLearner
+from relgym.laws.records import PairLaw
 from relgym.laws.touching import Contacts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
@@ -62,15 +63,23 @@ class Laws:
         }
         self._columns = max(2, sum(len(schema.type(t).properties) for _, t in schema.objects))
         self._seen = 0
+        self._governs: tuple[frozenset[str] | None, PairLaw | None, set[tuple[str, str]]] = (
+            None,
+            None,
+            set(),
+        )
         self._last: tuple[Percept, Contacts, Motion] | None = None  # predicted last, and often learned next
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_last": None}
+        return self.__dict__ | {"_last": None, "_governs": (None, None, set())}
 
     def governs(self, target: Target) -> bool:
         """Whether the laws predict a target."""
-        known = target.type in self.governed and (target.type, target.property) in self._components
-        return known and target.property in self.learner.book.components(target.type)
+        pair = self.learner.book.pair
+        if self._governs[0] is not self.governed or self._governs[1] is not pair:
+            own = {(t, p) for t in self.governed for p in self.learner.book.components(t)}
+            self._governs = self.governed, pair, own.intersection(self._components)
+        return (target.type, target.property) in self._governs[2]
 
     def beyond_modes(self, target: Target) -> bool:
         """Whether a target is for laws alone to claim, and they don't govern it.
@@ -133,28 +142,26 @@ class Laws:
         if told.scene.layout is not layout or not all(stays.values()):
             return False
         cast = self.learner.book.cast(layout)
-        bodies = {layout.names[index]: body for body, index in enumerate(layout.bodies)}
+        bodies = cast.bodies
+        wanted = {
+            body: self.learner.book.components(source.type.name) if source.type.name in self.governed else ()
+            for body, (source, _) in cast.sources.items()
+        }
         said: dict[int, int] = {}
         off: dict[int, float] = {}
         touched: dict[int, list[int]] = {}
         for one in told.parts:
             body = bodies.get(one.object, -1)
-            if body not in cast.sources:
-                continue
-            kind = layout.types[layout.bodies[body]].name
-            if kind not in self.governed or one.property not in self.learner.book.components(kind):
+            if one.property not in wanted.get(body, ()):
                 continue
             if not one.ok or len(one.roles) < one.mode or one.mode not in (FREE, TOUCHING):
                 return False  # a batch tells no roles
-            column = layout.column(layout.bodies[body], one.property)
-            error = abs(one.value - float(following[column]))
+            error = abs(one.value - float(following[layout.places[one.object, one.property]]))
             said[body] = said.get(body, 0) + 1
             off[body] = max(off.get(body, 0.0), error)
             touched[body] = [bodies[name] for name in one.roles[1:]]
-        for body in cast.movers:
-            kind = layout.types[layout.bodies[body]].name
-            if said.get(body, 0) != len(self.learner.book.components(kind)):
-                return False
+        if any(not components or said.get(body, 0) != len(components) for body, components in wanted.items()):
+            return False
         perception = percept.perception
         return self.learner.confirm(
             cast,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import check_entries, library_of
 from relgym.model.grouping import distinct
-from relgym.scene.context import canonical_order, signature, slots
+from relgym.scene.context import order_and_ties, signature, slots
 from relgym.scene.objects import ACTION, ObjectType, SceneLayout, poses
 from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
@@ -45,6 +45,13 @@ class Standing(NamedTuple):
     plain: NDArray[np.intp]
     signature: SlotSignature
     bodies: NDArray[np.intp]
+
+
+LinedUp: TypeAlias = tuple[NDArray[np.intp], list[bytes]]
+"""The other bodies of each scene in canonical order, shape ``(n, K - 1)``, and each scene's relational state."""
+
+MOST_ORDERS = 4096
+"""Of so many single scenes it is remembered how bodies are lined up."""
 
 
 class Situation:
@@ -88,7 +95,7 @@ class Situation:
         """Relational state of each scene under that order."""
         if self._body < 0:
             return [b""] * len(self._percept)
-        return signature(self._percept.relations, self._body, self._numbers)
+        return self._lined_up[1]
 
     @cached_property
     def examples(self) -> ExampleBatch:
@@ -106,12 +113,13 @@ class Situation:
         """`examples` without binary relations."""
         return self._percept.bare_examples(self._target, self._body)
 
-    @cached_property
+    @property
     def _numbers(self) -> NDArray[np.intp]:
-        percept = self._percept
-        return canonical_order(
-            percept.relations, self._body, lambda rows: poses(percept.layout, percept.vectors[rows])
-        )
+        return self._lined_up[0]
+
+    @cached_property
+    def _lined_up(self) -> LinedUp:
+        return self._percept.perception.lined_up(self._percept, self._body)
 
 
 class Perception:
@@ -165,6 +173,7 @@ class Perception:
         self._unary: dict[int, NDArray[np.bool_]] = {}
         self._features: dict[int, NDArray[np.intp]] = {}
         self._pair_counts: dict[str, int] = {}
+        self._orders: dict[tuple[int, int, bytes], LinedUp] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         # Caches are keyed by identity, which a copy doesn't share.
@@ -177,6 +186,7 @@ class Perception:
             "_unary",
             "_features",
             "_pair_counts",
+            "_orders",
         )
         return {name: value for name, value in self.__dict__.items() if name not in caches}
 
@@ -228,6 +238,26 @@ class Perception:
             known = self._standings[id(layout), target] = Standing(body, head, plain, kind, bodies)
             self._layouts[id(layout)] = layout  # keeps it alive, so that its id stays its own
         return known
+
+    def lined_up(self, percept: Percept, body: int) -> LinedUp:
+        """How the other bodies of scenes are lined up for one of them, and what state that makes.
+
+        What relations alone decide is remembered for single scenes: they mostly hold for many steps.
+        """
+        relations, alone = percept.relations, len(percept) == 1
+        key = (id(percept.layout), body, relations.table.tobytes() if alone else b"")
+        if alone and (known := self._orders.get(key)) is not None:
+            return known
+        order, tied = order_and_ties(
+            relations, body, lambda rows: poses(percept.layout, percept.vectors[rows])
+        )
+        found = order, signature(relations, body, order)
+        if alone and not tied[0]:
+            if len(self._orders) >= MOST_ORDERS:
+                self._orders.clear()
+            order.flags.writeable = False
+            self._orders[key] = found
+        return found
 
     def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
         """Columns of a regression row in the concatenation of a state vector and its next one; cached."""

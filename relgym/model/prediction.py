@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import enum
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +15,7 @@ from relgym.html import html_table
 from relgym.model.calibration import Audit
 from relgym.scene.objects import Scene, SceneLayout
 
-__all__ = ["BatchPrediction", "Outcome", "Prediction", "ScenePrediction"]
+__all__ = ["BatchPrediction", "LateAudit", "Outcome", "Prediction", "ScenePrediction"]
 
 
 class Outcome(enum.Enum):
@@ -43,6 +44,37 @@ class Outcome(enum.Enum):
 
 OUTCOMES = tuple(Outcome)
 """Order in which batches number outcomes."""
+
+
+class LateAudit:
+    """An audit that is worked out when somebody looks back: what every expert said takes longer than predicting.
+
+    Who had no say in the prediction is asked of the model as it then is.
+
+    Parameters
+    ----------
+    work
+        Works it out.
+    """
+
+    __slots__ = ("_found", "_work")
+
+    def __init__(self, work: Callable[[], Audit | None]) -> None:
+        self._work: Callable[[], Audit | None] | None = work
+        self._found: Audit | None = None
+
+    def __call__(self) -> Audit | None:
+        """The audit; worked out once."""
+        if self._work is not None:
+            self._found, self._work = self._work(), None
+        return self._found
+
+    def __reduce__(self) -> tuple[Callable[[Audit | None], LateAudit], tuple[Audit | None]]:
+        return _audited, (self(),)
+
+
+def _audited(audit: Audit | None) -> LateAudit:
+    return LateAudit(lambda: audit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +109,8 @@ class Prediction:
     interval
         Half width of the interval about the value that holds what comes in 95 % of such predictions, in units of the
         property; NaN where too few came out for that.
-    audit
-        What `WorldModel.look_back` needs to learn that.
+    record
+        What `WorldModel.look_back` needs to learn that, or what works it out; see `audit`.
     """
 
     object: str
@@ -92,7 +124,12 @@ class Prediction:
     spread: float = math.nan
     probability: float = math.nan
     interval: float = math.nan
-    audit: Audit | None = field(default=None, compare=False, repr=False)
+    record: Audit | LateAudit | None = field(default=None, compare=False, repr=False)
+
+    @builtins.property
+    def audit(self) -> Audit | None:
+        """What `WorldModel.look_back` needs; None where nobody asked who else would have had a value."""
+        return self.record() if isinstance(self.record, LateAudit) else self.record
 
     @builtins.property  # `property` is a field here
     def ok(self) -> bool:

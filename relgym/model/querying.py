@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +20,29 @@ from relgym.model.target.property_model import Verdict
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["derive", "predict", "predict_many", "settled"]
+__all__ = ["Said", "derive", "predict", "predict_many", "settled"]
 
 _PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED, _UNSURE = (
     OUTCOMES.index(o)
     for o in (Outcome.PREDICTED, Outcome.OUTSIDE, Outcome.DEPENDS, Outcome.UNEXPLAINED, Outcome.UNSURE)
 )
+
+
+class Said(NamedTuple):
+    """What modes or laws say, before it is asked how right such predictions were; attributes as of `Prediction`."""
+
+    value: float
+    outcome: Outcome
+    mode: int
+    roles: tuple[str, ...]
+    margin: float
+    frame: str
+    spread: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether a mode or a law predicts it."""
+        return self.outcome is Outcome.PREDICTED
 
 
 def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
@@ -62,7 +80,7 @@ def settled(
     percept: Percept,
     index: int,
     following: NDArray[np.float64],
-    one: Prediction,
+    one: Prediction | Said,
 ) -> Prediction:
     """A prediction with the value of who codes such ones best, how right that will be, and what it is of.
 
@@ -137,13 +155,13 @@ def _experts_one(
     found[LATEST] = math.nan if latest is None else float(latest[0])
     changes = parts.regressed(percept, index, target.property) if model.rough else None
     if changes is not None:
-        found[LINEAR : LINEAR + KINDS] = [present + float(change) for change in changes[0]]
+        found[LINEAR : LINEAR + KINDS] = [present + change for change in changes[0].tolist()]
     if model.candidates:
         found[len(EXPERTS) :] = _hypothesised(parts, target, percept, index)[0].tolist()
-    return tuple(value if math.isfinite(value) else math.nan for value in found)
+    return tuple([value if math.isfinite(value) else math.nan for value in found])
 
 
-def _outcome(one: Prediction, speaker: int, *, claimed: bool, known: bool) -> Outcome:
+def _outcome(one: Prediction | Said, speaker: int, *, claimed: bool, known: bool) -> Outcome:
     """What is known of a mode's predictions, or of a hypothesis', has the last word on whether one is claimed."""
     if one.ok or (speaker >= len(EXPERTS) and claimed):
         return Outcome.PREDICTED if claimed else Outcome.UNSURE

@@ -13,6 +13,8 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from threading import Lock
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -20,19 +22,27 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.errors import SlowWarning
+from relgym.model.calibration import GUESS, LATEST, OWN, PERSISTENCE, Audit, Key
 from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
 from relgym.model.motion import TOUCHING
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.querying import derive, settled
+from relgym.model.prediction import (
+    OUTCOMES,
+    BatchPrediction,
+    LateAudit,
+    Outcome,
+    Prediction,
+    ScenePrediction,
+)
+from relgym.model.querying import Said, derive, predict, settled
 from relgym.model.scenes import wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
 from relgym.model.trusting import trusting
-from relgym.program.records import Answer, BeyondError, Program
-from relgym.program.tape import Tape, encoded
+from relgym.program.records import Answer, BeyondError, Program, Trust
+from relgym.program.tape import Tape, encoded, kind_of, ordered
 from relgym.scene.objects import Scene, SceneLayout
 
 if TYPE_CHECKING:
@@ -43,6 +53,10 @@ __all__ = ["KERNEL", "Kernel", "Programs"]
 PATIENCE = 8
 """Scenes that arrays answer after each change of what a model says before a program is lowered: that takes about as
 long."""
+
+SETTLING = 64
+"""Scenes asked one by one, since the model last changed, before the program is told how right its predictions were:
+to write that down takes about as long as to settle so many predictions without it."""
 
 ASKING, SCENE = 5e-4, 6e-6
 """What arrays take to answer, in seconds: each time, and for each scene."""
@@ -192,6 +206,8 @@ class _Told(NamedTuple):
     sure: NDArray[np.float64]
     players: _Bits
     noted: _Bits
+    believed: _Bits
+    """Of the last scene: number and place of each answer's belief, shape ``(answers, 2)``; only where one is told."""
 
 
 class Runner:
@@ -208,11 +224,15 @@ class Runner:
         self.program = program
         self._settling: bool | None = None
         self._settled = False  # whether that is what is known now
+        self._asked = 0  # scenes one by one, since then
+        self._believing = False  # whether of all answers it is known how right they were
+        self._turn = Lock()
         tape = encoded(program)
         self._run = kernel.run
         self._roles, self._space = tape.roles, tape.space()
         if not hasattr(kernel.run, "py_func"):  # interpreted (NUMBA_DISABLE_JIT)
             self._space = self._space.view(np.recarray)
+        self._believed = self._space["believed"][0]
         pair = None if parts.laws is None else parts.laws.learner.book.pair
         frame = "world" if pair is None else pair.frame
         self._keys = tuple((a.object, a.property) for a in program.answers)
@@ -234,7 +254,7 @@ class Runner:
 
         How right its predictions are is written anew when somebody asks for many.
         """
-        self._settled = False
+        self._settled, self._asked = False, 0
         code, k, moved = self._space["code"][0], 0, False
         for model, (places, by_tie) in zip(self._voted, self._places, strict=True):
             voting = model.classifier._voting
@@ -275,11 +295,15 @@ class Runner:
         self._settling = any(t.model.calibration.trials for t in self._tellers)
         if self._settling:
             try:
-                tape = encoded(trusting(self._parts, self._layout, self.program))
+                known = trusting(self._parts, self._layout, self.program)
+                tape = encoded(known)
                 tape.lay(self._space)
                 self._lay(tape)
+                for teller, answer in zip(self._tellers, known.answers, strict=True):
+                    teller.trusts(answer.trust)
             except BeyondError:
                 self._settling = None
+        self._believing = bool(self._settling) and all(teller.spoken for teller in self._tellers)
         self._settled = True
         return self._settling
 
@@ -287,8 +311,22 @@ class Runner:
         """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not.
 
         What the program says is what arrays would have said of modes and laws; whose value counts is settled as there
-        (`relgym.model.querying.settled`). A percept of the scene may be given, for what isn't asked of the program.
+        (`relgym.model.querying.settled`), or by the program, where many scenes are asked of a model that stays as it
+        is. A percept of the scene may be given, for what isn't asked of the program.
         """
+        if self._knows() and (known := self._sure(scene)) is not None:
+            return known
+        return self._argued(scene, percept)
+
+    def _knows(self) -> bool:
+        """Whether the program knows how right its predictions were, now that one more scene is asked."""
+        if not self._settled and self._asked >= SETTLING:
+            self._settles()
+        self._asked += 1
+        return self._settled and self._believing
+
+    def _argued(self, scene: Scene, percept: Percept | None) -> ScenePrediction | None:
+        """`one` where whose value counts is settled here."""
         now = scene.vector
         if percept is None:
             percept = self._parts.perception.percept(self._layout, now[None])
@@ -321,6 +359,58 @@ class Runner:
             wrap(self._layout, following)
         return ScenePrediction(Scene(scene.schema, self._layout, following), tuple(found))
 
+    def _sure(self, scene: Scene) -> ScenePrediction | None:
+        """`one` where the program knows how right its predictions are; None where it can't tell all that is asked."""
+        now = scene.vector
+        told = self._told(now[None], settling=True, told=1)
+        if told is None:
+            return None
+        after = told.following[0]
+        probable, widths = told.sure[:, 0].tolist()
+        rows = zip(
+            self._tellers,
+            told.outcomes[0].tolist(),
+            told.modes[0].tolist(),
+            told.margins[0].tolist(),
+            told.noted[0].tolist(),
+            told.players[0],
+            probable,
+            widths,
+            told.believed.tolist(),
+            strict=True,
+        )
+        found: list[Prediction] = []
+        for k, (teller, outcome, mode, margin, noted, players, probability, interval, believed) in enumerate(
+            rows
+        ):
+            speaker, spread = teller.spoken[believed[1]]
+            value = float(after[teller.answer.column])
+            if speaker == GUESS or teller.turned(value, now):
+                return None
+            roles, own, frame = teller.known(now, mode, noted, players)
+            if speaker == LATEST and mode:
+                roles = roles[:1]
+            if speaker != OWN:
+                own = math.nan if speaker == PERSISTENCE else spread
+            audit = LateAudit(partial(_audit, self._parts, scene, k, believed[0], speaker, value))
+            found.append(
+                Prediction(
+                    teller.answer.object,
+                    teller.answer.property,
+                    value,
+                    OUTCOMES[outcome],
+                    mode,
+                    roles,
+                    margin,
+                    frame,
+                    own,
+                    probability,
+                    interval,
+                    audit,
+                )
+            )
+        return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
+
     def _told(self, vectors: NDArray[np.float64], *, settling: bool, told: int) -> _Told | None:
         """Run the program. What it writes to is new each time: another thread may ask before this one has read it."""
         n, count = len(vectors), len(self._keys)
@@ -332,8 +422,12 @@ class Runner:
             np.empty((2, n if settling else 0, count)),
             np.empty((told, count, self._roles), dtype=np.int64),
             np.zeros((told, count), dtype=np.int64),
+            np.empty((0, 2), dtype=np.int64),
         )
-        return None if self._run(self._space, vectors, settling, *found) else found
+        with self._turn:  # what was believed last stands in the work space
+            if self._run(self._space, vectors, settling, *found[:-1]):
+                return None
+            return found._replace(believed=self._believed[:count].copy()) if settling and told else found
 
 
 class _Teller:
@@ -345,15 +439,18 @@ class _Teller:
         The answer, and the model of its target.
     target, index
         Which property of which object it is of.
+    spoken
+        Who speaks in each belief, and what that one left lately, in the order on the tape; empty: nothing is believed.
     """
 
     __slots__ = (
         *("_body_names", "_frame", "_modes", "_spreads", "_turns"),
-        *("answer", "index", "model", "target"),
+        *("answer", "index", "model", "spoken", "target"),
     )
 
     def __init__(self, parts: Parts, layout: SceneLayout, answer: Answer, frame: str) -> None:
         self.answer, self._frame = answer, frame
+        self.spoken: list[tuple[int, float]] = []
         self._body_names = tuple(layout.names[i] for i in layout.bodies)
         self._modes = {mode.id: mode for mode in answer.modes}
         index = self.index = layout.index(answer.object)
@@ -374,7 +471,7 @@ class _Teller:
         margin: float,
         noted: int,
         players: _Bits,
-    ) -> Prediction | None:
+    ) -> Said | None:
         """What modes or laws say of a scene; `noted` is the mode that gave the value, or of laws whom the body touches.
 
         None where whether they have a value isn't told, or what it was before a turn was taken off.
@@ -386,17 +483,33 @@ class _Teller:
         value = math.nan
         if outcome == _PREDICTED if lawful else noted > 0:
             value = float(after[a.column])
-            if self._turns and abs(value - now[a.column]) > math.pi:
+            if self.turned(value, now):
                 return None
-        roles: tuple[str, ...] = ()
-        spread = math.nan
-        if lawful and mode:
-            roles = (a.object, *(name for k, name in enumerate(self._body_names) if noted >> k & 1))
-        elif noted > 0 and not lawful:
-            spread = self._spreads[noted](now) if noted in self._spreads else math.nan
-            roles = self._roles(mode, players) if mode else ()
-        frame = self._frame if lawful and mode == TOUCHING else "world"
-        return Prediction("", "", value, OUTCOMES[outcome], mode, roles, margin, frame, spread)
+        roles, spread, frame = self.known(now, mode, noted, players)
+        return Said(value, OUTCOMES[outcome], mode, roles, margin, frame, spread)
+
+    def trusts(self, trust: Trust | None) -> None:
+        """Take note of what is believed now."""
+        self.spoken = [] if trust is None else [(b.speaker, b.spread) for b in ordered(trust.beliefs)]
+
+    def turned(self, value: float, now: NDArray[np.float64]) -> bool:
+        """Whether a turn was taken off a value: what it was before isn't told."""
+        return self._turns and abs(value - now[self.answer.column]) > math.pi
+
+    def known(
+        self, now: NDArray[np.float64], mode: int, noted: int, players: _Bits
+    ) -> tuple[tuple[str, ...], float, str]:
+        """Roles, spread and frame of what modes or laws say; arguments as of `tell`."""
+        a = self.answer
+        if a.component >= 0:
+            if not mode:
+                return (), math.nan, "world"
+            touched = (name for k, name in enumerate(self._body_names) if noted >> k & 1)
+            return (a.object, *touched), math.nan, self._frame if mode == TOUCHING else "world"
+        if noted <= 0:
+            return (), math.nan, "world"
+        spread = self._spreads[noted](now) if noted in self._spreads else math.nan
+        return self._roles(mode, players) if mode else (), spread, "world"
 
     def _roles(self, mode: int, players: _Bits) -> tuple[str, ...]:
         known = self._modes.get(mode)
@@ -408,6 +521,27 @@ class _Teller:
         for role in known.roles:
             names[role.number + 1] = self._body_names[int(players[role.number])]
         return tuple(name for name in names if name is not None)
+
+
+def _audit(parts: Parts, scene: Scene, part: int, kind: int, speaker: int, value: float) -> Audit | None:
+    """What looking back needs of a prediction that a program settled: what the other experts said, too.
+
+    Parameters
+    ----------
+    parts, scene, part
+        The model, what it was asked, and the number of the answer.
+    kind
+        Number of the kind of prediction.
+    speaker, value
+        Who spoke, and what was said.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        said = predict(parts, parts.perception.percept(scene.layout, scene.vector[None]), scene).parts
+    known = said[part].audit if part < len(said) else None
+    if known is None:
+        return None
+    values = tuple(value if k == speaker else each for k, each in enumerate(known.values))
+    return Audit(Key(*kind_of(kind)), values, speaker)
 
 
 def _spreads(

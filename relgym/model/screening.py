@@ -82,18 +82,20 @@ class Screen:
         places = self._places(layout)
         sizes = np.maximum(np.abs(before), np.abs(after))
         limits = self._limit()[places]
-        if (sizes <= limits).all():
+        within = np.count_nonzero(sizes <= limits) == len(sizes)
+        if within:
             self._run.clear()
         else:
             self._suspect(places, np.where(np.abs(before) < np.abs(after), after, before), sizes > limits)
             limits = self._limit()[places]
-        within = bool((sizes <= limits).all())
-        for vector in (before, after):
-            magnitudes = np.abs(vector)
-            fine = slice(None) if within else magnitudes <= limits
-            self._note(places[fine], magnitudes[fine])
+            within = bool((sizes <= limits).all())
+        if np.count_nonzero(sizes > self._largest[places, 0]):  # one of both has news
+            for vector in (before, after):
+                magnitudes = np.abs(vector)
+                fine = slice(None) if within else magnitudes <= limits
+                self._note(places[fine], magnitudes[fine])
         young = self._scenes[places] < START
-        if young.any():
+        if np.count_nonzero(young):
             self._scenes[np.unique(places[young])] += 1
             self._limits = None
         if within:
@@ -104,7 +106,7 @@ class Screen:
     def plausible(self, layout: SceneLayout, vector: NDArray[np.float64]) -> bool:
         """Whether a scene's numbers are as large as is known; takes note of nothing."""
         places = self._places(layout)
-        return bool((np.abs(vector) <= self._limit()[places]).all())
+        return bool(np.count_nonzero(np.abs(vector) <= self._limit()[places]) == len(vector))
 
     def _places(self, layout: SceneLayout) -> NDArray[np.intp]:
         """Number of the property of each column; cached."""

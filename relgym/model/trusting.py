@@ -60,7 +60,7 @@ def _beliefs(model: PropertyModel, able: int) -> list[ir.Belief]:
     """What is made of all kinds of predictions, whoever of those who may have a value has one."""
     some = [bits for bits in range(able + 1) if bits & ~able == 0]
     return [
-        ir.Belief(*key, bits, told.speaker, told.probability, told.interval, claimed)
+        ir.Belief(*key, bits, told.speaker, told.probability, told.interval, claimed, told.spread)
         for key, bits, told, claimed in model.record.table(KINDS, some)
     ]
 

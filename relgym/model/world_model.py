@@ -457,12 +457,14 @@ class WorldModel:
     def _look_back(
         self, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
     ) -> None:
-        scene = prediction.scene
-        said = {(part.object, part.property): part.value for part in prediction.parts}
-        observed = scene.replace({key: said[key] + off for key, off in residuals.items() if key in said})
-        if all(
-            self._parts.screen.plausible(scene.layout, vector) for vector in (scene.vector, observed.vector)
-        ):
+        layout, expected = prediction.scene.layout, prediction.scene.vector
+        observed = expected.copy()
+        for part in prediction.parts:
+            key = part.object, part.property
+            if key in residuals:
+                observed[layout.places[key]] = part.value + residuals[key]
+        largest = np.maximum(np.abs(expected), np.abs(observed))
+        if self._parts.screen.plausible(layout, largest):
             look_back(self._parts, prediction, residuals, precision)
 
     @refusing(ConfigError)

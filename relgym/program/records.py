@@ -17,6 +17,7 @@ Behind them lie features and what modes predict. `CONSTANT` in the place of a co
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 __all__ = [
@@ -502,6 +503,8 @@ class Belief:
         That it is right, and the half width of its 95 % interval; NaN where too little is known.
     claimed
         Whether that is a prediction.
+    spread
+        Root mean square of what the speaker left lately; NaN where nothing is known. No kernel reads it.
     """
 
     outcome: int
@@ -512,6 +515,7 @@ class Belief:
     probability: float
     interval: float
     claimed: bool
+    spread: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)

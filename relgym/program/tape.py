@@ -7,6 +7,7 @@ numbers; where it holds others, it names where those begin (0: there is none). `
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from relgym.program import records as ir
 
-__all__ = ["Tape", "encoded"]
+__all__ = ["Tape", "encoded", "kind_of", "ordered"]
 
 HEADER = 28
 (
@@ -474,7 +475,7 @@ class _Writer:
             return 0
         if trust.regression is not None:
             raise ir.BeyondError("values that regressions may give")
-        some = sorted(trust.beliefs, key=_kind)
+        some = ordered(trust.beliefs)
         kinds = self.put(*map(_kind, some))
         said = self.put(*(v for each in some for v in (each.speaker, each.claimed)))
         at = self.num(*(v for each in some for v in (each.probability, each.interval)))
@@ -493,8 +494,18 @@ class _Writer:
         return self.put(1, each.mode, *self.col(each.column), self.num(each.value, each.at, each.slack))
 
 
+def ordered(beliefs: Iterable[ir.Belief]) -> list[ir.Belief]:
+    """Beliefs in the order in which they stand on the tape: that of their kinds' numbers."""
+    return sorted(beliefs, key=_kind)
+
+
+def kind_of(number: int) -> tuple[int, int, int]:
+    """Outcome, winner and lead of a kind of predictions, from its number as the kernel works it out."""
+    rest, outcome = divmod(number // 32, 8)
+    return outcome, rest // 16, rest % 16 - 2
+
+
 def _kind(belief: ir.Belief) -> int:
-    """The number of a kind of predictions, as the kernel works it out."""
     return ((belief.winner * 16 + belief.lead + 2) * 8 + belief.outcome) * 32 + belief.able
 
 

@@ -18,7 +18,7 @@ from relgym.scene.objects import SceneLayout
 if TYPE_CHECKING:
     from relgym.scene.relations import Relations
 
-__all__ = ["Slots", "canonical_order", "close_set", "signature", "slots"]
+__all__ = ["Slots", "canonical_order", "close_set", "order_and_ties", "signature", "slots"]
 
 _SAME_DISTANCE = 1e-9
 """Distances within this, in units of length, count as equal: rounding must not decide an order."""
@@ -89,15 +89,25 @@ def canonical_order(relations: Relations, body: int, pose: _Poses | None = None)
     -------
     Numbers of the other bodies, shape ``(n, K - 1)``. Column j belongs to the same type in all scenes.
     """
+    return order_and_ties(relations, body, pose)[0]
+
+
+def order_and_ties(
+    relations: Relations, body: int, pose: _Poses | None = None
+) -> tuple[_Order, NDArray[np.bool_]]:
+    """`canonical_order`, and in which scenes more than the relations to the target decides it, shape ``(n,)``."""
     groups = slots(relations.layout, body)
     plain = np.array([k for _, members in groups for k in members], dtype=np.intp)
     order = np.repeat(plain[None], len(relations), axis=0)
     if any(len(members) > 1 for _, members in groups):
-        _sort_groups(relations, body, groups, order, pose)
-    return order
+        return order, _sort_groups(relations, body, groups, order, pose)
+    return order, np.zeros(len(order), dtype=np.bool_)
 
 
-def _sort_groups(relations: Relations, body: int, groups: Slots, order: _Order, pose: _Poses | None) -> None:
+def _sort_groups(
+    relations: Relations, body: int, groups: Slots, order: _Order, pose: _Poses | None
+) -> NDArray[np.bool_]:
+    """Sort the bodies of each type, in place; in which scenes their relations to the target don't decide."""
     table = relations.table
     toward = _codes(table[:, :, :, body], table[:, :, body])
     tied, spans, at = np.zeros(len(order), dtype=np.bool_), [], 0
@@ -110,13 +120,14 @@ def _sort_groups(relations: Relations, body: int, groups: Slots, order: _Order, 
         at += len(members)
     rows = np.flatnonzero(tied)
     if not len(rows):
-        return
+        return tied
     near = np.round(relations.distances(body)[rows] / _SAME_DISTANCE)
     around = _around(table[rows], body, groups, toward[rows])
     last = [] if pose is None else list(pose(rows).transpose(2, 0, 1)[::-1])
     for span, members, codes in spans:
         keys = [key[:, members] for key in (*last, near, around)]
         order[rows, span] = members[np.lexsort([*keys, codes[rows]], axis=-1)]
+    return tied
 
 
 def signature(relations: Relations, body: int, order: _Order | None = None) -> list[bytes]:

@@ -83,6 +83,13 @@ class SceneLayout:
         return {name: i for i, name in enumerate(self.names)}
 
     @cached_property
+    def _by_type(self) -> dict[str, tuple[int, ...]]:
+        names = [t.name for t in self.types]
+        return {
+            name: tuple(i for i, each in enumerate(names) if each == name) for name in dict.fromkeys(names)
+        }
+
+    @cached_property
     def places(self) -> Mapping[tuple[str, str], int]:
         """Column of each (object, property)."""
         names = (
@@ -126,7 +133,7 @@ class SceneLayout:
     @refusing(QueryError)
     def of_type(self, type_name: str) -> tuple[int, ...]:
         """Indices of the objects of exactly that type."""
-        return tuple(i for i, t in enumerate(self.types) if t.name == type_name)
+        return self._by_type.get(type_name, ())
 
 
 @dataclass(frozen=True, slots=True)

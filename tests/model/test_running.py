@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from collections.abc import Callable
 
@@ -10,13 +11,16 @@ import pytest
 from dreams import LINE_STEPS, cart_model, line_model, room_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from programs import arrays
+from programs import MODELS, arrays, looked_back, scenes_of
 from worlds import LINE_TARGETS, learned, schema_of, transitions
 
 from relgym.config import ModelConfig
 from relgym.errors import SlowWarning
 from relgym.model import running
+from relgym.model.calibration import Audit, Key
 from relgym.model.lowering import lowered
+from relgym.model.prediction import LateAudit, Prediction
+from relgym.model.querying import predict
 from relgym.model.world_model import WorldModel
 from relgym.program.records import BeyondError
 from relgym.scene.objects import Scene
@@ -133,3 +137,53 @@ def test_what_has_no_program_says_why() -> None:
     fcl = WorldModel(schema, ModelConfig(geometry="fcl"))
     with pytest.raises(BeyondError, match="geometry 'fcl'"):
         lowered(fcl._parts, schema.layout())
+
+
+def fields_of(part: Prediction) -> list[object]:
+    """All that a prediction says; NaN as a word, since it differs from itself."""
+    told = [
+        part.object,
+        part.property,
+        part.value,
+        part.outcome,
+        part.mode,
+        part.roles,
+        part.margin,
+        part.frame,
+    ]
+    said = [*told, part.spread, part.probability, part.interval, part.audit]
+    return [repr(each) for each in said]
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+def test_a_program_that_settles_says_what_arrays_say(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "SETTLING", 0)
+    model = looked_back(MODELS[name](), seed=3)
+    layout, vectors = scenes_of(model, 60, seed=4)
+    for vector in vectors:
+        scene = Scene(model.schema, layout, vector)
+        known = predict(model._parts, model._parts.perception.percept(layout, vector[None]), scene)
+        found = model.predict_one(scene)
+        np.testing.assert_array_equal(found.scene.vector, known.scene.vector)
+        assert [fields_of(part) for part in found.parts] == [fields_of(part) for part in known.parts]
+
+
+def test_many_single_scenes_are_settled_by_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = looked_back(cart_model())
+    layout, vectors = scenes_of(model, 1, seed=4)
+    scene = Scene(model.schema, layout, vectors[0])
+    monkeypatch.setattr(running, "SETTLING", 3)
+    late = [any(isinstance(p.record, LateAudit) for p in model.predict_one(scene).parts) for _ in range(6)]
+    assert late == [False] * 3 + [True] * 3
+    found = model.predict_one(scene)
+    model.look_back(found, {(p.object, p.property): 0.0 for p in found.parts})
+    assert not any(isinstance(p.record, LateAudit) for p in model.predict_one(scene).parts)
+
+
+def test_a_late_audit_is_worked_out_once_and_copied_as_what_it_says() -> None:
+    asked = []
+    audit = Audit(Key(0, 1, 2), (1.0,), 0)
+    late = LateAudit(lambda: asked.append(1) or audit)
+    copied = pickle.loads(pickle.dumps(late))
+    assert late() == late() == copied() == audit
+    assert asked == [1]

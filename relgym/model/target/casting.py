@@ -36,10 +36,22 @@ class Casting:
         self.vocabulary = vocabulary
         self.config = config
         self.classifiers: dict[int, RoleClassifier] = {}
+        self._cast: dict[int, tuple[Mode, tuple[Role, ...], tuple[RoleKind, ...]]] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_cast": {}}
 
     def embodied(self, mode: Mode) -> tuple[Role, ...]:
         """Roles of a mode that bodies play, the target's own left aside."""
-        return tuple(role for role in mode.open_roles if role.type in self.vocabulary.unary)
+        return self._roles(mode)[0]
+
+    def _roles(self, mode: Mode) -> tuple[tuple[Role, ...], tuple[RoleKind, ...]]:
+        """Roles that bodies play, and their kinds; of the latest mode of each id they are remembered."""
+        known = self._cast.get(mode.id)
+        if known is None or known[0] is not mode:
+            roles = tuple(role for role in mode.open_roles if role.type in self.vocabulary.unary)
+            known = self._cast[mode.id] = (mode, roles, tuple(RoleKind(*role.kind) for role in roles))
+        return known[1], known[2]
 
     def sync(self, modes: Mapping[int, Mode]) -> None:
         """Follow a change of the modes: drop classifiers of those that are gone or have other roles."""
@@ -100,4 +112,4 @@ class Casting:
         }
 
     def _kinds(self, mode: Mode) -> tuple[RoleKind, ...]:
-        return tuple(RoleKind(*role.kind) for role in self.embodied(mode))
+        return self._roles(mode)[1]

@@ -49,8 +49,10 @@ class Fallback:
     @property
     def inexact(self) -> bool:
         """Whether modes are approximations, or leave more than rounding explains, and nobody said that they would."""
-        rough = self.clusterer.scale.sigma > ROUGH * self.clusterer.floor
-        return self.clusterer.approximate or (rough and self.clusterer.config.noise_std == "auto")
+        known = self.clusterer.population
+        if known.approximate:
+            return True
+        return known.scale.sigma > ROUGH * self.clusterer.floor and known.config.noise_std == "auto"
 
     @property
     def guessable(self) -> bool:
@@ -70,7 +72,10 @@ class Fallback:
     @property
     def guesses_something(self) -> bool:
         """Whether there is any guess that stands in."""
-        return self.guess is not None or self.guess_beyond is not None
+        known = self.guesses
+        if known.best is None and (known.beyond is None or self.scope.tree is None):
+            return False
+        return self.guessable
 
     def guess_at(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Guess | None:
         """The guess for one object of a single scene; arguments as of `predict_one`."""

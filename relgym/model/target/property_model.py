@@ -166,7 +166,9 @@ class PropertyModel:
         budget
             What may be spent on searches; default: as much as they take.
         """
-        self._compare(situation, example, table.x[row], y)
+        x = table.x[row : row + 1]
+        seen = self._with_next(example, situation.signature, x, len(self.clusterer.y))
+        self._compare(situation, seen, x[0], y)
         report = self.clusterer.learn_one(table, row, y, budget)
         self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
@@ -174,19 +176,15 @@ class PropertyModel:
         self.fallback.unexplained = self._assess()
         if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
             self._measure(table)
-        x = table.x[row : row + 1]
         refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
         if report.changed or refuted or self.stops.contradicted(report.mode, situation.signature, x[0]):
             self._follow(table)
-        number = len(self.clusterer.y) - 1
-        own = np.concatenate([example.own, self.conditions.values(situation.signature, x)[0]])
-        seen = example.with_own(own, number)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(
             self.functions.values_one(situation.signature, x[0].tolist(), self.classifier.modes)
         )
         assigned = UNKNOWN if report.mode == NOISE or self.bounds(report.mode) else report.mode
-        played = self.functions.played_one(table, number, report.mode)
+        played = self.functions.played_one(table, seen.row, report.mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played)
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
@@ -201,11 +199,20 @@ class PropertyModel:
         if not self.fallback.scope.covers_one(row, situation.signature):
             return
         values = self.functions.values_one(situation.signature, row, self.classifier.modes)
-        own = np.concatenate([example.own, self.conditions.values(situation.signature, x[None])[0]])
-        first = self.classifier.rank(example.with_own(own), values).modes[0]
+        first = self.classifier.rank(example, values).modes[0]
         said = values[self.classifier.modes.index(first)]
         if np.isfinite(said):
             self.fallback.guesses.compare(said - y, binding.value(row) - y)
+
+    def _with_next(
+        self, example: Example, signature: SlotSignature, x: NDArray[np.float64], number: int = -1
+    ) -> Example:
+        """An example by its number, with the next values that clauses may test, of a regression row ``(1, d)``."""
+        if not self.conditions.pairs:
+            return example.with_own(example.own, number)
+        return example.with_own(
+            np.concatenate([example.own, self.conditions.values(signature, x)[0]]), number
+        )
 
     @property
     def flags(self) -> frozenset[str]:
@@ -401,9 +408,9 @@ class PropertyModel:
     @property
     def asks_latest(self) -> bool:
         """Whether the mode that held last is asked: not where the vote's winners are mostly right."""
-        known = self.latest in self.clusterer.clusters and not self.bounds(self.latest)
-        asked = self.rough or self.record.doubts(_PREDICTED)
-        return known and asked and len(self.classifier.modes) >= 2
+        if len(self.classifier.modes) < 2 or self.latest not in self.clusterer.clusters:
+            return False
+        return not self.bounds(self.latest) and (self.rough or self.record.doubts(_PREDICTED))
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]
@@ -425,7 +432,7 @@ class PropertyModel:
     @property
     def rough(self) -> bool:
         """Whether so much is unexplained, or explained only roughly, that regressions may know better."""
-        return self.fallback.guessable or self._unsettled
+        return self._unsettled or self.fallback.guessable
 
     @property
     def lost(self) -> bool:
@@ -452,10 +459,7 @@ class PropertyModel:
     def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
         """`example` without the key, by which examples are kept and not classified."""
         first = situation.examples[0]
-        if not self.conditions.pairs:
-            return first
-        ahead = self.conditions.values(situation.signature, x)[0]
-        return first.with_own(np.concatenate([first.own, ahead]))
+        return self._with_next(first, situation.signature, x) if self.conditions.pairs else first
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
