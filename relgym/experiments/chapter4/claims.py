@@ -618,7 +618,7 @@ CLAIMS: Final = (
         _rolled("original"),
         (26, 48),
         (16, 60),
-        "a trial has some six bounces, and of those of either kind one in four is misclassified",
+        "some six bounces a trial, one in four misclassified",
     ),
     Claim(
         "4.8",
