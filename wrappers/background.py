@@ -147,7 +147,7 @@ class Background:
             parcel.append(transition)
         return True
 
-    def fetch(self) -> tuple[WorldModel, Prequential | None]:
+    def fetch(self) -> tuple[SceneLearner, Prequential | None]:
         """Wait until everything queued was learned; copies of the model and of the counts.
 
         Raises
@@ -262,7 +262,7 @@ def _end_with(parent: int) -> None:
 
 
 def _learn(
-    model: WorldModel,
+    model: SceneLearner,
     prequential: Prequential | None,
     precision: float,
     functions: bytes,
@@ -327,14 +327,15 @@ def _registered(sent: bytes) -> Exception | None:
 
 
 def _take_up(
-    model: WorldModel, prequential: Prequential | None, precision: float, transition: Transition
+    model: SceneLearner, prequential: Prequential | None, precision: float, transition: Transition
 ) -> None:
     if prequential is not None:
         prediction = model.predict_one(transition.before)
         residuals, wrong = compared(prediction, transition.after, precision)
         prequential.count(residuals, wrong, Outcomes.of(prediction, transition.before, residuals))
-        model.look_back(prediction, residuals, precision)
-    model.learn_one(transition)
+        model.take_up(transition, prediction, residuals, precision)
+    else:
+        model.learn_one(transition)
 
 
 def _packed(transitions: Iterable[Transition]) -> list[Bundle]:

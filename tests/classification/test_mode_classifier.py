@@ -283,23 +283,6 @@ def test_ties_go_to_the_mode_with_more_examples_then_to_the_lower_id() -> None:
     assert classifier.rank(item.example, [0.0] * 3).modes == (9, 2, 4)
 
 
-@pytest.mark.parametrize("preset", ["thesis", "original"])
-def test_presets_learn_what_relations_can_tell(
-    preset: str, stream: list[Labelled], fresh: list[Labelled]
-) -> None:
-    config = getattr(ClassificationConfig, preset)()
-    classifier = _empty(config=config)
-    for item in stream[:2000]:
-        classifier.observe(item.example, item.mode, item.fits, item.values)
-    classifier.refresh()
-    names = " ".join(str(c.definition) for c in classifier.classifiers)
-    assert "approach" not in names
-    assert "F0" not in names
-    items = [item for item in fresh[:2000] if item.mode != RAMP]
-    # Which of bouncing and leaving it is, no relation tells; the bulk of all examples is clear all the same.
-    assert 0 < _wrong(classifier, items) <= 0.2 * len(items)
-
-
 def test_table_3_2_from_a_truck_with_bystanders() -> None:
     classifier = _empty((1, 2, 3), TRUCK_VOCABULARY)
     _taught_truck(classifier, 48, bystanders=2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
@@ -176,7 +176,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
     @property
     def world(self) -> WorldModel:
         """What was learned, as of the last `catch_up`; `model` is Stable-Baselines3's name of the algorithm."""
-        return self.observer.study.model
+        return cast("WorldModel", self.observer.study.model)  # it was given none of another kind
 
     @property
     def prequential(self) -> Prequential:
@@ -215,7 +215,7 @@ class ModelCallback(BaseCallback):  # type: ignore[misc]
 
     def catch_up(self) -> WorldModel:
         """Wait until the background process has learned all it was sent; the model as it then is."""
-        return self.observer.study.catch_up()
+        return cast("WorldModel", self.observer.study.catch_up())
 
     def save(self, path: str | os.PathLike[str], *, history: bool = False) -> None:
         """Write model, spaces, view and some first scenes to one file, as `ModelLearner.save`."""
