@@ -230,10 +230,10 @@ class ModeSearch:
         """The end of `_pool`, all that `extended` looks at: found without a look at everything that is remembered."""
         if is_flag(self.population.y):  # how many took a value counts
             return self._pool(table, signature)
-        found, end, block = np.empty(0, dtype=np.intp), len(self.population.y), 2 * SEARCH
+        found, end, length = np.empty(0, dtype=np.intp), len(self.population.y), 2 * SEARCH
         while end > 0 and len(found) < SEARCH:
-            found = np.concatenate([self._pool(table, signature, slice(max(end - block, 0), end)), found])
-            end, block = end - block, 2 * block
+            found = np.concatenate([self._pool(table, signature, slice(max(end - length, 0), end)), found])
+            end, length = end - length, 2 * length
         return found[-SEARCH:]
 
     def _pool(self, table: ExampleTable, signature: int, among: slice = slice(None)) -> NDArray[np.intp]:
