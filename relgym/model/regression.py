@@ -121,9 +121,10 @@ class Regression:
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
         found = np.full((len(x), KINDS, len(self.targets)), np.nan)
-        shown = self._shown(self._scaled(x[:, places]))
-        for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
-            found[:, k, : len(ridge.weights)] = ridge.predict(columns)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a gross error nothing is told
+            shown = self._shown(self._scaled(x[:, places]))
+            for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
+                found[:, k, : len(ridge.weights)] = ridge.predict(columns)
         least, most = self._range
         slack = BEYOND * (most - least)
         clipped: NDArray[np.float64] = np.clip(found, least - slack, most + slack)

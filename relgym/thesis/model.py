@@ -105,7 +105,7 @@ class ThesisModel:
     >>> episodes = list(islice(ball_episodes(1, seed=900), 3))
     >>> model = ThesisModel(episodes[0].schema, ThesisSettings.thesis())
     >>> for transition in (t for episode in episodes for t in episode.transitions()):
-    ...     model.learn_one(transition)
+    ...     _ = model.learn_one(transition)
     >>> [mode.formula(3) for mode in model.modes("ball", "vy")][:2]
     ["vy' = 0", "vy' = vy - 0.00098"]
     """

@@ -76,9 +76,12 @@ def test_votes_are_whole_units() -> None:
 def test_familiar_is_what_was_seen_or_what_a_clause_speaks_for() -> None:
     voting = _voting()
     values = [0.0] * 3
-    assert voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN).familiar  # a clause spoke for mode 1
     assert not voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN).seen
     sure = [[9.0, 0.0], [0.0, 9.0]]
+    voting.set_pairs([_pair(i, j, sure, fires=True) for i, j in ((1, 2), (1, 3), (2, 3))])
+    assert voting.rank(
+        _ITEM.example, values, _COUNTS, _NOTHING_SEEN
+    ).familiar  # a clause spoke for the winner
     voting.set_pairs([_pair(i, j, sure, fires=False) for i, j in ((1, 2), (1, 3), (2, 3))])
     abstained = voting.rank(_ITEM.example, values, _COUNTS, _NOTHING_SEEN)
     assert abstained.modes[0] == 3

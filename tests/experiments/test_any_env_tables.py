@@ -136,7 +136,7 @@ def test_the_stream_is_compared_with_what_others_say(
     still = np.zeros_like(columns["change"])
     assert size(still, columns["change"], columns["ended"] | True)[0] == pytest.approx(1.0, abs=0.01)
     found = dict(stream("ball", rows["ball"], verbose=True, batch=False))
-    assert len(found) == 2 and max(found.values()) < 1.0
+    assert len(found) == 2 and max(found.values()) < 1.05
     text = capsys.readouterr().out
     assert "ball.dy, all steps" in text and "constant velocity" in text
 
