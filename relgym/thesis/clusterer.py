@@ -213,8 +213,8 @@ class Clusterer:
     def _converge(self) -> None:
         """E-steps and M-steps until no example changes its mode."""
         for _ in range(self.settings.em_iterations):
-            lost, gained = self._assign()
-            stale = gained | (lost if self.settings.refit_after_loss else set())
+            lost = self._assign()
+            stale = lost if self.settings.refit_after_loss else set()
             refitted = [self._refit(c) for c in list(self.clusters) if c.number in stale]
             gone = [c for c in self.clusters if len(self.members(c.number)) < self.settings.least_members]
             for cluster in gone:
@@ -223,11 +223,11 @@ class Clusterer:
             if not any(refitted) and not gone:
                 return
 
-    def _assign(self) -> tuple[set[int], set[int]]:
-        """E-step. Modes that lost an example, and modes that took one whose error is beyond the tolerance."""
+    def _assign(self) -> set[int]:
+        """E-step. Modes that lost an example; one that takes an example explains it, and needs no other function."""
         n = self.examples.count
         if not self.clusters:
-            return set(), set()
+            return set()
         errors = np.stack([self._errors[c.number][:n] for c in self.clusters], axis=1)
         best = errors.min(axis=1)
         numbers = np.array([c.number for c in self.clusters])
@@ -236,7 +236,7 @@ class Clusterer:
         lost = set(self.labels[moved].tolist()) - {NOISE}
         for number in np.unique(after[moved]).tolist():
             self._move(moved[after[moved] == number], number)
-        return lost, set()
+        return lost
 
     def _refit(self, cluster: Cluster) -> bool:
         """M-step: fit the function to all its examples, each under its best casting; whether it changed.
