@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from gymnasium import spaces
-from simulated import Corridor, Line
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from simulated import Corridor, Line, Table
 
 from relgym.errors import ConfigError
 from relgym.planning import (
@@ -20,7 +24,8 @@ from relgym.planning import (
     Simulator,
     TreeSearch,
 )
-from relgym.planning.sequences import held_noise
+from relgym.planning.sequences import _varied, held_noise
+from relgym.planning.tree import _Tree
 
 SEARCHES: list[Search] = [
     CrossEntropy(horizon=6, candidates=64, rounds=4),
@@ -167,3 +172,147 @@ def test_with_curiosity_a_plan_leads_into_what_is_not_known() -> None:
         assert not plan.known
         assert len(plan.states) == len(plan.actions) == len(plan.rewards) + 1
         assert Fog().step(plan.states[-1][None], plan.actions[-1][None]).known.tolist() == [False]
+
+
+# ---------------------------------------------------------------------- all plans of a small world, one by one
+HORIZON = 3
+THOROUGH: list[Search] = [
+    CrossEntropy(horizon=HORIZON, candidates=512, rounds=2),
+    PathIntegral(horizon=HORIZON, candidates=512, rounds=2),
+    RandomShooting(horizon=HORIZON, candidates=1024),
+    TreeSearch(horizon=HORIZON, expansions=1024, batch=128, patience=1024),
+]
+"""All but the tree look at every plan: it keeps one branch of each cell, the best as far as it goes."""
+
+
+def worth_of(world: Table, actions: tuple[int, ...], discount: float) -> float | None:
+    """What a plan from state 0 pays; None where it leads into what isn't known."""
+    state, total = 0, 0.0
+    for k, action in enumerate(actions):
+        if world.leads[state, action] < 0:
+            return None
+        total += discount**k * float(world.pays[state, action])
+        if world.ends[state, action]:
+            break
+        state = int(world.leads[state, action])
+    return total
+
+
+PAYS = st.integers(-4, 4).map(float)
+
+
+@pytest.mark.parametrize("how", THOROUGH, ids=lambda s: type(s).__name__)
+@settings(max_examples=12, deadline=None)
+@given(
+    leads=arrays(np.int64, (5, 3), elements=st.integers(0, 4)),
+    pays=arrays(np.float64, (5, 3), elements=PAYS),
+    ends=arrays(np.bool_, (5, 3), elements=st.integers(0, 3).map(lambda k: k == 0)),
+    discount=st.sampled_from((1.0, 0.5)),
+)
+def test_no_plan_of_a_small_world_is_better(
+    how: Search, leads: Any, pays: Any, ends: Any, discount: float
+) -> None:
+    world = Table(leads, pays, ends)
+    worths = [worth_of(world, plan, discount) for plan in itertools.product(range(3), repeat=HORIZON)]
+    coder = ActionCoder(world.action_space)
+    options: dict[str, Any] = {"warm": None, "rng": np.random.default_rng(0), "deadline": None}
+    plan = how.plan(world, coder, np.array([0.0]), Objective(discount=discount), **options)
+    best = max(w for w in worths if w is not None)
+    assert plan.worth == pytest.approx(best, abs=1e-12) or (isinstance(how, TreeSearch) and plan.worth < best)
+    assert plan.worth == pytest.approx(worth_of(world, tuple(plan.actions.tolist()), discount), abs=1e-12)
+    assert plan.known and len(plan.rewards) == len(plan.actions)
+
+
+@pytest.mark.parametrize("how", THOROUGH[:3], ids=lambda s: type(s).__name__)
+def test_what_is_not_known_is_worth_what_curiosity_says(how: Search) -> None:
+    """Action 0 pays 1 a step; action 2 leads nowhere known: worth 2 a step there, not 1.5 after two steps of 1."""
+    leads = np.array([[0, 0, -1]] * 5)
+    pays, ends = np.array([[1.0, 0.0, 0.0]] * 5), np.zeros((5, 3), dtype=np.bool_)
+    world, coder = Table(leads, pays, ends), ActionCoder(spaces.Discrete(3))
+    options: dict[str, Any] = {"warm": None, "rng": np.random.default_rng(0), "deadline": None}
+    plan = how.plan(world, coder, np.array([0.0]), Objective(curiosity=2.0), **options)
+    assert plan.actions.tolist() == [0, 0, 2] and not plan.known and plan.worth == 4.0
+    assert plan.rewards.tolist() == [1.0, 1.0] and plan.states.ravel().tolist() == [0.0, 0.0, 0.0]
+    plan = how.plan(world, coder, np.array([0.0]), Objective(), **options)
+    assert plan.actions.tolist() == [0, 0, 0] and plan.known and plan.worth == 3.0
+
+
+def test_path_integrals_by_hand() -> None:
+    """Two candidates, worths 1 and 0: weights e^(2 / 0.2) = e^10 to 1 where they spread by 0.5."""
+    seen: list[Any] = []
+
+    class Two(Line):
+        def step(self, states: Any, actions: Any) -> Any:
+            seen.append(np.asarray(actions, dtype=np.float64).ravel().copy())
+            some = len(states)
+            paid, no = np.linspace(1.0, 0.0, some), np.zeros(some, dtype=np.bool_)
+            return replace(super().step(states, actions), rewards=paid, known=~no, terminated=no)
+
+    how = PathIntegral(horizon=1, candidates=2, rounds=2, spread=1e-9)
+    world = Two(action_space=spaces.Box(-1e3, 1e3, (1,), np.float64))
+    how.plan(
+        world,
+        ActionCoder(world.action_space),
+        np.array([0.0]),
+        Objective(),
+        warm=None,
+        rng=np.random.default_rng(0),
+        deadline=None,
+    )
+    (first, second), later = seen
+    mean = (np.exp(10.0) * first + second) / (np.exp(10.0) + 1.0)
+    # The best of the last round is kept; of the others half are drawn about the mean, hardly spread at all.
+    assert later[0] == first and later[1] == pytest.approx(mean, abs=1e-4)
+
+
+def test_noise_is_held_for_one_length_in_each_sequence() -> None:
+    """Holds of 1, 2, 4, 8 decisions, from any phase: between two changes lies one length, or it is cut off."""
+    lengths = set()
+    for row in held_noise(400, 8, 2, rng=np.random.default_rng(1)):
+        changes = np.flatnonzero((np.diff(row, axis=0) != 0.0).all(axis=1)) + 1
+        assert len(changes) == len(np.flatnonzero((np.diff(row, axis=0) != 0.0).any(axis=1)))
+        inner = set(np.diff(changes).tolist())
+        assert len(inner) <= 1
+        lengths |= inner
+    assert lengths == {1, 2, 4}
+
+
+def test_variations_change_one_stretch_of_a_kept_sequence() -> None:
+    kept = np.arange(5.0)[None, :, None].repeat(2, axis=0) * np.array([1.0, 10.0])[:, None, None]
+    noise = np.ones((200, 5, 1))
+    for row in _varied(kept, noise, rng=np.random.default_rng(0))[:, :, 0]:
+        off = np.stack([row - kept[0, :, 0], row - kept[1, :, 0]])
+        mine = off[np.abs(off).max(axis=1).argmin()]
+        assert np.unique(np.round(mine[mine != 0.0], 12)).size == 1  # one size of change
+        places = np.flatnonzero(mine)
+        assert len(places) and places.tolist() == list(range(places[0], places[-1] + 1))
+        assert 0.02 <= mine[places[0]] <= 1.0
+
+
+def tree_of(*ways: tuple[int, float, bool]) -> _Tree:
+    """A tree grown by hand: parent, reward and whether that ended the episode, of nodes 1, 2, …; horizon 2."""
+    tree = _Tree(np.array([0.0]), 32, 2, Objective())
+    for parent, reward, ended in ways:
+        one = np.array([reward])
+        state = tree.states[[parent]] + reward
+        tree.grow(np.array([parent]), state, one, one, np.zeros((1, 1)), np.array([ended]))
+    return tree
+
+
+def test_the_best_whole_branch_of_a_tree_by_hand() -> None:
+    coder = ActionCoder(spaces.Box(-1.0, 1.0, (1,), np.float64))
+    # 1 pays 5 and leads to 2, which costs 4: whole, worth 1. 3 ends the episode for 2.
+    tree = tree_of((0, 5.0, False), (1, -4.0, False), (0, 2.0, True))
+    assert (tree.whole, tree.whole_worth, tree.ended, tree.ended_worth) == (2, 1.0, 3, 2.0)
+    plan = tree.branch(tree.best(), coder)
+    assert (plan.worth, plan.terminates, plan.rewards.tolist()) == (2.0, True, [2.0])
+    tree = tree_of((0, 5.0, False), (1, -2.0, False), (0, 2.0, True))
+    plan = tree.branch(tree.best(), coder)
+    assert (plan.worth, plan.terminates, plan.rewards.tolist()) == (3.0, False, [5.0, -2.0])
+    assert plan.states.ravel().tolist() == [0.0, 5.0, 3.0]
+
+
+def test_a_tree_of_nothing_but_its_root_has_an_action() -> None:
+    coder = ActionCoder(spaces.Box(-1.0, 1.0, (1,), np.float64))
+    plan = _Tree(np.array([4.0]), 32, 2, Objective()).branch(0, coder)
+    assert len(plan) == 1 and not plan.known and plan.worth == -np.inf and plan.states.tolist() == [[4.0]]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.planning import Steps
 
-__all__ = ["Corridor", "Line"]
+__all__ = ["Corridor", "Line", "Table"]
 
 
 @dataclass
@@ -40,6 +40,31 @@ class Line:
         return Steps(
             np.where(known[:, None], after, states), np.where(known, -off, 0.0), known & (off < 0.05), known
         )
+
+
+@dataclass
+class Table:
+    """Five states, three actions: where each leads (-1: nobody knows), what it pays, and whether it ends the episode."""
+
+    leads: NDArray[np.int64]
+    pays: NDArray[np.float64]
+    ends: NDArray[np.bool_]
+    action_space: spaces.Space[Any] = field(default_factory=lambda: spaces.Discrete(3))
+    observation_space: spaces.Space[Any] = field(
+        default_factory=lambda: spaces.Box(0.0, 4.0, (1,), np.float64)
+    )
+
+    def state(self, observation: Any) -> NDArray[np.float64]:
+        return np.asarray(observation, dtype=np.float64)
+
+    def prepare(self) -> None:
+        pass
+
+    def step(self, states: NDArray[np.float64], actions: NDArray[Any]) -> Steps:
+        at = states[:, 0].astype(np.int64), np.asarray(actions, dtype=np.int64).reshape(-1)
+        known = self.leads[at] >= 0
+        after = np.where(known, self.leads[at], states[:, 0])[:, None].astype(np.float64)
+        return Steps(after, np.where(known, self.pays[at], 0.0), self.ends[at] & known, known)
 
 
 @dataclass
