@@ -62,7 +62,7 @@ class Draws:
         """Draw one of `values`; `ConfigError` when the option is none of them."""
         drawn = values[int(self.rng.integers(len(values)))]
         value: T = self.options.get(name, drawn)
-        if value not in values:
+        if isinstance(value, np.ndarray) or value not in values:
             raise ConfigError(f"option {name!r}: expected one of {list(values)}, got {value!r}")
         self.taken[name] = value
         return value
@@ -70,8 +70,9 @@ class Draws:
     def order(self, name: str, values: tuple[str, ...]) -> tuple[str, ...]:
         """Draw a permutation of `values`; `ConfigError` when the option is none."""
         drawn = tuple(values[int(i)] for i in self.rng.permutation(len(values)))
-        value = tuple(self.options.get(name, drawn))
+        given = self.options.get(name, drawn)
+        value = tuple(map(str, given)) if isinstance(given, (Sequence, np.ndarray)) else ()
         if sorted(value) != sorted(values):
-            raise ConfigError(f"option {name!r}: expected {list(values)} in some order, got {value}")
+            raise ConfigError(f"option {name!r}: expected {list(values)} in some order, got {given!r}")
         self.taken[name] = value
         return value

@@ -95,7 +95,8 @@ def _dict(data: Mapping[str, Any]) -> spaces.Space[Any]:
     if len(set(names)) < len(names):
         raise ValueError(f"keys must differ, got {names}")
     parts = {name: _read(part) for name, part in data["spaces"]}
-    return AgentsSpace(parts) if data["kind"] == "agents" else spaces.Dict(parts)
+    # Pairs keep their order, which flat vectors follow; Gymnasium sorts the keys of a dict.
+    return AgentsSpace(parts) if data["kind"] == "agents" else spaces.Dict(list(parts.items()))
 
 
 def _tuple(data: Mapping[str, Any]) -> spaces.Space[Any]:
