@@ -484,7 +484,7 @@ class _Lowering:
             self.wanted |= {r for _, relations, _ in known.used for r in relations}
             experience = ir.Experience(used, tuple(sorted(int(s) for s in known.seen)))
         by_tie = tuple(classifier._voting._by_tie(classifier.counts))
-        return ir.Vote(contests, by_tie, True, experience)
+        return ir.Vote(contests, by_tie, experience)
 
     def _contest(
         self,

@@ -1217,29 +1217,17 @@ def rank(s, vote, count, target):
     for i in range(count):
         for j in range(count):
             lead[i, j] = 0
-    for k in range(s.code[vote + 1]):
-        contest = s.code[vote + 4 + k]
+    for k in range(s.code[vote]):
+        contest = s.code[vote + 3 + k]
         a, b = s.code[contest], s.code[contest + 1]
         at = s.code[contest + 3] + 2 * decide(s, contest, target)
         lead[a, b] = s.code[at]
         lead[b, a] = s.code[at + 1]
-    if not s.code[vote]:
-        for i in range(count):
-            totals[i] = 0
-            for j in range(count):
-                totals[i] += lead[i, j]
-        for k in range(count):
-            mode, j = s.code[s.code[vote + 2] + k], k
-            while j > 0 and totals[order[j - 1]] < totals[mode]:
-                order[j] = order[j - 1]
-                j -= 1
-            order[j] = mode
-        return totals[order[0]] - totals[order[1]]
     for i in range(count):
         for j in range(i):
             lead[i, j], lead[j, i] = lead[i, j] - lead[j, i], lead[j, i] - lead[i, j]
     for i in range(count):
-        alive[i] = s.code[s.code[vote + 2] + i]
+        alive[i] = s.code[s.code[vote + 1] + i]
         totals[i] = 0
         for j in range(count):
             totals[i] += lead[i, j]
@@ -1537,7 +1525,7 @@ def ranked(s, a, slot):
 @compiled
 def familiar(s, a, slot):
     """Whether the situation was seen in training, or what is remembered of that."""
-    experience, target = s.code[s.code[a + 11] + 3], max(s.code[a + 2], 0)
+    experience, target = s.code[s.code[a + 11] + 2], max(s.code[a + 2], 0)
     if slot < 0:
         return seen_before(s, experience, target)
     record = s.memory[slot]
@@ -1615,7 +1603,7 @@ def by_modes(s, a, answer):
         slot = remembered(s, a)
     if vote:
         margin = ranked(s, a, slot) / VOTE_UNIT
-        if s.code[vote + 3] and not familiar(s, a, slot):
+        if s.code[vote + 2] and not familiar(s, a, slot):
             mode = s.code[modes + s.order[0, 0]]
             value = x[s.code[mode + 1]]
             return clip(s, s.code[a + 18], clipped, value), OUTSIDE, s.code[mode], 0.0

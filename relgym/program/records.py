@@ -340,11 +340,10 @@ class Experience:
 
 @dataclass(frozen=True, slots=True)
 class Vote:
-    """One-against-one voting: all contests, places by who wins ties, and whether there is a run-off."""
+    """One-against-one voting with a run-off: all contests, and places by who wins ties."""
 
     contests: tuple[Contest, ...]
     by_tie: tuple[int, ...]
-    runoff: bool
     experience: Experience | None
 
 

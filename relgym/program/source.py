@@ -35,16 +35,22 @@ def python_source(program: ir.Program, told: str, sentences: tuple[str, ...]) ->
     Notes
     -----
     Whatever a program says can be written: the text grows with it, some lines for each mode, law and stage of a choice.
+    Names are made of those of objects and properties; where two would be the same (``a_b.c`` and ``a.b_c``), all get
+    numbers.
     """
-    return _Source(program, told, sentences).text()
+    text = _Source(program, told, sentences).text()
+    return text if _distinct(text) else _Source(program, told, sentences, numbered=True).text()
 
 
 class _Source:
-    def __init__(self, program: ir.Program, told: str, sentences: tuple[str, ...]) -> None:
+    def __init__(
+        self, program: ir.Program, told: str, sentences: tuple[str, ...], *, numbered: bool = False
+    ) -> None:
         self.program, self.told, self.sentences = program, told, sentences
+        self.numbered = numbered
         self.names: dict[int, str] = {}
         for k, name in enumerate(program.columns):
-            constant = _constant(name)
+            constant = f"C{k}_{_constant(name)}" if numbered else _constant(name)
             self.names[k], self.names[program.width + k] = constant, f"NEXT + {constant}"
         for k, name in enumerate(("MISSING", "ZERO", "UNIT")):
             self.names[2 * program.width + k] = name
@@ -170,16 +176,12 @@ class _Source:
         add = self.lines.append
         add("# ---- laws of motion")
         for mover in m.movers:
-            name = _name(self.program.bodies[mover.body].name)
-            add(f"def free_{name}(x):")
+            add(f"def {self._free(mover)}(x):")
             add(
                 f'    """Next velocity of {self.program.bodies[mover.body].name} where it touches nothing."""'
             )
             add(f"    return [{', '.join(self.sum(s) for s in mover.free)}]\n")
-        movers = [
-            f"({v.body}, free_{_name(self.program.bodies[v.body].name)}, {v.governed}, {v.moving})"
-            for v in m.movers
-        ]
+        movers = [f"({v.body}, {self._free(v)}, {v.governed}, {v.moving})" for v in m.movers]
         add(f"MOVERS = ({', '.join(movers)},)  # body, law, components, of how many")
         letters = {
             "contact": "nt",
@@ -233,10 +235,15 @@ class _Source:
         add(")")
         add(f"SLACK, SPINS = {m.slack!r}, {m.spins}\n")
 
+    def _free(self, mover: ir.Mover) -> str:
+        """The name of a mover's free law."""
+        name = _name(self.program.bodies[mover.body].name)
+        return f"free{mover.body}_{name}" if self.numbered else f"free_{name}"
+
     # ------------------------------------------------------------------ answers
     def _answer(self, number: int, a: ir.Answer) -> str:
         add = self.lines.append
-        name = f"{_name(a.object)}_{_name(a.property)}"
+        name = self._called(number)
         add(f"# ---- {a.object}.{a.property}")
         for feature in a.features:
             self.names[feature.register] = f"NEXT + {feature.register - self.program.width}"
@@ -266,6 +273,12 @@ class _Source:
         self._said(name, a)
         add("")
         return name
+
+    def _called(self, number: int) -> str:
+        """The name of an answer's function, with which those of its parts begin."""
+        a = self.program.answers[number]
+        name = f"{_name(a.object)}_{_name(a.property)}"
+        return f"a{number}_{name}" if self.numbered else name
 
     def _mode(self, name: str, mode: ir.Mode) -> None:
         """A mode as a function of the registers and of the bodies that are bound to its roles."""
@@ -402,7 +415,7 @@ class _Source:
                 f"        ({contest.first}, {contest.second}, *{name}_{i}_or_{j}(x, near, target, pair, stands)),"
             )
         add("    )")
-        add(f"    order, margin = ranked(lead, {vote.by_tie!r}, {vote.runoff})")
+        add(f"    order, margin = ranked(lead, {vote.by_tie!r})")
         if (known := vote.experience) is not None:
             used = ", ".join(
                 f"({context}, {tuple(self.program.relations[r] for r in relations)!r}, {unary!r})"
@@ -535,7 +548,7 @@ class _Source:
             "# -2: of all other modes), and whose values there are (bits of EXPERTS): who speaks, and how sure that is"
         )
         add(f"EXPERTS = {ir.EXPERTS!r}")
-        for a in self.program.answers:
+        for number, a in enumerate(self.program.answers):
             trust = a.trust
             if trust is None:
                 told.append("None")
@@ -547,7 +560,7 @@ class _Source:
                     sure = f"{_number(b.probability)}, {_number(b.interval)}, {b.claimed}"
                     add(f"    ({b.outcome}, {b.winner}, {b.lead}, {b.able}): ({b.speaker}, {sure}),")
                 add("}")
-            name = f"{_name(a.object)}_{_name(a.property)}"
+            name = self._called(number)
             latest = (
                 f"({trust.latest[0]}, {name}_mode_{trust.latest[0]})" if trust.latest is not None else "None"
             )
@@ -606,6 +619,17 @@ def _number(value: float) -> str:
     if value != value:
         return "math.nan"
     return repr(value) if abs(value) != float("inf") else ("-" if value < 0 else "") + "math.inf"
+
+
+def _distinct(text: str) -> bool:
+    """Whether a module gives each of its names once."""
+    names: list[str] = []
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.FunctionDef):
+            names.append(node.name)
+        elif isinstance(node, ast.Assign):
+            names += [n.id for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)]
+    return len(set(names)) == len(names)
 
 
 def _doc(text: str) -> str:
@@ -693,15 +717,12 @@ def least(values):
     return min((v for v in values if v == v), default=math.nan)
 
 
-def ranked(votes, by_tie, runoff):
+def ranked(votes, by_tie):
     """Places of the modes, the winner first, and its lead: who has least votes drops out, until one is left."""
     lead = [[0] * len(by_tie) for _ in by_tie]
     for a, b, for_a, for_b in votes:
-        lead[a][b], lead[b][a] = (for_a - for_b, for_b - for_a) if runoff else (for_a, for_b)
+        lead[a][b], lead[b][a] = for_a - for_b, for_b - for_a
     totals, alive, out, margin = [sum(row) for row in lead], list(by_tie), [], 0
-    if not runoff:
-        order = sorted(by_tie, key=lambda m: -totals[m])
-        return order, (totals[order[0]] - totals[order[1]]) / 2.0**32
     while len(alive) > 1:
         fewest = min(totals[m] for m in alive)
         worst = next(m for m in reversed(alive) if totals[m] == fewest)

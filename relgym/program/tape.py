@@ -396,7 +396,7 @@ class _Writer:
                 for context, relations, unary in known.used
             ]
             experience = self.put(len(used), len(seen), at, *used)
-        return self.put(int(vote.runoff), len(contests), by_tie, experience, *contests)
+        return self.put(len(contests), by_tie, experience, *contests)
 
     # ------------------------------------------------------------------ roles and answers
     def _casting(self, casting: ir.Casting | None) -> int:

@@ -78,9 +78,20 @@ def test_a_number_for_each_object() -> None:
     kinds = {"ball": "ball", "ball2": "ball", "box": "box"}
     assert per_object("e", 0.5, kinds, 0.9, (0.0, 1.0)) == dict.fromkeys(kinds, 0.5)
     # Its own entry, else its kind's, else the default; "ball" is an object and a kind.
-    assert per_object("e", {"ball2": 0.25}, kinds, 0.75, (0.0, 1.0)) == {"ball": 0.75, "ball2": 0.25, "box": 0.75}
-    assert per_object("e", {"ball": 0.1, "ball2": 0.2}, kinds, 0.5, (0.0, 1.0)) == {"ball": 0.1, "ball2": 0.2, "box": 0.5}
-    assert per_object("e", {"box": 0.0}, {"box1": "box", "box2": "box"}, 0.5, (0.0, 1.0)) == {"box1": 0.0, "box2": 0.0}
+    assert per_object("e", {"ball2": 0.25}, kinds, 0.75, (0.0, 1.0)) == {
+        "ball": 0.75,
+        "ball2": 0.25,
+        "box": 0.75,
+    }
+    assert per_object("e", {"ball": 0.1, "ball2": 0.2}, kinds, 0.5, (0.0, 1.0)) == {
+        "ball": 0.1,
+        "ball2": 0.2,
+        "box": 0.5,
+    }
+    assert per_object("e", {"box": 0.0}, {"box1": "box", "box2": "box"}, 0.5, (0.0, 1.0)) == {
+        "box1": 0.0,
+        "box2": 0.0,
+    }
     with pytest.raises(ConfigError, match=r"unknown objects \['disc'\]"):
         per_object("e", {"disc": 0.1}, kinds, 0.5, (0.0, 1.0))
     for bad in (1.1, math.nan, "x", True):

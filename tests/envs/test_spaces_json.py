@@ -79,7 +79,9 @@ def test_a_space_of_somebodys_own_is_refused() -> None:
     class Odd(spaces.Space[int]):
         pass
 
-    with pytest.raises(ConfigError, match="a model file can hold the spaces that come with Gymnasium, got .*Odd"):
+    with pytest.raises(
+        ConfigError, match="a model file can hold the spaces that come with Gymnasium, got .*Odd"
+    ):
         space_to_json(Odd())
     with pytest.raises(ConfigError, match="Odd"):
         space_to_json(spaces.Dict({"a": Odd()}))

@@ -2,15 +2,39 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 import pytest
+from dreams import LINE_STEPS, line_model, room_model
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from worlds import LINE_TARGETS, schema_of, transitions
 
+from relgym.classification.binary import majority
+from relgym.clustering.mode import NOISE
+from relgym.config import ModelConfig
+from relgym.envs.dreams.setting import recorded
+from relgym.laws.book import LawBook
+from relgym.laws.records import Share
+from relgym.logic.clause import Definition
 from relgym.model import running
 from relgym.model.grounds import Grounds
+from relgym.model.lowering import lowered
 from relgym.model.prediction import ScenePrediction
 from relgym.model.querying import predict
+from relgym.model.running import Runner
+from relgym.model.target.hindsight import Hindsight
+from relgym.model.target.limits import Limits
+from relgym.model.target.scope import Scope
+from relgym.model.target.spread import Spreads
+from relgym.model.target.stops import Stop, Stops
 from relgym.model.world_model import WorldModel
+from relgym.program import kernel
 from relgym.scene.objects import Scene
 from relgym.wrappers import ModelLearner
 
@@ -90,3 +114,169 @@ def test_grounds_are_the_same_until_something_is_said_otherwise() -> None:
     fallback.scope = type(fallback.scope)()
     assert not known.same(Grounds.of(model._parts))
     assert np.isfinite(env.scene.vector).all()
+
+
+# ---------------------------------------------------------------------- kept programs and fresh ones
+def fresh_and_kept(model: WorldModel, scene: Scene) -> tuple[Runner, Runner] | None:
+    """What runs the program that was kept, and one that was lowered just now; None where there is none."""
+    model.predict_one(scene)
+    kept = model._programs.of(model._parts, scene.layout, 1)
+    if kept is None:
+        return None
+    return Runner(model._parts, scene.layout, lowered(model._parts, scene.layout), kernel), kept
+
+
+def assert_nothing_stale(model: WorldModel, scene: Scene) -> bool:
+    """The program that was kept is, number for number, the one that would be made now."""
+    pair = fresh_and_kept(model, scene)
+    if pair is None:
+        return False
+    fresh, kept = pair
+    # Whether it is known how right predictions were is written when that pays: let both know.
+    assert fresh._settles() == kept._settles()
+    for part in ("code", "numbers"):
+        np.testing.assert_array_equal(fresh._space[part], kept._space[part], part)
+    assert [t.spoken for t in fresh._tellers] == [t.spoken for t in kept._tellers]
+    assert [sorted(t._spreads) for t in fresh._tellers] == [sorted(t._spreads) for t in kept._tellers]
+    now = scene.vector
+    for one, other in zip(fresh._tellers, kept._tellers, strict=True):
+        assert [s(now) for s in one._spreads.values()] == [s(now) for s in other._spreads.values()]
+    return True
+
+
+@pytest.mark.parametrize("frames", ["auto", "world"])
+@settings(max_examples=3, deadline=None)
+@given(start=st.integers(0, 150), forgets=st.booleans())
+def test_a_kept_program_is_the_one_that_would_be_made_now(frames: str, start: int, forgets: bool) -> None:
+    schema = schema_of(LINE_STEPS, LINE_TARGETS)
+    model = WorldModel(schema, ModelConfig(frames=frames, history=100 if forgets else 200_000))  # type: ignore[arg-type]
+    stream = transitions(schema, LINE_STEPS[start : start + 140])
+    found = 0
+    for k, transition in enumerate(stream):
+        if k % 3 == 0:
+            found += assert_nothing_stale(model, transition.before)
+        model.learn_one(transition)
+    model.finish()
+    assert assert_nothing_stale(model, stream[-1].before)
+    assert found > 20
+
+
+def _swap(model: WorldModel, **changes: Any) -> None:
+    for part in model._parts.models.values():
+        for name, value in changes.items():
+            setattr(part, name, value)
+
+
+def _other_mode(model: WorldModel) -> None:
+    for part in model._parts.models.values():
+        for cluster in part.clusterer.clusters.values():
+            cluster.mode = replace(cluster.mode, intercept=cluster.mode.intercept + 1.0)
+
+
+def _other_guess(model: WorldModel) -> None:
+    for part in model._parts.models.values():
+        part.fallback.unexplained = True
+
+
+def _other_scope(model: WorldModel) -> None:
+    for part in model._parts.models.values():
+        part.fallback.scope = Scope(None, -1.0, 1.0)
+
+
+def _other_classifier(model: WorldModel) -> None:
+    for part in model._parts.models.values():
+        for state in part.classifier._pairs.values():
+            c = state.classifier
+            state.classifier = majority(c.i, c.j, c.scope, (1.0, 2.0))
+        part.classifier._pairs_changed()
+
+
+def _other_experience(model: WorldModel) -> None:
+    for part in model._parts.models.values():
+        part.classifier._familiarity().seen.add(1)
+
+
+def _other_players(model: WorldModel) -> None:
+    for part in model._parts.models.values():
+        for cast in part.casting.classifiers.values():
+            for description in cast.descriptions:
+                description.definition = Definition((), 2)
+
+
+def _other_company(model: WorldModel) -> None:
+    for part in model._parts.models.values():
+        for cast in part.casting.classifiers.values():
+            for description in cast.descriptions:
+                assert description.common is not None
+                description.common = ~description.common
+
+
+def _other_doubt(model: WorldModel) -> None:
+    for part in model._parts.models.values():
+        for cast in part.casting.classifiers.values():
+            cast.errors = 1.0
+
+
+CHANGES: dict[str, Callable[[WorldModel], None]] = {
+    "a mode": _other_mode,
+    "limits": lambda model: _swap(model, limits=Limits(7, NOISE, 0.0, np.inf)),
+    "walls": lambda model: _swap(model, stops=Stops((Stop(7, 0.0, "px", 1.0, 0.0, -1.0, 0.1),))),
+    "spreads": lambda model: _swap(model, spreads=Spreads()),
+    "hindsight": lambda model: _swap(model, hindsight=Hindsight([(1, 1)] * 100)),
+    "nothing is explained": _other_guess,
+    "scope": _other_scope,
+    "conditions": _other_classifier,
+    "experience": _other_experience,
+    "players": _other_players,
+    "what players had in common": _other_company,
+    "errors among players": _other_doubt,
+}
+
+
+@pytest.mark.parametrize("change", sorted(CHANGES))
+def test_no_program_outlives_what_it_was_lowered_from(change: str) -> None:
+    model = copy.deepcopy(line_model())
+    scene = transitions(model.schema, LINE_STEPS[:1])[0].before
+    pair = fresh_and_kept(model, scene)
+    assert pair is not None
+    CHANGES[change](model)
+    model._programs.changed()
+    assert assert_nothing_stale(model, scene)
+    found = fresh_and_kept(model, scene)
+    assert found is not None and found[1] is not pair[1]
+
+
+def test_a_program_stays_where_votes_alone_are_counted() -> None:
+    model = copy.deepcopy(line_model())
+    scene = transitions(model.schema, LINE_STEPS[:1])[0].before
+    pair = fresh_and_kept(model, scene)
+    part = next(p for p in model._parts.models.values() if p.classifier.classifiers)
+    part.classifier.classifiers[0].count(0, True)
+    part.classifier._voting.recount(0)
+    mode = part.classifier.modes[0]
+    part.classifier.counts[mode] += 1000.0
+    model._programs.changed()
+    assert assert_nothing_stale(model, scene)
+    found = fresh_and_kept(model, scene)
+    assert pair is not None and found is not None and found[1] is pair[1]
+
+
+LAWFUL: dict[str, Callable[[LawBook], None]] = {
+    "the law of pairs": lambda book: setattr(book, "pair", None),
+    "a free law": lambda book: book.free.update(ball=replace(book.free["ball"])),
+    "the tolerance": lambda book: setattr(book, "tolerance", 0.25),
+    "a share": lambda book: book.shares.update({("ball", "ball"): Share(constant=0.25)}),
+}
+
+
+@pytest.mark.parametrize("change", sorted(LAWFUL))
+def test_no_program_outlives_its_laws(change: str) -> None:
+    model = copy.deepcopy(room_model("auto"))
+    scene = recorded(model).starts[0]
+    pair = fresh_and_kept(model, scene)
+    assert model._parts.laws is not None and pair is not None
+    LAWFUL[change](model._parts.laws.learner.book)
+    model._programs.changed()
+    assert assert_nothing_stale(model, scene)
+    found = fresh_and_kept(model, scene)
+    assert found is not None and found[1] is not pair[1]

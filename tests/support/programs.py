@@ -11,6 +11,11 @@ from hypothesis import strategies as st
 from law_streams import Stream, taught
 from numpy.typing import NDArray
 
+from relgym.classification.binary import BinaryClassifier, tree_columns
+from relgym.classification.examples import Vocabulary
+from relgym.classification.views import CONTEXTS
+from relgym.classification.views import Scope as Offered
+from relgym.clustering.mode import NOISE
 from relgym.config import ModelConfig
 from relgym.envs.dreams.setting import recorded
 from relgym.experiments.law_trials import Trial, trial_rooms
@@ -19,6 +24,7 @@ from relgym.laws.columns import Sources
 from relgym.laws.frames import FRAMES, POINT, axis_names
 from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE, AxisLaw, FreeLaw, PairLaw, Piece, Share
+from relgym.logic.clause import Clause, Coverage, Definition, Literal
 from relgym.model.calibration import EXPERTS, OWN, Audit, Key
 from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
@@ -26,7 +32,12 @@ from relgym.model.prediction import BatchPrediction
 from relgym.model.querying import predict_many
 from relgym.model.running import Runner
 from relgym.model.target.hindsight import Hindsight
+from relgym.model.target.limits import Limits
+from relgym.model.target.property_model import PropertyModel
+from relgym.model.target.scope import Scope
+from relgym.model.target.stops import Landing, Stop, Stops
 from relgym.model.world_model import WorldModel
+from relgym.numeric.tree import DecisionTree
 from relgym.program import kernel
 from relgym.scene.objects import POSE, Kinematics, ObjectType, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
@@ -209,3 +220,120 @@ def crowded(schema: SceneSchema, count: int, seed: int) -> Array:
         if t.name == "ball":
             vectors[:, at + 12] = rng.uniform(0.5, 2.0, count)
     return vectors
+
+
+# ---------------------------------------------------------------------- choices that nobody learned
+@st.composite
+def scrambled(draw: st.DrawFn, model: WorldModel) -> WorldModel:
+    """The model with other conditions, limits, walls, scopes, guesses and descriptions of players, drawn anyhow."""
+    model = copy.deepcopy(model)
+    for target, part in model._parts.models.items():
+        if model._parts.governs(target):
+            continue
+        for state in part.classifier._pairs.values():
+            state.classifier = draw(_classifiers(state.classifier))
+        part.classifier._reset_caches()
+        part.hindsight = Hindsight([(1, 1)] * draw(st.sampled_from((0, 0, 100))))
+        _scramble_walls(draw, target, part)
+        slots = model._parts.tables[target.type].signatures[0]
+        numbers = [slots.named(k) for k in range(slots.core) if not slots.named(k).endswith("'")]
+        if draw(st.booleans()):
+            least = draw(_NUMBERS) - 2.0
+            tree = draw(_trees(tuple(numbers))) if draw(st.booleans()) else None
+            part.fallback.scope = Scope(tree, least, least + 4.0)
+        for cast in part.casting.classifiers.values():
+            cast.errors = draw(st.sampled_from((0.0, 1.0)))
+            for description in cast.descriptions:
+                description.definition = draw(_described(cast.vocabulary))
+                if draw(st.booleans()):
+                    bits = 2 * len(cast.vocabulary.relations) + len(cast.vocabulary.unary)
+                    common = draw(st.lists(st.integers(0, bits - 1), max_size=2))
+                    description.common = np.isin(np.arange(bits), common)
+            cast._answers.clear()
+            cast._extensions.clear()
+    model._programs.changed()
+    return model
+
+
+def _scramble_walls(draw: st.DrawFn, target: Target, part: PropertyModel) -> None:
+    low = draw(st.sampled_from((NOISE, 70)))
+    part.limits = Limits(low, NOISE, draw(_NUMBERS) - 1.0 if low else -np.inf, np.inf)
+    rate, wall = target.property, "p" + target.property[1:] if target.property.startswith("v") else "x"
+    stop = Stop(
+        71, draw(_NUMBERS), wall, draw(_NUMBERS), draw(_NUMBERS), draw(st.sampled_from((-1.0, 1.0))), 0.1
+    )
+    landing = Landing(72, draw(_NUMBERS), target.given[0][1] if target.given else rate, draw(_NUMBERS), 0.5)
+    stops = (stop,) if draw(st.booleans()) else ()
+    part.stops = Stops(stops, (landing,) if draw(st.booleans()) else ())
+
+
+@st.composite
+def _trees(draw: st.DrawFn, columns: tuple[str, ...]) -> DecisionTree:
+    """Trees of three tests at most."""
+    some, cut = st.integers(0, len(columns) - 1), _NUMBERS.map(lambda x: x / 4.0)
+    shapes = [
+        ([1, 0, 0], [1, 1, 2], [2, 1, 2]),
+        ([1, 1, 0, 0, 0], [1, 2, 2, 3, 4], [4, 3, 2, 3, 4]),
+        ([1, 0, 1, 1, 0, 0, 0], [1, 1, 3, 4, 4, 5, 6], [2, 1, 6, 5, 4, 5, 6]),
+    ]
+    inner, below, above = draw(st.sampled_from(shapes))
+    column = tuple(draw(some) if k else -1 for k in inner)
+    threshold = tuple(draw(cut) if k else 0.0 for k in inner)
+    positive = tuple(draw(st.sampled_from((0.0, 2.0))) for _ in inner)
+    return DecisionTree(columns, column, threshold, tuple(below), tuple(above), positive, (1.0,) * len(inner))
+
+
+@st.composite
+def _clauses(draw: st.DrawFn, scope: Offered, arity: int) -> Clause:
+    """Clauses over all that a scope names."""
+    free = st.integers(0, arity + 1)
+    literals = []
+    for _ in range(draw(st.integers(0, 3))):
+        negated, op = draw(st.booleans()), draw(st.sampled_from(("<=", ">")))
+        kind = draw(
+            st.sampled_from([k for k in ("relations", "unary", "pair", "scalars") if getattr(scope, k)])
+        )
+        if kind == "relations":
+            pair = draw(st.lists(free, min_size=2, max_size=2, unique=True))
+            name = draw(st.sampled_from([name for name, _ in scope.relations]))
+            literals.append(Literal(name, tuple(pair), negated))
+        elif kind == "unary":
+            literals.append(
+                Literal(draw(st.sampled_from([n for n, _ in scope.unary])), (draw(free),), negated)
+            )
+        elif kind == "pair" and arity == 1:
+            name, other = draw(st.sampled_from([n for n, _ in scope.pair])), draw(st.integers(1, 2))
+            literals.append(Literal(name, (0, other), negated, op, draw(_NUMBERS) / 4.0))
+        elif arity == 1:
+            name = draw(st.sampled_from(scope.scalars))
+            literals.append(Literal(name, (), negated, op, draw(_NUMBERS) / 16.0))
+    return Clause.of(literals, arity)
+
+
+@st.composite
+def _classifiers(draw: st.DrawFn, known: BinaryClassifier) -> BinaryClassifier:
+    """Other classifiers of the same two modes."""
+    scope = known.scope
+    clauses = tuple(draw(st.lists(_clauses(scope, 1), max_size=2)))
+    definition = Definition(clauses, negated=draw(st.booleans()))
+    trees = [
+        draw(_trees(tree_columns(scope, clause.variables))) if draw(st.booleans()) else None
+        for clause in clauses
+    ]
+    last = draw(_trees(scope.scalars)) if draw(st.booleans()) else None
+    context = draw(st.sampled_from(CONTEXTS))
+    made = BinaryClassifier(known.i, known.j, scope, context, definition, tuple(trees), last)
+    made.counts = [[float(draw(st.integers(0, 5))), float(draw(st.integers(0, 5)))] for _ in made.outcomes]
+    return made
+
+
+@st.composite
+def _described(draw: st.DrawFn, vocabulary: Vocabulary) -> Definition | None:
+    """Descriptions of who plays a role: clauses over target and candidate, with what they covered."""
+    relations = tuple((n, k) for k, n in enumerate(vocabulary.relations))
+    unary = tuple((n, k) for k, n in enumerate(vocabulary.unary))
+    scope = Offered(relations, unary, (), ())
+    clauses = tuple(draw(st.lists(_clauses(scope, 2), max_size=2)))
+    counts = st.builds(Coverage, st.sampled_from((0.0, 3.0)), st.sampled_from((0.0, 1.0)))
+    coverage = tuple(draw(counts) for _ in clauses)
+    return draw(st.just(Definition(clauses, 2, False, coverage, draw(counts))) | st.none())

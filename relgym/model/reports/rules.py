@@ -513,7 +513,9 @@ def _within(part: PropertyModel, branches: tuple[Branch, ...]) -> tuple[Branch, 
     yes, no = (tuple(_parts(tree, 0, {}, part.flags, said=said)) for said in (True, False))
     if not no:
         return branches
-    if yes and len(branches) == 1 and not branches[0].cases and sum(map(len, yes)) <= sum(map(len, no)):
+    if not yes:
+        return (Branch((), None, reason="unexplained everywhere"),)
+    if len(branches) == 1 and not branches[0].cases and sum(map(len, yes)) <= sum(map(len, no)):
         return replace(branches[0], cases=yes), Branch((), None, reason="unexplained elsewhere")
     return Branch(no, None, reason="unexplained there"), *branches
 

@@ -600,7 +600,7 @@ class PropertyModel:
             return found
         values, modes = np.array([found.value]), np.array([found.mode])
         self.stops.apply(signature, row, values, modes)
-        if modes[0] == found.mode:
+        if modes[0] == found.mode and (values[0] == found.value or np.isnan(values[0])):
             return found
         return replace(found, value=float(values[0]), mode=int(modes[0]), roles=found.roles[:1])
 

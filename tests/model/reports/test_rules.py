@@ -2,24 +2,39 @@
 
 from __future__ import annotations
 
+import copy
 import re
 from collections.abc import Iterable, Iterator
+from functools import cache
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import relgym
+from relgym.clustering.mode import NOISE
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.data import ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.online import learned
-from relgym.model.reports.rules import agreement
+from relgym.model.reports.rules import agreement, rule_list
+from relgym.model.target.limits import Limits
+from relgym.model.target.scope import Scope
+from relgym.model.target.stops import Stop, Stops
 from relgym.model.world_model import WorldModel
+from relgym.numeric.tree import DecisionTree
+from relgym.reporting.conditions import parse_condition
+from relgym.reporting.functions import parse_sum
 from relgym.reporting.parser import parse_rules
-from relgym.scene.objects import Scene
+from relgym.reporting.rules import Branch, PropertyRules, RuleList
+from relgym.scene.objects import ACTION, ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers.follower import scenes_of
 from relgym.wrappers.views import view_of
 
@@ -142,3 +157,182 @@ def test_any_env_in_text_on_many_fresh_steps(env_id: str, features: tuple[str, .
     fresh = gym.make(env_id)
     view = view_of(fresh, env.model.extra.get("view"))
     assert agreed(env.model, scenes_of(fresh, view, 24_000, seed=1)) >= 0.999
+
+
+# ---------------------------------------------------------------------- where modes speak, and where they don't
+PUSHED = SceneSchema(
+    (ObjectType("cart", ("x", "v")), ObjectType(ACTION, ("push", "brake"), flags=("brake",))),
+    (("cart", "cart"), (ACTION, ACTION)),
+    targets=(Target("cart", "v"),),
+)
+COLUMNS = ("x", "v", "action.push", "action.brake")
+
+
+def pushed_scene(x: float, v: float, push: float, brake: float = 0.0) -> Scene:
+    return PUSHED.scene({"cart": [x, v], ACTION: [push, brake]})
+
+
+@cache
+def pushed() -> WorldModel:
+    """A cart of which v' = v / 2 + push."""
+    model, rng = WorldModel(PUSHED), np.random.default_rng(0)
+    for x, v, push in rng.uniform(-2.0, 2.0, (40, 3)).tolist():
+        before = pushed_scene(x, v, push, float(x > 0.0))
+        model.learn_one(Transition(before, before.replace({("cart", "v"): 0.5 * v + push})))
+    model.finish()
+    return model
+
+
+def scoped(tree: DecisionTree | None, **walls: Any) -> WorldModel:
+    """The cart, whose modes speak where a tree says so."""
+    model = copy.deepcopy(pushed())
+    part = model.property_model("cart", "v")
+    part.fallback.scope = Scope(tree, -9.0, 9.0)
+    for name, value in walls.items():
+        setattr(part, name, value)
+    model._programs.changed()
+    return model
+
+
+def tree_of(*nodes: tuple[str, float] | bool, shape: tuple[tuple[int, int], ...]) -> DecisionTree:
+    """A tree in preorder: tests (column, threshold) and leaves (yes or no), with what follows each."""
+    tests = [n if isinstance(n, tuple) else None for n in nodes]
+    return DecisionTree(
+        COLUMNS,
+        tuple(-1 if t is None else COLUMNS.index(t[0]) for t in tests),
+        tuple(0.0 if t is None else t[1] for t in tests),
+        tuple(b for b, _ in shape),
+        tuple(a for _, a in shape),
+        tuple(2.0 if n is True else 0.0 for n in nodes),
+        (1.0,) * len(nodes),
+    )
+
+
+ONE_TEST = ((1, 2), (1, 1), (2, 2))
+TWO_TESTS = ((1, 4), (2, 3), (2, 2), (3, 3), (4, 4))
+
+
+@pytest.mark.parametrize(
+    ("tree", "lines"),
+    [
+        (
+            tree_of(("x", 0.5), True, False, shape=ONE_TEST),
+            ["if   x <= 0.5: v' = 0.5 v + action.push", "else: no prediction (unexplained elsewhere)"],
+        ),
+        (
+            tree_of(("action.brake", 0.5), True, False, shape=ONE_TEST),
+            [
+                "if   not action.brake: v' = 0.5 v + action.push",
+                "else: no prediction (unexplained elsewhere)",
+            ],
+        ),
+        (  # no: x <= 1 and v > 0, two tests; yes: three of them
+            tree_of(("x", 1.0), ("v", 0.0), True, False, True, shape=TWO_TESTS),
+            ["if   x <= 1 and v > 0: no prediction (unexplained there)", "else: v' = 0.5 v + action.push"],
+        ),
+        (  # of two tests of one number on one way the closer one is told
+            tree_of(("x", 1.0), ("x", 0.0), True, False, False, shape=TWO_TESTS),
+            ["if   x <= 0: v' = 0.5 v + action.push", "else: no prediction (unexplained elsewhere)"],
+        ),
+        (  # subtrees that say one thing are one part
+            tree_of(("x", 1.0), ("v", 0.0), False, False, True, shape=TWO_TESTS),
+            ["if   x > 1: v' = 0.5 v + action.push", "else: no prediction (unexplained elsewhere)"],
+        ),
+        (tree_of(("x", 1.0), True, True, shape=ONE_TEST), ["always: v' = 0.5 v + action.push"]),
+        (
+            tree_of(("x", 1.0), False, False, shape=ONE_TEST),
+            ["always: no prediction (unexplained everywhere)"],
+        ),
+        (None, ["always: v' = 0.5 v + action.push"]),
+    ],
+)
+def test_where_modes_speak_by_hand(tree: DecisionTree | None, lines: list[str]) -> None:
+    text = rule_list(scoped(tree)).text(3)
+    start = text.index("cart.v'")
+    told = [" ".join(line.split()) for line in text[start:].splitlines()[1 : len(lines) + 1]]
+    assert [line.split(" 40 steps")[0].split(" 20 steps")[0] for line in told] == [
+        " ".join(line.split()) for line in lines
+    ]
+    assert parse_rules(text).text(3) == text
+
+
+@st.composite
+def trees(draw: st.DrawFn) -> DecisionTree:
+    """Trees of up to four tests, with thresholds that scenes may lie on."""
+    nodes: list[tuple[str, float] | bool] = []
+    shape: list[tuple[int, int]] = []
+
+    def grow(depth: int) -> int:
+        at = len(nodes)
+        if depth == 0 or draw(st.booleans()):
+            nodes.append(draw(st.booleans()))
+            shape.append((at, at))
+            return at
+        column = draw(st.sampled_from(COLUMNS))
+        nodes.append((column, 0.5 if column == "action.brake" else draw(QUARTERS)))
+        shape.append((at, at))
+        shape[at] = (grow(depth - 1), grow(depth - 1))
+        return at
+
+    grow(3)
+    return tree_of(*nodes, shape=tuple(shape))
+
+
+QUARTERS = st.integers(-6, 6).map(lambda k: k / 4.0)
+PUSHES = st.builds(pushed_scene, QUARTERS, QUARTERS, QUARTERS, st.sampled_from((0.0, 1.0)))
+
+
+@settings(max_examples=40, deadline=None)
+@given(trees(), st.lists(PUSHES, min_size=1, max_size=12))
+def test_the_text_speaks_where_modes_do(tree: DecisionTree, some: list[Scene]) -> None:
+    model = scoped(tree)
+    rules = parse_rules(rule_list(model).text(17))
+    for each in some:
+        one = model.predict_one(each).parts[0]
+        said = rules.predict(each)["cart", "v"]
+        assert np.isnan(said) if not one.ok else said == pytest.approx(one.value, rel=1e-14, abs=1e-14)
+    assert agreement(model, rules, some)[1] == 1.0
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=st.data(), some=st.lists(PUSHES, min_size=1, max_size=12))
+def test_the_text_tells_of_walls(data: st.DataObject, some: list[Scene]) -> None:
+    low, high = sorted(data.draw(st.lists(QUARTERS, min_size=2, max_size=2)))
+    side = data.draw(st.sampled_from((-1.0, 1.0)))
+    bound = data.draw(QUARTERS) + 0.013  # beside all that rounding could bring about
+    stop = Stop(1, data.draw(QUARTERS), "x", data.draw(QUARTERS), bound, side, 0.1)
+    some_limits = data.draw(st.sampled_from((Limits(), Limits(1, NOISE, low), Limits(1, 1, low, high))))
+    model = scoped(None, stops=Stops((stop,) * data.draw(st.integers(0, 1))), limits=some_limits)
+    rules = parse_rules(rule_list(model).text(17))
+    for each in some:
+        one = model.predict_one(each).parts[0]
+        assert rules.predict(each)["cart", "v"] == pytest.approx(one.value, rel=1e-14, abs=1e-14)
+
+
+def test_agreement_counts_what_differs() -> None:
+    """Four scenes: two of them where the list says nothing, one where it is off by more than digits."""
+    model = scoped(None)
+    some = [pushed_scene(x, v, 0.0) for x, v in ((0.0, 1.0), (1.0, 1.0), (2.0, 1.0), (3.0, 1.0))]
+    branch = Branch((), parse_sum("0.5 v + action.push"))
+    none = Branch((parse_condition("x > 1.5"),), None, reason="unexplained there")
+    off = Branch((parse_condition("x > 0.5"),), parse_sum("0.51 v + action.push"))
+    rules = RuleList(1, (), (PropertyRules("cart", "v", (none, off, branch)),))
+    told, share = agreement(model, rules, some)
+    assert share == 0.25
+    assert told.agreement == "on 4 steps these rules say what the model says of 25 % of 4 values."
+
+
+def test_a_share_is_not_rounded_up_to_all() -> None:
+    from relgym.model.reports.rules import _floor
+
+    assert _floor(1.0) == 1.0 and _floor(0.9999999) == 0.99999 and _floor(0.5) == 0.5
+
+
+def test_what_both_leave_open_agrees() -> None:
+    from relgym.model.reports.rules import _same
+
+    nan = float("nan")
+    value, rule = np.array([2.0, 2.0, nan, nan, 2.0]), np.array([2.00009, 2.0002, nan, 1.0, nan])
+    equal, none = _same(value, rule, np.full(5, 1.0))  # values change by 1: slack 1e-4
+    assert equal.tolist() == [True, False, True, False, False]
+    assert none.tolist() == [False, False, True, False, False]

@@ -1,0 +1,100 @@
+"""Kernel and exported Python say of any program what its records say."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_programs import SMALL, Told, by_kernel, by_records, by_source, empty, programs
+
+from relgym.model.prediction import OUTCOMES
+from relgym.program import records as ir
+from relgym.program.source import python_source
+
+SENTENCES = tuple(outcome.value for outcome in OUTCOMES)
+
+
+def assert_told(told: Told, known: Told, tolerance: float = 1e-12) -> None:
+    for name in ("outcomes", "modes", "margins", "probabilities", "intervals"):
+        np.testing.assert_array_equal(getattr(told, name), getattr(known, name), name)
+    np.testing.assert_allclose(told.after, known.after, rtol=tolerance, atol=tolerance)
+
+
+def rows(data: st.DataObject, program: ir.Program) -> Any:
+    row = st.lists(SMALL, min_size=program.width, max_size=program.width)
+    return np.array(data.draw(st.lists(row, min_size=1, max_size=4)))
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data(), program=programs())
+def test_both_say_what_the_records_say(data: st.DataObject, program: ir.Program) -> None:
+    vectors = rows(data, program)
+    known = by_records(program, vectors)
+    assert_told(by_kernel(program, vectors), known)
+    assert_told(by_source(python_source(program, "", SENTENCES), vectors), known)
+
+
+def named(*pairs: tuple[str, str]) -> ir.Program:
+    """Answers ``p' = p + k`` of properties so called, the first one by mode 1 in k = 1 and so on."""
+    n = len(pairs)
+    answers = tuple(
+        ir.Answer(
+            o, p, k, k, (), -1, modes=(ir.Mode(1, 2 * n + 3 + k, ir.Sum(((ir.CONSTANT, k + 1.0), (k, 1.0)))),)
+        )
+        for k, (o, p) in enumerate(pairs)
+    )
+    return empty(n, 3 * n + 3, answers=answers, columns=tuple(f"{o}.{p}" for o, p in pairs))
+
+
+WORDS = st.text("aAbx_1", min_size=1, max_size=4).filter(str.isidentifier)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(WORDS, WORDS), min_size=1, max_size=5, unique=True))
+def test_names_that_look_alike_stay_apart(pairs: list[tuple[str, str]]) -> None:
+    """`a_b.c` and `a.b_c` are two things, and so are `A.x` and `a.x`."""
+    program = named(*pairs)
+    told = by_source(python_source(program, "", SENTENCES), np.zeros((1, len(pairs))))
+    np.testing.assert_array_equal(told.after, [np.arange(1.0, len(pairs) + 1.0)])
+
+
+def test_names_are_as_they_are_where_they_differ() -> None:
+    text = python_source(named(("cart", "x"), ("cart", "v")), "", SENTENCES)
+    assert "def cart_v(x, scene):" in text and "CART_X = 0" in text
+    text = python_source(named(("cart", "x_v"), ("cart_x", "v")), "", SENTENCES)
+    assert "def a1_cart_x_v(x, scene):" in text and "C1_CART_X_V = 1" in text
+
+
+def test_a_name_of_what_stands_below_is_no_answers_name() -> None:
+    program = named(("disc", "and_polygon"), ("nearest", "x"))
+    told = by_source(python_source(program, "", SENTENCES), np.zeros((1, 2)))
+    np.testing.assert_array_equal(told.after, [[1.0, 2.0]])
+
+
+def test_least_squares_by_hand() -> None:
+    """z = (4 - 2) / 2 = 1 and (1 - 0) / 1 = 1: 0.5 + z_1 + 2 z_2 = 3.5, kept to 3; with products less."""
+    columns = ((1, 2.0, 2.0), (2, 0.0, 1.0))
+    weights = ((0.5, 1.0, 2.0), (0.0, 1.0, 0.0, 0.0, 0.25, 0.5))  # 1, z1, z2; then z1 z1, z1 z2, z2 z2
+    squares = ir.Regression(0, columns, weights, -3.0, 3.0)
+    told = {}
+    for speaker in (2, 3):
+        beliefs = tuple(ir.Belief(1, 0, -2, able, speaker, 0.75, 0.125, True) for able in (0, 4, 8, 12))
+        answer = ir.Answer(
+            "o", "p0", 0, 0, (), -1, state="none", trust=ir.Trust(beliefs, False, None, squares)
+        )
+        program = empty(3, 9, answers=(answer,))
+        said = by_source(python_source(program, "", SENTENCES), np.array([[10.0, 4.0, 1.0]]))
+        told[speaker] = said.after[0, 0]
+        assert (said.outcomes[0, 0], said.probabilities[0, 0], said.intervals[0, 0]) == (1, 0.75, 0.125)
+    assert told == {2: 13.0, 3: 10.0 + 1.75}
+
+
+def test_text_that_a_model_says_stands_in_the_docstring_whatever_it_is() -> None:
+    odd = 'a "quote", """three""", a \\ and a newline\n'
+    module: dict[str, Any] = {}
+    exec(python_source(named(("o", "x")), odd, SENTENCES), module)
+    assert module["__doc__"].startswith("a \"quote\", '''three''', a \\ and a newline")
+    assert math.isclose(float(module["predict"]([[2.0]])[0][0, 0]), 3.0)
