@@ -44,7 +44,7 @@ def test_numbers_of_at_least_something(value: Any) -> None:
 
 @pytest.mark.parametrize("value", [-1e-9, math.inf, math.nan, True, "1", None])
 def test_and_what_is_none(value: Any) -> None:
-    with pytest.raises(ConfigError, match="friction=.*: expected a finite number of at least 0"):
+    with pytest.raises(ConfigError, match=r"friction=.*: expected a finite number of at least 0"):
         checked_least("friction", value, 0.0)
 
 

@@ -80,7 +80,7 @@ def test_a_space_of_somebodys_own_is_refused() -> None:
         pass
 
     with pytest.raises(
-        ConfigError, match="a model file can hold the spaces that come with Gymnasium, got .*Odd"
+        ConfigError, match=r"a model file can hold the spaces that come with Gymnasium, got .*Odd"
     ):
         space_to_json(Odd())
     with pytest.raises(ConfigError, match="Odd"):

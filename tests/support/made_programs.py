@@ -1,15 +1,15 @@
-"""Programs that hypothesis makes up, of things without bodies, and what their records say, word for word."""
+"""Programs that are made up at random, of things without bodies, and what their records say, word for word."""
 
 from __future__ import annotations
 
 import itertools
 import math
+import random
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from relgym.logic.situations import mixed, situation
@@ -20,9 +20,6 @@ from relgym.program.tape import Tape, encoded
 PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
 UNIT = 2.0**32
 """Votes are counted in integers of one in so many."""
-
-SMALL = st.integers(-8, 8).map(lambda k: k / 4.0)
-"""Numbers that come out equal often, and whose sums are exact."""
 
 
 _NOTHING = (
@@ -116,12 +113,7 @@ def _step(p: ir.Program, now: Sequence[float]) -> tuple[list[float], list[tuple[
             x[feature.register] = math.prod((_factor(f, x) for f in feature.factors), start=1.0)
         guess = _guess(a, x)
         value, outcome, mode, margin = _modes(a, x)
-        if lost & set(a.needs):
-            outcome, margin = DEPENDS, 0.0
-        if not math.isfinite(value) and outcome == PREDICTED:
-            outcome = OUTSIDE
-        if not math.isfinite(value) or outcome not in (PREDICTED, UNEXPLAINED):
-            mode = 0
+        value, outcome, mode, margin = _heard(value, outcome, mode, margin, depends=bool(lost & set(a.needs)))
         sure = math.nan, math.nan
         if a.trust is None:
             value = value if math.isfinite(value) else guess
@@ -139,6 +131,18 @@ def _step(p: ir.Program, now: Sequence[float]) -> tuple[list[float], list[tuple[
     for column in p.angles:
         x[p.width + column] -= 2 * math.pi * round(x[p.width + column] / (2 * math.pi))
     return x[p.width : 2 * p.width], told
+
+
+def _heard(
+    value: float, outcome: int, mode: int, margin: float, *, depends: bool
+) -> tuple[float, int, int, float]:
+    """What modes say, once it is known whether all that they depend on is, and whether it is a number."""
+    if depends:
+        outcome, margin = DEPENDS, 0.0
+    if not math.isfinite(value) and outcome == PREDICTED:
+        outcome = OUTSIDE
+    told = math.isfinite(value) and outcome in (PREDICTED, UNEXPLAINED)
+    return value, outcome, mode if told else 0, margin
 
 
 def _sum(s: ir.Sum, x: Sequence[float]) -> float:
@@ -196,22 +200,27 @@ def _modes(a: ir.Answer, x: list[float]) -> tuple[float, int, int, float]:
         chosen = a.modes[number]
         if chosen.function is None:
             continue
-        value, mode = x[chosen.register], chosen.id
-        value = _kept(a, value, x) if a.clipped else value
-        if value < a.low[1]:
-            mode, value = a.low
-        elif value > a.high[1]:
-            mode, value = a.high
-        for each in a.stops:
-            now = x[each.column]
-            if isinstance(each, ir.Stop):
-                held = each.side * (now + each.step * value - each.bound) >= 0.0
-            else:
-                held = abs(now - each.at) <= each.slack and math.isfinite(value)
-            if held:
-                value, mode = each.value, each.mode
+        value, mode = _walled(a, x[chosen.register], chosen.id, x)
         return value, PREDICTED if a.said else UNEXPLAINED, mode, margin if place == 0 else 0.0
     return math.nan, NO_ROLES, 0, 0.0
+
+
+def _walled(a: ir.Answer, value: float, mode: int, x: Sequence[float]) -> tuple[float, int]:
+    """What reach, limits and stops make of a mode's value, and who gives it then."""
+    value = _kept(a, value, x) if a.clipped else value
+    if value < a.low[1]:
+        mode, value = a.low
+    elif value > a.high[1]:
+        mode, value = a.high
+    for each in a.stops:
+        now = x[each.column]
+        if isinstance(each, ir.Stop):
+            held = each.side * (now + each.step * value - each.bound) >= 0.0
+        else:
+            held = abs(now - each.at) <= each.slack and math.isfinite(value)
+        if held:
+            value, mode = each.value, each.mode
+    return value, mode
 
 
 def _ranked(vote: ir.Vote, x: Sequence[float]) -> tuple[list[int], float]:
@@ -251,9 +260,9 @@ def _trusted(
     values = {"own": value, "guess": guess, "latest": latest, "persistence": x[width + a.column]}
     able = sum(1 << ir.EXPERTS.index(e) for e in ("own", "guess", "latest") if math.isfinite(values[e]))
     kind = PREDICTED if mode else outcome
-    # Bins of leads: up to 1/2, 1, 2, 4, 8 and more; 0: none, 7: nobody else was in it.
+    # Bins of leads: below 1/2, 1, 2, 4, 8, and more; 0: none, 7: nobody else was in it.
     lead = (
-        0 if not margin > 0 else 7 if math.isinf(margin) else 1 + sum(margin >= 2.0**k for k in range(-2, 3))
+        0 if not margin > 0 else 7 if math.isinf(margin) else 1 + sum(margin >= 2.0**k for k in range(-1, 4))
     )
     known = {(b.outcome, b.winner, b.lead, b.able): b for b in trust.beliefs}
     family = (mode > 0) - (mode < 0)
@@ -269,151 +278,153 @@ def _trusted(
 
 
 # ---------------------------------------------------------------------- making them up
-@st.composite
-def programs(draw: st.DrawFn, *, trusting: bool | None = None) -> ir.Program:
-    """Programs of one thing without a body, with everything that such ones may hold."""
-    width = draw(st.integers(1, 4))
-    maker = _Maker(draw, width)
-    told = draw(st.lists(st.integers(0, width - 1), max_size=3, unique=True))
-    answers = []
-    for key, column in enumerate(told):
-        answers.append(maker.answer(key, column, draw(st.booleans()) if trusting is None else trusting))
-    places = draw(st.lists(st.integers(0, width - 1), max_size=2, unique=True))
-    kinematics = tuple((k, draw(SMALL), draw(st.integers(0, 2 * width - 1))) for k in places if k not in told)
-    angles = tuple(draw(st.lists(st.integers(0, width - 1), max_size=2, unique=True)))
-    return empty(width, maker.registers, answers=tuple(answers), kinematics=kinematics, angles=angles)
+def made(seed: int) -> tuple[ir.Program, NDArray[np.float64]]:
+    """A program of one thing without a body, with anything that such ones may hold, and four state vectors for it."""
+    maker = _Maker(random.Random(seed))
+    return maker.program(), np.array([[maker.small() for _ in range(maker.width)] for _ in range(4)])
 
 
 class _Maker:
-    def __init__(self, draw: st.DrawFn, width: int) -> None:
-        self.draw, self.width, self.registers = draw, width, 2 * width + 3
+    """Draws programs; numbers are few, and come out equal often."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self.rng, self.width = rng, rng.randint(1, 4)
+        self.registers = 2 * self.width + 3
+
+    def program(self) -> ir.Program:
+        rng, width = self.rng, self.width
+        told = rng.sample(range(width), rng.randint(0, min(3, width)))
+        answers = tuple(self.answer(key, column, trusting=self.coin()) for key, column in enumerate(told))
+        places = [k for k in range(width) if k not in told and self.coin()]
+        kinematics = tuple((k, self.small(), rng.randrange(2 * width)) for k in places)
+        angles = tuple(k for k in range(width) if rng.random() < 0.2)
+        return empty(width, self.registers, answers=answers, kinematics=kinematics, angles=angles)
+
+    def coin(self) -> bool:
+        return self.rng.random() < 0.5
+
+    def small(self) -> float:
+        return self.rng.randint(-8, 8) / 4.0
 
     def register(self) -> int:
         self.registers += 1
         return self.registers - 1
 
     def sum(self, able: Sequence[int]) -> ir.Sum:
-        terms = st.tuples(st.sampled_from([ir.CONSTANT, *able]), SMALL)
-        return ir.Sum(tuple(self.draw(st.lists(terms, max_size=3))))
+        terms = [(self.rng.choice([ir.CONSTANT, *able]), self.small()) for _ in range(self.rng.randint(0, 3))]
+        return ir.Sum(tuple(terms))
 
-    def tree(self, able: Sequence[int], outcomes: st.SearchStrategy[int]) -> tuple[ir.Tree, tuple[int, ...]]:
+    def tree(self, able: Sequence[int], outcomes: Sequence[int]) -> tuple[ir.Tree, tuple[int, ...]]:
         """A tree of two tests at most, and an outcome for each node."""
-        minus = st.sampled_from([-1, *able])
-        sights = [ir.Sight(self.draw(st.sampled_from(able)), self.draw(minus)) for _ in range(2)]
+        sights = tuple(ir.Sight(self.rng.choice(able), self.rng.choice([-1, *able])) for _ in range(2))
         shapes: list[list[tuple[int, int, int]]] = [
             [(-1, 0, 0)],
             [(0, 1, 2), (-1, 1, 1), (-1, 2, 2)],
             [(0, 1, 4), (1, 2, 3), (-1, 2, 2), (-1, 3, 3), (-1, 4, 4)],
             [(1, 1, 2), (-1, 1, 1), (0, 3, 4), (-1, 3, 3), (-1, 4, 4)],
         ]
-        nodes = [
-            (sight, self.draw(SMALL) if sight >= 0 else 0.0, below, above)
-            for sight, below, above in self.draw(st.sampled_from(shapes))
-        ]
-        return ir.Tree(tuple(sights), tuple(nodes)), tuple(self.draw(outcomes) for _ in nodes)
+        nodes = tuple(
+            (sight, self.small() if sight >= 0 else 0.0, below, above)
+            for sight, below, above in self.rng.choice(shapes)
+        )
+        return ir.Tree(sights, nodes), tuple(self.rng.choice(outcomes) for _ in nodes)
+
+    def test(self, able: Sequence[int]) -> ir.Test:
+        minus = self.rng.choice([-1, *able])
+        return ir.Test(self.rng.choice(able), minus, self.coin(), self.small(), self.coin())
 
     def contest(self, first: int, second: int, able: Sequence[int]) -> ir.Contest:
-        votes = tuple(
-            (self.draw(st.integers(-3, 0)) << 30, self.draw(st.integers(-3, 0)) << 30) for _ in range(3)
-        )
-        test = st.builds(
-            ir.Test,
-            st.sampled_from(able),
-            st.sampled_from([-1, *able]),
-            st.booleans(),
-            SMALL,
-            st.booleans(),
-        )
+        rng, always = self.rng, ir.Clause(1, 1, ())
+        votes = tuple((rng.randint(-9, 0) << 31, rng.randint(-9, 0) << 30) for _ in range(3))
         stages = []
-        for _ in range(self.draw(st.integers(0, 2))):
-            tests = tuple(self.draw(st.lists(test, min_size=1, max_size=2)))
-            if self.draw(st.booleans()):
-                stages.append(ir.Stage(ir.Clause(1, 1, ()), tests, None, (self.draw(st.integers(0, 2)),)))
-            else:
-                tree, outcomes = self.tree(able, st.integers(-1, 2))
-                stages.append(ir.Stage(ir.Clause(1, 1, ()), tests, tree, outcomes))
-        tree, outcomes = self.tree(able, st.integers(0, 2))
+        for _ in range(rng.randint(0, 2)):
+            tests = tuple(self.test(able) for _ in range(rng.randint(1, 2)))
+            tree, outcomes = (None, (rng.randrange(3),)) if self.coin() else self.tree(able, range(-1, 3))
+            stages.append(ir.Stage(always, tests, tree, outcomes))
+        tree, outcomes = self.tree(able, range(3))
         stages.append(ir.Stage(None, (), tree, outcomes))
-        return ir.Contest(first, second, self.draw(st.integers(0, 2)), tuple(stages), votes)
+        return ir.Contest(first, second, rng.randrange(3), tuple(stages), votes)
 
-    def answer(self, key: int, column: int, trusting: bool) -> ir.Answer:
-        draw, able = self.draw, list(range(2 * self.width))
-        factor = st.builds(
-            ir.Factor, st.sampled_from(able), st.sampled_from(("", "sin", "cos")), st.integers(1, 3)
-        )
+    def factor(self, able: Sequence[int]) -> ir.Factor:
+        return ir.Factor(self.rng.choice(able), self.rng.choice(("", "sin", "cos")), self.rng.randint(1, 3))
+
+    def answer(self, key: int, column: int, *, trusting: bool) -> ir.Answer:
+        rng, able = self.rng, list(range(2 * self.width))
         features = tuple(
-            ir.Feature(self.register(), tuple(draw(st.lists(factor, min_size=1, max_size=2))), "a product")
-            for _ in range(draw(st.integers(0, 2)))
+            ir.Feature(
+                self.register(), tuple(self.factor(able) for _ in range(rng.randint(1, 2))), "a product"
+            )
+            for _ in range(rng.randint(0, 2))
         )
         able += [f.register for f in features]
-        a = ir.Answer("o", f"p{column}", column, key, tuple(range(draw(st.integers(0, key)))), -1)
-        state = draw(st.sampled_from(("modes", "modes", "modes", "lost", "none")))
-        a = replace(a, features=features, state=state, said=draw(st.booleans()), abstains=draw(st.booleans()))
-        if draw(st.booleans()):
-            a = replace(a, scope=self.tree(able, st.integers(0, 1)))
-        if draw(st.booleans()):
-            a = replace(a, guess=self.sum(able))
-        if a.scope is not None and draw(st.booleans()):
+        a = ir.Answer("o", f"p{column}", column, key, tuple(k for k in range(key) if self.coin()), -1)
+        state = rng.choice(("modes", "modes", "modes", "lost", "none"))
+        a = replace(a, features=features, state=state, said=self.coin(), abstains=self.coin())
+        a = replace(
+            a,
+            scope=self.tree(able, range(2)) if self.coin() else None,
+            guess=self.sum(able) if self.coin() else None,
+        )
+        if a.scope is not None and self.coin():
             a = replace(a, beyond=self.sum(able))
-        if draw(st.booleans()):
-            least = draw(st.integers(-4, 0)) / 2
-            present = draw(st.sampled_from((column, 2 * self.width + 1)))
-            a = replace(a, reach=ir.Reach(present, least, least + draw(st.integers(0, 4)) / 2))
-            a = replace(a, clipped=draw(st.booleans()))
+        if self.coin():
+            least = rng.randint(-4, 0) / 2
+            present = rng.choice((column, 2 * self.width + 1))
+            reach = ir.Reach(present, least, least + rng.randint(0, 4) / 2)
+            a = replace(a, reach=reach, clipped=self.coin())
         if state == "modes":
             a = self.modes(a, able)
-        elif draw(st.booleans()):  # it isn't asked, but may be the one that held last
+        elif self.coin():  # it isn't asked, but may be the one that held last
             a = replace(a, modes=(ir.Mode(9, self.register(), self.sum(able)),))
         bound = [(mode.id, mode.function) for mode in a.modes if mode.function is not None]
-        latest = draw(st.sampled_from([None, *bound])) if trusting else None
-        return replace(a, trust=self.trust(a, latest)) if trusting else a
+        return replace(a, trust=self.trust(a, rng.choice([None, *bound]))) if trusting else a
 
     def modes(self, a: ir.Answer, able: list[int]) -> ir.Answer:
-        draw, count = self.draw, self.draw(st.integers(1, 4))
+        rng, count = self.rng, self.rng.randint(1, 4)
         modes = tuple(
-            ir.Mode(k + 1, self.register(), self.sum(able) if draw(st.integers(0, 4)) else None)
+            ir.Mode(k + 1, self.register(), self.sum(able) if rng.random() < 0.8 else None)
             for k in range(count)
         )
         able = able + [m.register for m in modes]
         follows = tuple(
-            ir.Follow(self.register(), draw(st.sampled_from(able)), m.register, draw(SMALL))
+            ir.Follow(self.register(), rng.choice(able), m.register, self.small())
             for m in modes
-            if draw(st.booleans())
+            if self.coin()
         )
         able += [f.register for f in follows]
         vote = None
         if count > 1:
             pairs = itertools.combinations(range(count), 2)
             contests = tuple(self.contest(*pair, able) for pair in pairs)
-            by_tie = tuple(draw(st.permutations(range(count))))
-            known = draw(st.sampled_from((None, None, FAMILIAR, STRANGE)))
-            vote = ir.Vote(contests, by_tie, known)
-        low = draw(st.sampled_from(((0, -math.inf), (7, -0.5))))
-        high = draw(st.sampled_from(((0, math.inf), (8, 0.75))))
-        place = st.sampled_from(range(2 * self.width))
-        stop = st.builds(ir.Stop, st.just(5), SMALL, place, SMALL, SMALL, st.sampled_from((-1.0, 1.0)))
-        landing = st.builds(ir.Landing, st.just(6), SMALL, place, SMALL, st.sampled_from((0.0, 0.25)))
-        stops = tuple(draw(st.lists(stop | landing, max_size=2)))
+            by_tie = tuple(rng.sample(range(count), count))
+            vote = ir.Vote(contests, by_tie, rng.choice((None, None, FAMILIAR, STRANGE)))
+        low = rng.choice(((0, -math.inf), (7, -0.5)))
+        high = rng.choice(((0, math.inf), (8, 0.75)))
+        stops = tuple(self.wall() for _ in range(rng.randint(0, 2)))
         return replace(a, modes=modes, follows=follows, vote=vote, low=low, high=high, stops=stops)
+
+    def wall(self) -> ir.Stop | ir.Landing:
+        place, value = self.rng.randrange(2 * self.width), self.small()
+        if self.coin():
+            return ir.Landing(6, value, place, self.small(), self.rng.choice((0.0, 0.25)))
+        return ir.Stop(5, value, place, self.small(), self.small(), self.rng.choice((-1.0, 1.0)))
 
     def trust(self, a: ir.Answer, latest: tuple[int, ir.Sum] | None) -> ir.Trust:
         """Something about every kind of predictions, and more about some of them."""
-        draw = self.draw
+        rng = self.rng
         able = [
             bits
             for bits in (0, 1, 2, 3, 16, 17, 18, 19)
             if (a.guess or a.beyond or not bits & 2) and (latest or not bits & 16)
         ]
         kinds = [(outcome, who, -2) for outcome in range(6) for who in (-1, 0, 1)]
-        some = st.tuples(st.integers(0, 5), st.integers(1, 8), st.integers(-1, 7))
-        kinds += draw(st.lists(some, max_size=6, unique=True))
+        winners = [*(mode.id for mode in a.modes), 5, 7]
+        some = itertools.product((PREDICTED, UNEXPLAINED), winners, range(-1, 8))
+        kinds += [kind for kind in some if self.coin()]
         beliefs = []
         for outcome, winner, lead in kinds:
             for bits in able:
-                speakers = [k for k in (0, 1, 4) if bits >> k & 1]
-                speaker = draw(st.sampled_from([*speakers, 5]))
-                sure = draw(st.sampled_from((math.nan, 0.5, 0.99)))
-                beliefs.append(
-                    ir.Belief(outcome, winner, lead, bits, speaker, sure, 0.125, draw(st.booleans()))
-                )
+                speaker = rng.choice([*(k for k in (0, 1, 4) if bits >> k & 1), 5])
+                sure, width = rng.choice((math.nan, 0.5, 0.99)), rng.randint(1, 99) / 8.0
+                beliefs.append(ir.Belief(outcome, winner, lead, bits, speaker, sure, width, self.coin()))
         return ir.Trust(tuple(beliefs), False, latest, None)

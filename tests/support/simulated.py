@@ -44,7 +44,7 @@ class Line:
 
 @dataclass
 class Table:
-    """Five states, three actions: where each leads (-1: nobody knows), what it pays, and whether it ends the episode."""
+    """Five states, three actions: where each leads (-1: nobody knows), what it pays, whether it ends the episode."""
 
     leads: NDArray[np.int64]
     pays: NDArray[np.float64]
