@@ -19,8 +19,6 @@ from relgym.model.files.storage import read_model, write_model
 from relgym.model.world_model import WorldModel
 
 FILES = Path(__file__).parent / "v1"
-NAMES = sorted(path.stem for path in FILES.glob("*.relgym"))
-HISTORIES = [name for name in NAMES if name.endswith("-history")]
 
 Change = Callable[[dict[str, Any], dict[str, Any]], object]
 
@@ -32,20 +30,6 @@ def changed(name: str, change: Change, path: Path) -> Path:
     change(body, arrays or {})
     write_model(path, body, arrays)
     return path
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_files_of_version_1_are_read_and_saved_as_version_2(name: str, tmp_path: Path) -> None:
-    model = WorldModel.load(FILES / f"{name}.relgym")
-    assert model.frozen is not name.endswith("-history")
-    assert model.seen > 100
-    model.save(tmp_path / "one", history=not model.frozen)
-    again = WorldModel.load(tmp_path / "one")
-    assert again.describe(details=True) == model.describe(details=True)
-    assert again.describe() == model.describe()  # without rules, what is printed are the details
-    again.save(tmp_path / "two", history=not model.frozen)
-    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
-    assert b'"version":2' in (tmp_path / "one").read_bytes()
 
 
 def test_the_checksum_covers_the_history(tmp_path: Path) -> None:
