@@ -19,6 +19,7 @@ from relgym.model.files.storage import read_model, write_model
 from relgym.model.world_model import WorldModel
 
 FILES = Path(__file__).parent / "v1"
+LATER = Path(__file__).parent / "v2" / "ball-calibrated-history"
 
 Change = Callable[[dict[str, Any], dict[str, Any]], object]
 
@@ -301,15 +302,22 @@ def _fields(value: Any, where: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str
             yield from _fields(inner, where)
 
 
-@pytest.mark.parametrize("name", ["puck", "pay", "discs-frozen"])
-@pytest.mark.parametrize("empty", [None, [], {}], ids=["null", "list", "object"])
-def test_every_field_may_be_empty_or_is_refused(name: str, empty: Any) -> None:
+_MISSING = object()
+
+
+@pytest.mark.parametrize(
+    "path", [SMALL / "puck", SMALL / "pay", SMALL / "discs-frozen", LATER], ids=lambda p: p.name
+)
+@pytest.mark.parametrize("empty", [None, [], {}, _MISSING], ids=["null", "list", "object", "missing"])
+def test_every_field_may_be_empty_or_is_refused(path: Path, empty: Any) -> None:
     """One of each kind; what is accepted describes and saves."""
-    body, stored = read_model(SMALL / f"{name}.relgym")
+    body, stored = read_model(path.with_suffix(".relgym"))
     arrays = None if stored is None else dict(stored)
     kinds = {where[-3:]: (inside, key) for where, inside, key in _fields(body)}
     for where, (inside, key) in kinds.items():
-        kept, inside[key] = inside[key], copy.copy(empty)
+        kept = inside.pop(key)
+        if empty is not _MISSING:
+            inside[key] = copy.copy(empty)
         try:
             model = WorldModel._restored(copy.deepcopy(body), arrays)
             model.describe(details=True)
