@@ -74,6 +74,9 @@ OCTAVE: Final = 4
 _EXACT: Final = -(1 << 14)
 """The bin of errors no larger than rounding."""
 
+_WIDEST: Final = 1022 * OCTAVE
+"""The bin of all errors beyond 2**1022: a number is read back from it."""
+
 
 OF_WINNER, OF_FAMILY = -1, -2
 """Bins of leads that stand for all of a winner's, and for those of all modes or all laws."""
@@ -653,7 +656,9 @@ def _winner(key: Key) -> Key:
 
 def _place(error: float) -> int:
     """The bin of an error's size."""
-    return _EXACT if error <= 0.0 else math.ceil(OCTAVE * math.log2(error))
+    if error <= 0.0:
+        return _EXACT
+    return math.ceil(OCTAVE * math.log2(error)) if error < 2.0**1022 else _WIDEST
 
 
 def _counted(bins: dict[int, float], place: int) -> dict[int, float]:
