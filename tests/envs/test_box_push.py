@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 import relgym  # noqa: F401  (registers the ids)
 from relgym.envs.box_goal import DeliverTask
 from relgym.envs.box_push import HALF, SPEED, BoxPushEnv
+from relgym.envs.physics import TIME_STEP
 from relgym.envs.scripted import deliver
 from relgym.errors import ConfigError
 
@@ -86,3 +89,90 @@ def test_wrong_arguments() -> None:
     with pytest.raises(ConfigError, match="no room on the table for 10 boxes"):
         sizes = {f"box{k}_{s}": 0.8 for k in range(1, 11) for s in ("width", "height")}
         BoxPushEnv(n_boxes=10).reset(seed=0, options={"count": 10, **sizes})
+
+
+# ---------------------------------------------------------------------- contacts by hand, without friction
+DIAMETER, LENGTH, HEIGHT = 0.2, 0.4, 0.3
+DISC, PARCEL = math.pi * DIAMETER**2 / 4.0, LENGTH * HEIGHT
+"""Masses: bodies are of one density."""
+TOUCHING = -0.3
+"""Where a pusher on its left just touches a parcel at the origin: -(LENGTH + DIAMETER) / 2."""
+TURNING = PARCEL * (LENGTH**2 + HEIGHT**2) / 12.0
+KEPT = 0.02**TIME_STEP
+"""What the table leaves of a velocity after a step."""
+
+
+def laid(**places: float) -> BoxPushEnv:
+    """A pusher at (-0.5, 0) and a parcel at the origin, at rest, unless other numbers are given: ``parcel__vx=0.1``."""
+    env = BoxPushEnv(n_boxes=0, friction=0.0)
+    sizes = {"pusher_size": DIAMETER, "parcel_width": LENGTH, "parcel_height": HEIGHT}
+    env.reset(seed=0, options=sizes)
+    usual = {
+        f"{body}__{name}": 0.0
+        for body in ("pusher", "parcel")
+        for name in ("px", "py", "rz", "vx", "vy", "spin")
+    }
+    usual |= {"pusher__px": -0.5, "goal__dx": 1.0, "goal__dy": 0.0} | places
+    env.set_state(env.scene.replace({tuple(name.split("__")): value for name, value in usual.items()}))  # type: ignore[misc]
+    return env
+
+
+def moved(env: BoxPushEnv, x: float = 0.0, y: float = 0.0) -> dict[str, tuple[float, float, float]]:
+    """Velocities and spins after one step of an action."""
+    env.step(np.array([x, y], dtype=np.float32))
+    return {name: tuple(env.scene[name][p] for p in ("vx", "vy", "spin")) for name in ("pusher", "parcel")}  # type: ignore[misc]
+
+
+def test_what_nothing_touches_is_slowed_down_by_the_table_alone() -> None:
+    env = laid(parcel__vx=0.01, parcel__vy=-0.004, parcel__spin=0.02)
+    for k in (1, 2, 3):
+        found = moved(env, 0.0, 0.5)
+        assert found["parcel"] == pytest.approx((0.01 * KEPT**k, -0.004 * KEPT**k, 0.02 * KEPT**k), abs=1e-12)
+        assert found["pusher"] == pytest.approx((0.0, 0.5 * SPEED, 0.0), abs=1e-12)
+    assert env.scene["parcel"]["px"] == pytest.approx(0.01 * (KEPT + KEPT**2 + KEPT**3), abs=1e-12)
+    assert env.scene["parcel"]["rz"] == pytest.approx(0.02 * (KEPT + KEPT**2 + KEPT**3), abs=1e-12)
+
+
+def test_a_push_through_the_centre_shares_the_momentum() -> None:
+    """No bounce: both go on at the velocity of their centre of mass, step by step faster."""
+    env = laid(pusher__px=TOUCHING)
+    speed = 0.0
+    for _ in range(4):
+        speed = (DISC * SPEED + PARCEL * speed * KEPT) / (DISC + PARCEL)
+        found = moved(env, 1.0)
+        assert found["pusher"] == pytest.approx((speed, 0.0, 0.0), abs=1e-9)
+        assert found["parcel"] == pytest.approx((speed, 0.0, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("arm", [-0.1, 0.05, 0.1])
+def test_a_push_beside_the_centre_turns(arm: float) -> None:
+    """The impulse that takes the velocity of approach: speed / (1 / m + 1 / M + arm^2 / I)."""
+    env = laid(pusher__px=TOUCHING, pusher__py=arm)
+    impulse = SPEED / (1.0 / DISC + 1.0 / PARCEL + arm**2 / TURNING)
+    found = moved(env, 1.0)
+    assert found["pusher"][:2] == pytest.approx((SPEED - impulse / DISC, 0.0), abs=1e-9)
+    assert found["parcel"] == pytest.approx((impulse / PARCEL, 0.0, -arm * impulse / TURNING), abs=1e-9)
+    # The parcel's face goes as fast as the pusher where they touch.
+    assert found["parcel"][0] - found["parcel"][2] * arm == pytest.approx(found["pusher"][0], abs=1e-9)
+
+
+def test_without_friction_nothing_is_dragged_along() -> None:
+    env = laid(pusher__px=TOUCHING)
+    found = moved(env, 0.0, 1.0)
+    assert found["pusher"] == pytest.approx((0.0, SPEED, 0.0), abs=1e-9)
+    assert found["parcel"] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+
+
+def test_who_touches_is_told() -> None:
+    env = laid(pusher__px=TOUCHING)
+    *_, info = env.step(np.array([1.0, 0.0], dtype=np.float32))
+    assert info["touching"] == (("pusher", "parcel"),)
+    *_, info = laid().step(np.array([0.5, 0.0], dtype=np.float32))
+    assert info["touching"] == ()
+
+
+def test_the_way_to_the_goal_follows_the_parcel() -> None:
+    env = laid(parcel__vx=0.01, parcel__vy=-0.004)
+    moved(env)
+    found = env.scene["goal"]["dx"], env.scene["goal"]["dy"]
+    assert found == pytest.approx((1.0 - 0.01 * KEPT, 0.004 * KEPT), abs=1e-12)

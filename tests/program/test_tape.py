@@ -199,3 +199,15 @@ def test_another_tape_in_the_same_space_leaves_nothing_behind() -> None:
     np.testing.assert_array_equal(space["code"][0, : len(other.code)], other.code)
     np.testing.assert_array_equal(space["numbers"][0, : len(other.numbers)], other.numbers)
     assert not space["memory_keys"].any() and (space["believed"] == tapes.NOBODY).all()
+
+
+def test_what_a_wall_reads_is_there_in_every_scene() -> None:
+    """A stop that looks at p1', which nobody else reads or writes: it is p1 of this scene, not of the one before."""
+    (answer,) = halving().answers
+    stop = ir.Stop(5, -1.0, 3, 0.0, 10.0, 1.0)  # where p1' >= 10
+    program = _many(answers=(replace(answer, stops=(stop,)),))
+    told = by_kernel(program, np.array([[4.0, 20.0], [4.0, 0.0], [4.0, 10.0]]))
+    assert told.modes.ravel().tolist() == [5, 3, 5] and told.after[:, 0].tolist() == [-1.0, 3.0, -1.0]
+    landing = ir.Landing(6, -2.0, 3, 7.0, 0.5)
+    told = by_kernel(_many(answers=(replace(answer, stops=(landing,)),)), np.array([[4.0, 7.5], [4.0, 7.6]]))
+    assert told.modes.ravel().tolist() == [6, 3]
