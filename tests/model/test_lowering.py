@@ -16,6 +16,7 @@ from worlds import scene, schema_of
 from relgym.config import ModelConfig
 from relgym.model.lowering import lowered
 from relgym.model.prediction import OUTCOMES
+from relgym.model.querying import predict
 from relgym.model.trusting import trusting
 from relgym.model.world_model import WorldModel
 from relgym.program import records as ir
@@ -41,8 +42,9 @@ def assert_everywhere_the_same(model: WorldModel, count: int, seed: int) -> None
     many = run.many(np.ascontiguousarray(vectors))
     assert many is not None
     for k, vector in enumerate(vectors[:4]):
-        one = run.one(Scene(model.schema, layout, vector.copy()))
-        assert one is not None
+        scene = Scene(model.schema, layout, vector.copy())
+        percept = model._parts.perception.percept(layout, scene.vector[None])
+        one = run.argued(scene, percept) or predict(model._parts, percept, scene)
         np.testing.assert_array_equal(one.scene.vector, many.vectors[k])
         assert [p.mode for p in one.parts] == many.modes[k].tolist()
         assert [OUTCOMES.index(p.outcome) for p in one.parts] == many.outcomes[k].tolist()

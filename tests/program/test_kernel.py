@@ -96,7 +96,8 @@ def test_a_scene_alone_gets_the_same_bits(name: str) -> None:
     many = run.many(np.ascontiguousarray(vectors))
     assert many is not None
     for k, vector in enumerate(vectors):
-        one = run.one(Scene(model.schema, layout, vector.copy()))
+        scene = Scene(model.schema, layout, vector.copy())
+        one = run.argued(scene, model._parts.perception.percept(layout, scene.vector[None]))
         assert one is not None
         np.testing.assert_array_equal(one.scene.vector, many.vectors[k])
         assert [p.mode for p in one.parts] == many.modes[k].tolist()
@@ -112,7 +113,7 @@ def test_a_single_scene_is_told_as_arrays_tell_it(name: str) -> None:
     for vector in vectors:
         scene = Scene(model.schema, layout, vector.copy())
         percept = model._parts.perception.percept(layout, scene.vector[None])
-        known, said = predict(model._parts, percept, scene), run.one(scene)
+        known, said = predict(model._parts, percept, scene), run.argued(scene, percept)
         assert said is not None
         assert [repr(p) for p in said.parts] == [repr(p) for p in known.parts]
 
