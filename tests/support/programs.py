@@ -329,7 +329,7 @@ def _classifiers(draw: st.DrawFn, known: BinaryClassifier) -> BinaryClassifier:
 
 @st.composite
 def _described(draw: st.DrawFn, vocabulary: Vocabulary) -> Definition | None:
-    """Descriptions of who plays a role: clauses over target and candidate, with what they covered."""
+    """Descriptions of what is bound to a role: clauses over target and candidate, with what they covered."""
     relations = tuple((n, k) for k, n in enumerate(vocabulary.relations))
     unary = tuple((n, k) for k, n in enumerate(vocabulary.unary))
     scope = Offered(relations, unary, (), ())

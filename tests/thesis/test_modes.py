@@ -1,4 +1,4 @@
-"""Roles of lines, and who plays them, by hand."""
+"""Roles of lines, and the objects bound to them, by hand."""
 
 from __future__ import annotations
 
