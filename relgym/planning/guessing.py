@@ -60,18 +60,18 @@ class Guessing:
         if layout not in self._laws:
             self._laws[layout] = _bare_laws(self._model, layout, told.parts)
         laws = self._laws[layout]
-        silent = {k: _kept(told, k, law.column, vectors) for k, law in laws.items()}
-        rows = np.flatnonzero(np.any([*silent.values(), np.zeros(len(vectors), dtype=np.bool_)], axis=0))
+        abstaining = {k: _kept(told, k, law.column, vectors) for k, law in laws.items()}
+        rows = np.flatnonzero(np.any([*abstaining.values(), np.zeros(len(vectors), dtype=np.bool_)], axis=0))
         if not len(rows):
             return told
         moved = vectors[rows].copy()
         for k, law in laws.items():
-            here = silent[k][rows]
+            here = abstaining[k][rows]
             moved[here, law.column] = np.clip(vectors[rows[here]] @ law.weights, law.least, law.most)
         again = self._model.predict_batch(layout, moved)
         good = np.ones(len(rows), dtype=np.bool_)
         for k, law in laws.items():  # from another value another mode may hold: then that was no next value
-            good &= ~silent[k][rows] | _kept(again, k, law.column, moved)
+            good &= ~abstaining[k][rows] | _kept(again, k, law.column, moved)
         found = told.vectors.copy()
         found[rows[good]] = again.vectors[good]
         return replace(told, vectors=found)
@@ -80,7 +80,7 @@ class Guessing:
 def _kept(
     told: BatchPrediction, part: int, column: int, before: Float2D
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """In which scenes a part keeps its value for want of a law, shape ``(n,)``."""
+    """In which scenes a part keeps its value since no law holds, shape ``(n,)``."""
     same = told.vectors[:, column] == before[:, column]
     found: np.ndarray[tuple[int], np.dtype[np.bool_]] = same & np.isin(told.outcomes[:, part], _ABSTAINED)
     return found
