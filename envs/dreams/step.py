@@ -14,7 +14,7 @@ from relgym.envs.dreams.rewards import BatchStepEvaluator, TaskFunctions
 from relgym.envs.dreams.setting import Setting
 from relgym.envs.dreams.shown import Deeds
 from relgym.model.prediction import BatchPrediction
-from relgym.scene.objects import Float1D, Float2D, Scene
+from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
 
 __all__ = ["DreamStep", "Stepped"]
 
@@ -70,6 +70,8 @@ class DreamStep:
         What is made of predicted state vectors before they are evaluated; None: nothing.
     guesses
         Whether abstentions are followed, too: to what the model would have said, else as if nothing changed.
+    predicts
+        Who predicts, as `WorldModel.predict_batch`; None: the setting's model.
     """
 
     setting: Setting
@@ -80,6 +82,7 @@ class DreamStep:
     min_margin: float
     corrected: Callable[[Float2D], Float2D] | None = None
     guesses: bool = False
+    predicts: Callable[[SceneLayout, Float2D], BatchPrediction] | None = None
 
     def __call__(
         self,
@@ -107,7 +110,8 @@ class DreamStep:
             A reward is NaN or infinite.
         """
         acting = self.actions.joined(before, actions)
-        prediction = self.setting.model.predict_batch(self.actions.layout, acting)
+        predicts = self.setting.model.predict_batch if self.predicts is None else self.predicts
+        prediction = predicts(self.actions.layout, acting)
         after = self.actions.parted(prediction.vectors)
         if self.corrected is not None:
             after = self.corrected(after)

@@ -369,7 +369,13 @@ def _planned(seeds: Sequence[int], episodes: int) -> Section:
     for seed in seeds:
         env = gym.make(DELIVERY.env_id, disable_env_checker=True)
         agent = PlanningAgent(
-            env, task="given", search=DELIVERY.search, repeat=DELIVERY.repeat, random_steps=REAL, seed=seed
+            env,
+            task="given",
+            search=DELIVERY.search,
+            repeat=DELIVERY.repeat,
+            random_steps=REAL,
+            restarts=False,
+            seed=seed,
         )
         agent.learn(REAL)
         shares.append(100.0 * Tests(DELIVERY, min(100, episodes)).successes(agent) / min(100, episodes))

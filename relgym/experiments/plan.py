@@ -291,7 +291,7 @@ def knowing(*, explores: bool, seed: int, steps: int, every: int = 25) -> dict[s
     Parameters
     ----------
     explores
-        Whether the agent looks for what is new, or acts at random throughout.
+        Whether the agent looks for what is new, or acts at random throughout, in whole episodes.
     seed
         Of everything random.
     steps
@@ -305,7 +305,7 @@ def knowing(*, explores: bool, seed: int, steps: int, every: int = 25) -> dict[s
     at the first test at which both are enough, or None.
     """
     course = COURSES["truck"]
-    options = {} if explores else {"random_steps": 10**9}
+    options = {} if explores else {"random_steps": 10**9, "restarts": False}
     agent = make_agent(replace(course, agent={**course.agent, **options}), ARMS["relgym"], seed=seed)
     fresh = _fresh_steps(course)
     curve: list[tuple[int, float, float]] = []

@@ -123,14 +123,15 @@ def demonstrate(out: Path, *, steps: int = 600, episodes: int = 10, seed: int = 
 
 
 def _episode(agent: PlanningAgent, env: gym.Env[Any, Any], k: int) -> tuple[Trajectory, PlannerState, bool]:
-    """One episode: what happened, and the first plan beside it."""
+    """One episode: what happened, and the first plan beside it until a better one takes its place."""
     seen, info = env.reset(seed=_FIRST + k)
     first: Scene = info["scene"]
-    real, planned, state, over = [first.vector], None, None, False
+    real, planned, state, over, followed = [first.vector], None, None, False, 0
     while not over:
         action, state = agent.predict(seen, state)
         if planned is None:
             planned = state[0].plan
+        followed += state[0].plan is planned
         seen, _, terminated, truncated, info = env.step(action)
         real.append(env.get_wrapper_attr("scene").vector)
         over = terminated or truncated
@@ -142,5 +143,5 @@ def _episode(agent: PlanningAgent, env: gym.Env[Any, Any], k: int) -> tuple[Traj
     succeeded = bool(info["is_success"])
     title = f"episode {k + 1}: {'on the goal' if succeeded else 'not on the goal'}"
     marks = env.get_wrapper_attr("task").regions(first)
-    own = Imagined("the first plan", dream, min(count, len(real) - 1))
+    own = Imagined("the first plan, while it was followed", dream, min(count, followed))
     return Trajectory(title, first, _MOVER, np.stack(real), (own,), marks), state[0], succeeded

@@ -42,8 +42,12 @@ _GROWTH: Final = 1.1
 """Between two reviews the agent's experience grows by this factor: all of them together cost as much as to learn from
 everything some ten times, for each order, but they only take place while the model is wrong."""
 
-_ORDERS: Final = 3
-"""Random orders that a review tries at most: of few steps one may miss what another finds."""
+_ORDERS: Final = 6
+"""Random orders that a review tries at most: of few steps one may miss what another finds. Two that come to the same
+end it."""
+
+_TASK_ORDERS: Final = 3
+"""The same for reward and end, which are compared by a count of mistakes alone: two counts may agree by chance."""
 
 _FIRST_REVIEW: Final = 100
 """Real steps before the first review."""
@@ -57,6 +61,17 @@ leads somewhere."""
 
 _SHARES: Final = tuple(1 / hold / sum(1 / each for each in _HOLDS) for hold in _HOLDS)
 """How often: as many different actions of each."""
+
+_LENGTHS: Final = (1, 2, 4, 8, 16, 32, 64)
+"""Decisions after which an episode of random actions may be cut short. What is drawn once an episode, such as a
+friction or an order of objects, is one example of it, however long the episode; but limits and ends lie further on."""
+
+_LENGTH_SHARES: Final = tuple(1 / length / sum(1 / each for each in _LENGTHS) for length in _LENGTHS)
+"""How often: as many steps of each."""
+
+_DIFFERENT: Final = 4
+"""Different actions at least that are drawn for an episode that lasts so long. From rest an action that is held looks
+as if every speed were twice the last one; few numbers say that, and it holds of many short episodes."""
 
 _BANG: Final = 0.5
 """Share of the random actions whose every component is at one end of its range or the other, as where systems are
@@ -87,6 +102,9 @@ class PlanningAgent:
         Env steps that a decision lasts.
     random_steps
         Steps at random at first; in each episode actions are held for another number of decisions.
+    restarts
+        Whether it may begin a new episode when it likes: most of those at random are then short, and teach more of what
+        differs between episodes. Leave it out where a reset is expensive; steps are counted, resets aren't.
     exploration
         What a state that shows nothing but new pairs of values is worth while learning, in units of what a step pays
         (root mean square so far); 0: it does what the model says pays. Steps of unknown outcome count as entirely new.
@@ -133,6 +151,7 @@ class PlanningAgent:
         search: Search | None = None,
         repeat: int = 1,
         random_steps: int = 100,
+        restarts: bool = True,
         exploration: float = 0.5,
         discount: float = DISCOUNT,
         safe: bool = False,
@@ -157,6 +176,7 @@ class PlanningAgent:
         if adopt is not None:  # it is asked about actions as the env understands them
             adopt(Lens(self._recorder).acting)
         self.random_steps = checked_count("random_steps", random_steps, 0, 10**9)
+        self.restarts = restarts
         self.coverage: Coverage | None = None
         self.steps = 0
         self._like, self._simulator = env, simulator
@@ -173,7 +193,7 @@ class PlanningAgent:
         self._next_review = _FIRST_REVIEW
         self._size = Spread()
         self._limit: int | None = None
-        self._hold = 1
+        self._hold, self._lasts = 1, cast(int | None, None)
         self._held: tuple[int, Any] = (0, None)
         self._thread: PlannerState | None = None
         self._observation: Any = None
@@ -265,8 +285,12 @@ class PlanningAgent:
                 self._observation, _ = self.env.reset(seed=int(self._rng.integers(2**31)))
                 self._thread, self._held = PlannerState(), (0, None)
                 self._begun += 1
-                self._hold = int(self._rng.choice(_HOLDS, p=_SHARES))
                 self._at_random = self.steps < self.random_steps or self._rng.random() < self.doubt
+                self._hold = int(self._rng.choice(_HOLDS, p=_SHARES))
+                self._lasts = None
+                if self._at_random and self.restarts:
+                    self._lasts = int(self._rng.choice(_LENGTHS, p=_LENGTH_SHARES))
+                    self._hold = min(self._hold, max(1, self._lasts // _DIFFERENT))
             action = self._choose(self._observation)
             self._observation, _, terminated, truncated, _ = self.env.step(action)
             for real in self._recorder.take():
@@ -276,7 +300,7 @@ class PlanningAgent:
                 self._thread.decisions += 1
             if truncated:  # so long, then, an episode may last
                 self._limit = max(self._limit or 1, self._thread.decisions)
-            if terminated or truncated:
+            if terminated or truncated or self._thread.decisions == self._lasts:
                 self._observation = None
             if callback is not None and callback(self) is False:
                 break
@@ -390,7 +414,10 @@ class PlanningAgent:
         best, least = None, cost(self.model)
         for _ in range(_ORDERS):
             fresh = learned_again(self.model, seen, rng=self._rng, episodes=episodes)
-            if fresh.targets and (found := cost(fresh)) < least:
+            found = cost(fresh) if fresh.targets else np.inf
+            if found == least:
+                break
+            if found < least:
                 best, least = fresh, found
         if best is not None:
             self.trainer.adopt(best)
@@ -405,7 +432,7 @@ class PlanningAgent:
         """The same for reward and end."""
         seen = list(self._history)
         best, least = None, int(self._missed(own, seen).sum())
-        for _ in range(_ORDERS):
+        for _ in range(_TASK_ORDERS):
             if not least:
                 break
             fresh = own.untaught()

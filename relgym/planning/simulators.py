@@ -19,6 +19,7 @@ from relgym.envs.dreams.step import DreamStep
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError, RelgymError
 from relgym.model.world_model import WorldModel
+from relgym.planning.guessing import Guessing
 from relgym.scene.objects import Float1D, Float2D, Scene
 
 __all__ = ["Correctable", "EnvSimulator", "ModelSimulator", "Simulator", "Steps"]
@@ -178,7 +179,14 @@ class ModelSimulator:
         evaluates = BatchStepEvaluator.of(None, None, self._task, self.model, place.layout)
         corrects = None if self._error is None else self._correct
         self._within = DreamStep(
-            place, evaluates, self._task, self._actions, None, self._margin, guesses=self._guesses
+            place,
+            evaluates,
+            self._task,
+            self._actions,
+            None,
+            self._margin,
+            guesses=self._guesses,
+            predicts=Guessing(self.model).predict_batch if self._guesses else None,
         )
         self._last = replace(self._within, corrected=corrects)
         self._low, self._high = self._limits()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
-from relgym.experiments import plan, plan_benchmark
+from relgym.experiments import plan, plan_benchmark, plan_demo
 from relgym.experiments.jobs.store import Result, ResultStore
 from relgym.experiments.plan_demo import demonstrate
 from relgym.planning import TreeSearch
@@ -114,3 +116,19 @@ def test_the_demo_tells_laws_task_and_plans(tmp_path: Path) -> None:
     text = str(shown)
     assert "truck.vx'" in text and "task.reward'" in text and "of 1 episodes end on the goal" in text
     assert Path(shown.picture).is_file()
+
+
+def test_the_first_plan_is_shown_while_it_is_followed() -> None:
+    env = gym.make(TINY.env_id, **TINY.arguments)
+    states = np.zeros((6, len(env.reset(seed=0)[1]["scene"].vector)))
+    first, better = (SimpleNamespace(states=states) for _ in range(2))
+
+    class Scripted:
+        told = iter([first, first, *[better] * 20])
+
+        def predict(self, observation: Any, state: Any = None) -> tuple[Any, Any]:
+            return np.zeros(1, np.float32), (SimpleNamespace(plan=next(self.told)),)
+
+    shown, _, _ = plan_demo._episode(cast(Any, Scripted()), env, 0)
+    (dream,) = shown.imagined
+    assert len(shown.real) == 4 and dream.predicted == 2  # three steps, two of them by the first plan

@@ -10,6 +10,7 @@ from pit import Pit
 
 from relgym.errors import ConfigError
 from relgym.planning import PlanningAgent, TreeSearch
+from relgym.planning import agent as planning_agent
 
 SEARCH = TreeSearch(horizon=8, expansions=64, batch=32)
 
@@ -65,7 +66,7 @@ def test_a_task_that_is_given_must_be_there() -> None:
 
 
 def falls(agent: PlanningAgent, episodes: int) -> int:
-    env, found = Pit(begin=8.0, steps=20), 0
+    env, found = Pit(begin=11.0, steps=20), 0
     for k in range(episodes):
         seen, _ = env.reset(seed=k)
         state, over = None, False
@@ -78,10 +79,11 @@ def falls(agent: PlanningAgent, episodes: int) -> int:
 
 
 def test_a_safe_agent_does_not_walk_into_a_pit_that_it_never_saw() -> None:
-    # While it learns, episodes are too short to reach the edge: each step forward pays, and that is all it knows.
+    # Six steps lead no farther than 10.03, so while it learns it can't reach the edge: each step forward pays, and that
+    # is all it knows.
     search = TreeSearch(horizon=6, expansions=128, batch=64)
     bold, careful = (
-        PlanningAgent(Pit(begin=8.0, steps=6), search=search, random_steps=150, safe=safe).learn(150)
+        PlanningAgent(Pit(begin=11.0, steps=6), search=search, random_steps=150, safe=safe).learn(150)
         for safe in (False, True)
     )
     assert falls(bold, 5) == 5
@@ -106,6 +108,54 @@ def test_where_more_was_paid_than_it_can_account_for_it_looks_again() -> None:
 def test_episodes_that_were_cut_short_tell_how_long_they_may_last() -> None:
     made = PlanningAgent(Pit(begin=60.0, steps=6), search=SEARCH, random_steps=20).learn(30)
     assert made._limit == 6
+
+
+@pytest.mark.parametrize(("restarts", "lengths"), [(False, {6}), (True, {1, 2, 4, 6})])
+def test_most_random_episodes_are_short(restarts: bool, lengths: set[int]) -> None:
+    # The env cuts them after six steps; what the agent would let last for 8, 16, … lasts so long.
+    made = PlanningAgent(Pit(begin=60.0, steps=6), search=SEARCH, random_steps=240, restarts=restarts)
+    made.learn(240, lambda each: each._lasts is None or 4 * each._hold <= max(4, each._lasts))
+    assert made.steps == 240  # an action is never held for more than a quarter of its episode
+    assert set(np.bincount(made._episodes)[1:-1].tolist()) == lengths
+
+
+def test_planned_episodes_are_whole() -> None:
+    made = PlanningAgent(Pit(begin=60.0, steps=6), search=SEARCH, random_steps=40).learn(40)
+    made._wrong.clear()
+    made._wrong.append(False)  # no doubt
+    made._observation = None
+    first = made._begun + 1
+    made.learn(60)
+    assert np.bincount(made._episodes)[first:-1].tolist() == [6] * (made._begun - first)
+
+
+@pytest.mark.parametrize(
+    ("costs", "lessons"),
+    [
+        ([9.0, 9.0], 1),  # as good as what it had
+        (
+            [9.0, 7.0, 5.0, 5.0],
+            3 + 1,
+        ),  # the second time the same; and once more for what it makes of new steps
+        ([9.0, 10.0, 11.0, 8.0, 12.0, 7.0, 10.0], 6 + 1),
+    ],
+)
+def test_orders_are_tried_until_two_come_to_the_same(
+    costs: list[float], lessons: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = agent(random_steps=40).learn(40)
+    told, called, learned_again = iter(costs), 0, planning_agent.learned_again
+
+    def counted(*arguments: Any, **options: Any) -> Any:
+        nonlocal called
+        called += 1
+        return learned_again(*arguments, **options)
+
+    monkeypatch.setattr(planning_agent, "learned_again", counted)
+    monkeypatch.setattr(planning_agent, "missed", lambda *_: 0)
+    monkeypatch.setattr(planning_agent, "length", lambda _: next(told))
+    made._review_model()
+    assert called == lessons and next(told, None) is None
 
 
 def test_an_agent_is_pickled_in_mid_life() -> None:
