@@ -347,8 +347,8 @@ def test_a_run_of_misses_ends_a_record_at_ten_bits(hits: int, misses: int) -> No
 
 
 def test_a_run_of_hits_ends_a_record_when_it_is_no_short_one() -> None:
-    # After 255 misses two hits say ten bits, too, but only so many as tell a record of their own are believed. It begins
-    # with the miss before them: what failed once isn't always right.
+    # After 255 misses two hits say ten bits, too, but only so many as tell a record of their own are believed. The new
+    # one begins with the miss before them: what failed once isn't always right.
     found = record(FEW - 1, 255, hits_first=False)
     assert (found.trials, found.hits) == (255 + FEW - 1, FEW - 1)
     assert found.count(0.0, 1.0)
@@ -372,8 +372,8 @@ def test_runs_are_counted_when_they_are_over() -> None:
 
 def test_where_misses_come_in_long_runs_another_one_is_no_news() -> None:
     # 32 hits and 8 misses; a first miss has the probability 1 - 32.5 / 41 = 8.5 / 41, and says 2.27 bits.
-    # Where the misses came one by one each other one says as much, and 7 in a row, less the log2(41) = 5.36 bits of when
-    # they begin, are 10.5 bits; where they came in one run, each other one has the probability
+    # Where the misses came one by one each other one says as much, and 7 in a row, less the log2(41) = 5.36 bits of
+    # when they begin, are 10.5 bits; where they came in one run, each other one has the probability
     # (8 - 1 + 8.5 / 41) / 9 = 0.80 and says 0.32 bits: it takes 42 of them until 2.27 + 41 * 0.32 - 5.36 > 10.
     first, after = math.log2(41 / 8.5), math.log2(9.0 / (7.0 + 8.5 / 41.0))
     alone = math.ceil((10.0 + math.log2(41)) / first)
