@@ -580,6 +580,16 @@ def test_a_law_keeps_the_word_by_hand() -> None:
     assert prefers(0.5, 0.02, able=(OWN, PERSISTENCE)) == OWN  # who speaks has none: the next best
 
 
+def test_a_guess_takes_no_law_the_word_but_an_added_class_does() -> None:
+    """What nobody would have tried first says nothing of a law that is right often enough."""
+    for other, speaker in ((GUESS, OWN), (LATEST, OWN), (PERSISTENCE, LINEAR), (len(EXPERTS), LINEAR)):
+        found = _Cell.new(LINEAR, len(EXPERTS) + 1)
+        found.records[OWN] = _Record(99.0, 99.0)
+        for expert, left in ((OWN, 0.5), (LINEAR, 0.5), (other, 0.1)):
+            found.squares[expert] = [99.0, left, 1.0]
+        assert found.preferred((OWN, LINEAR, other), CLAIMS) == speaker
+
+
 def test_the_first_who_has_a_value_speaks_before_anything_is_known() -> None:
     known = Calibration()
     some = list(values())
