@@ -174,16 +174,8 @@ class ModelConfig:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> ModelConfig:
-        """Read what `to_json` wrote."""
-        return cls(
-            **{
-                **data,
-                "clustering": ClusteringConfig(**data["clustering"]),
-                "classification": ClassificationConfig(**data["classification"]),
-                "features": tuple(data.get("features", ())),
-                "hypotheses": tuple(data.get("hypotheses", ())),
-            }
-        )
+        """Read what `to_json` wrote; `ConfigError` for anything else."""
+        return cls.of(data)
 
 
 def _part(kind: type[Any], given: Any) -> Any:

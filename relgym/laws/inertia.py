@@ -160,7 +160,7 @@ class Inertia:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Inertia:
         """Read what `to_json` wrote."""
-        m = data["mass"]
+        m = data.get("mass")
         mass = None if m is None else Mass(
             tuple((str(n), int(k)) for n, k in m["factors"]), m["by"],
             tuple((str(n), float(c)) for n, c in m["constants"]), int(m["examples"]), int(m["unexplained"]),
@@ -171,7 +171,7 @@ class Inertia:
                 None if g["terms"] is None else Piece(tuple((str(n), float(w)) for n, w in g["terms"])),
                 bool(g["whole"]), int(g["examples"]), int(g["unexplained"]),
             )
-            for g in data["gyrations"]
+            for g in data.get("gyrations", ())
         )  # fmt: skip
         return cls(mass, gyrations)
 

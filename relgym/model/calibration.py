@@ -127,10 +127,17 @@ def keys_of(
     outcomes: NDArray[np.int8], winners: NDArray[np.int64], margins: NDArray[np.float64]
 ) -> Iterator[tuple[Key, NDArray[np.intp]]]:
     """The cells of n predictions, and which of them lie in each."""
-    table = np.stack([outcomes.astype(np.int64), winners, lead_bins(margins)], axis=1)
-    cells, which = np.unique(table, axis=0, return_inverse=True)
-    for number, cell in enumerate(cells.tolist()):
-        yield Key(*cell), np.flatnonzero(which.reshape(-1) == number)
+    for rows in _groups((winners << 10) + (outcomes.astype(np.int64) << 3) + lead_bins(margins)):
+        first = rows[0]
+        (lead,) = lead_bins(margins[first : first + 1]).tolist()
+        yield Key(int(outcomes[first]), int(winners[first]), lead), rows
+
+
+def _groups(codes: NDArray[np.int64]) -> Iterator[NDArray[np.intp]]:
+    """Places of equal numbers, in ascending order, number by number."""
+    order = np.argsort(codes, kind="stable")
+    ends = np.flatnonzero(np.diff(codes[order])) + 1
+    yield from np.split(order, ends) if len(codes) else ()
 
 
 def lead_bins(margins: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -151,6 +158,7 @@ class _Record:
     runs: list[float] = field(
         default_factory=lambda: [0.0] * 4
     )  # over: trials in those of misses, of hits; how many
+    _even: tuple[float, float, float] | None = field(default=None, repr=False, compare=False)
 
     def count(self, error: float, within: float) -> bool:
         """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
@@ -186,6 +194,12 @@ class _Record:
             self.runs = [0.5 * each for each in self.runs]
         return ended
 
+    def even(self) -> float:
+        """`share` after a prior that says nothing; worked out once between trials."""
+        if self._even is None or self._even[:2] != (self.trials, self.hits):
+            self._even = (self.trials, self.hits, self.share(0.5))
+        return self._even[2]
+
     def mean(self, prior: float) -> float:
         """Posterior mean of the share of hits, after a beta distribution of `PRIOR` trials around the given mean."""
         return (self.hits + prior * PRIOR) / (self.trials + PRIOR)
@@ -217,6 +231,9 @@ class _Cell:
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials
     heard: float = 0.0  # predictions, those of long ago counting less
+    _sure: tuple[float, float] | None = field(
+        default=None, repr=False, compare=False
+    )  # by bits, since the last trial
 
     @classmethod
     def new(cls, speaker: int, experts: int) -> _Cell:
@@ -224,12 +241,14 @@ class _Cell:
 
     def note(self, speaker: int, errors: Sequence[float], within: float) -> None:
         """Take in whether the winner and the speaker were right, no more."""
+        self._sure = None
         for expert in {OWN, speaker}:
             if errors[expert] == errors[expert]:
                 self.records.setdefault(expert, _Record()).count(errors[expert], within)
 
     def count(self, errors: Sequence[float], within: float) -> None:
         """Take in what each expert was off by; the best one speaks, if it leads by enough."""
+        self._sure = None
         for expert in sorted({OWN, self.speaker}):
             if errors[expert] == errors[expert]:
                 if self.records.setdefault(expert, _Record()).count(errors[expert], within):
@@ -249,11 +268,13 @@ class _Cell:
 
     def sure(self, claims: tuple[float, float], bits: float) -> float:
         """How probably what would be claimed is right, after this record alone; 0 if no mode and no law speaks."""
-        able = [k for k, sums in enumerate(self.squares) if sums[0]]
-        speaker = self.preferred(able, claims) if able else OWN
-        known = self.records.get(speaker)
-        share = 0.5 if known is None else known.share(0.5, bits)
-        return share if _makes_claims(speaker) else 0.0
+        if self._sure is None or self._sure[0] != bits:
+            able = [k for k, sums in enumerate(self.squares) if sums[0]]
+            speaker = self.preferred(able, claims) if able else OWN
+            known = self.records.get(speaker)
+            share = 0.5 if known is None else known.share(0.5, bits)
+            self._sure = bits, share if _makes_claims(speaker) else 0.0
+        return self._sure[1]
 
     def left(self, expert: int) -> float:
         """Squares left of what saying that nothing changes leaves; infinite if the expert was never heard."""
@@ -276,8 +297,8 @@ class _Cell:
         """
         own, other = self.records.get(OWN), self.records.get(self.speaker, _Record())
         probability, slips = claims
-        least = max(probability, min(other.share(0.5), 1.0 - slips))
-        if OWN in able and own is not None and own.share(0.5) >= least:
+        least = max(probability, min(other.even(), 1.0 - slips))
+        if OWN in able and own is not None and own.even() >= least:
             least = min(self.left(expert) for expert in able if expert in _KNOWN or expert >= len(EXPERTS))
             if self.left(OWN) <= LEAVE * LEAVE * least:
                 return OWN
@@ -345,10 +366,9 @@ class Calibration:
         self, key: Key, values: NDArray[np.float64]
     ) -> Iterator[tuple[NDArray[np.intp], Assessment]]:
         """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
-        able, which = np.unique(np.isfinite(values), axis=0, return_inverse=True)
-        for number, row in enumerate(able):
-            rows = np.flatnonzero(which.reshape(-1) == number)
-            yield rows, self.assess(key, np.where(row, 0.0, np.nan).tolist())
+        able = np.isfinite(values)
+        for rows in _groups(able @ (1 << np.arange(values.shape[1]))):
+            yield rows, self.assess(key, np.where(able[rows[0]], 0.0, np.nan).tolist())
 
     def table(self, outcomes: int, able: Sequence[int]) -> Iterator[tuple[Key, int, Assessment, bool]]:
         """What is made of every kind of predictions: a table that says of any prediction what `assess` and `claims` do.
@@ -508,6 +528,7 @@ class Calibration:
             known = cell.squares[cell.speaker]
             share = min(1.0, EVIDENCE / known[0]) if known[0] else 0.0
             cell.squares[expert] = [share * each for each in known]
+            cell._sure = None
         self._assessed.clear()
         self._least.clear()
 

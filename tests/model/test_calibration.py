@@ -301,6 +301,29 @@ def test_cells_are_the_same_one_by_one_and_together(margin: float) -> None:
     assert found[key_of(0, 2, 1.0)] == [1]
 
 
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 4),
+            st.sampled_from([-3, -1, 0, 1, 2, 2**31 - 1]),
+            st.sampled_from([0.0, -1.0, math.nan, 1e-9, 0.3, 5.0, math.inf]),
+        ),
+        max_size=30,
+    )
+)
+def test_many_predictions_lie_in_the_cells_that_each_of_them_lies_in(
+    asked: list[tuple[int, int, float]],
+) -> None:
+    outcomes = np.array([outcome for outcome, _, _ in asked], dtype=np.int8)
+    winners = np.array([winner for _, winner, _ in asked], dtype=np.int64)
+    margins = np.array([margin for _, _, margin in asked], dtype=np.float64)
+    cells = list(keys_of(outcomes, winners, margins))
+    assert len({key for key, _ in cells}) == len(cells)
+    told = {int(row): key for key, rows in cells for row in rows}
+    assert [told[row] for row in range(len(asked))] == [key_of(*each) for each in asked]
+    assert sum(len(rows) for _, rows in cells) == len(asked)
+
+
 @given(st.lists(st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)), max_size=60))
 def test_saved_and_read_it_goes_on_as_before(steps: list[tuple[float, float]]) -> None:
     known = Calibration()

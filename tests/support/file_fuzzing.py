@@ -22,17 +22,20 @@ from numpy.typing import NDArray
 
 from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import RelgymError
+from relgym.files.reading import ARCHIVE, read_members
 from relgym.model.files.storage import read_model, write_model
+from relgym.model.files.upgrade import upgraded
 from relgym.model.running import KERNEL, PATIENCE
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers import ModelLearner
 from relgym.wrappers.dyna.reward_models import LearnedRewardModel
 
-__all__ = ["CORPUS", "Finding", "Fuzzer", "Tally", "spied", "worlds"]
+__all__ = ["EARLIER", "Finding", "Fuzzer", "Tally", "spied", "worlds"]
 
-CORPUS = Path(__file__).parent.parent / "model" / "files" / "v1"
-"""Files of version 1, of four worlds."""
+_FILES = Path(__file__).parent.parent / "model" / "files"
+EARLIER = _FILES / "v1", _FILES / "v2"
+"""Files of earlier versions, of four worlds."""
 SMALL = Path(__file__).parent.parent / "fuzz" / "corpus"
 """Files of small worlds (`tests/fuzz/make_corpus.py`), with some steps of each beside them."""
 STEPS = 20
@@ -129,8 +132,12 @@ class Fuzzer:
     def __init__(self, folder: Path, seed: int = 0) -> None:
         self.folder, self.seed = folder, seed
         self.steps = worlds() | {path.stem: _kept(path) for path in sorted(SMALL.glob("*.npz"))}
-        paths = [path for corpus in (CORPUS, SMALL) for path in sorted(corpus.glob("*.relgym"))]
-        self.files = {path.stem: _content(path) for path in paths}
+        paths = [path for corpus in (*EARLIER, SMALL) for path in sorted(corpus.glob("*.relgym"))]
+        self.files: dict[str, tuple[dict[str, Any], Arrays | None]] = {}
+        self.versions: dict[str, int] = {}
+        for path in paths:
+            self.versions[path.stem], body, arrays = _content(path)
+            self.files[path.stem] = body, arrays
         self._mutators: dict[str, Mutator] = {}
         _compile(next(path for path in paths if path.stem in self.steps), self.steps)
 
@@ -172,6 +179,7 @@ class Fuzzer:
         try:
             with _alarm(HANG), warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # numbers may overflow
+                body = upgraded(body, self.versions[name])
                 if number % 8 == 0:  # the container is dear, and much the same whatever it holds
                     try:
                         write_model(path, body, arrays)
@@ -256,9 +264,13 @@ class Fuzzer:
             tally.typed_later[f"dream: {type(error).__name__}"] += 1
 
 
-def _content(path: Path) -> tuple[dict[str, Any], Arrays | None]:
-    body, stored = read_model(path)
-    return body, None if stored is None else dict(stored)
+def _content(path: Path) -> tuple[int, dict[str, Any], Arrays | None]:
+    """The version of a file, its body as that version has it, and its history."""
+    data, (_, stored) = path.read_bytes(), read_model(path)
+    if data[:2] == ARCHIVE:
+        data = read_members(data, ("model.json", "history.npz"))["model.json"]
+    whole = json.loads(data)
+    return whole["version"], whole["body"], None if stored is None else dict(stored)
 
 
 def _kept(path: Path) -> list[Transition]:

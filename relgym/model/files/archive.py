@@ -70,10 +70,11 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     """
     # msgspec is loaded with the first file, not with relgym.
     from relgym.files.records import checked
-    from relgym.model.files.checks import check_body
+    from relgym.model.files.checks import check_body, check_settings
     from relgym.model.files.format import Body
 
     body: Body = checked(data, Body, "the model")
+    check_settings(data["config"])
     try:
         check_depth(body.extra)
     except ValueError as error:

@@ -11,7 +11,7 @@ import base64
 import binascii
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
 from typing import Any, Final
 
@@ -24,6 +24,7 @@ from relgym.classification.views import Scope
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.mode import Mode
 from relgym.clustering.roles import bind
+from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
 from relgym.errors import ModelFileError
 from relgym.files.reading import StoredArrays
 from relgym.files.records import LARGEST
@@ -59,7 +60,7 @@ from relgym.model.target.conditions import Conditions
 from relgym.scene.axes import Axes
 from relgym.scene.objects import Target
 
-__all__ = ["check_body"]
+__all__ = ["check_body", "check_settings"]
 
 _Arrays = Mapping[str, NDArray[Any]]
 
@@ -76,6 +77,26 @@ def _require(ok: object, where: str, said: str) -> None:
 
 def _distinct(values: Sequence[Any], where: str) -> None:
     _require(len(set(values)) == len(values), where, "something stands there twice")
+
+
+def check_settings(config: Mapping[str, Any]) -> None:
+    """Refuse settings that there aren't; types and ranges of the others are known to hold.
+
+    Parameters
+    ----------
+    config
+        The file's `ModelConfig`, as plain data.
+
+    Raises
+    ------
+    ModelFileError
+        It names a setting that relgym doesn't have.
+    """
+    kinds = {"": ModelConfig, "clustering.": ClusteringConfig, "classification.": ClassificationConfig}
+    for part, kind in kinds.items():
+        given = config.get(part[:-1], {}) if part else config
+        for name in sorted(set(given) - {each.name for each in fields(kind)}):
+            _require(False, f"config.{part}{name}"[:200], "relgym has no such setting")
 
 
 def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:

@@ -1,4 +1,4 @@
-"""The declared format of a model file's body, version 2: every field, its type and its range.
+"""The declared format of a model file's body, version 3: every field, its type and its range.
 
 `docs/reference/model-file.md` says what the parts mean, and the JSON Schema beside it is made from these records. What
 the records can't say, such as that a clause names relations that there are, is said in `relgym.model.files.checks`.

@@ -27,6 +27,7 @@ from relgym.files.reading import (
     write_members,
 )
 from relgym.files.writing import write_whole
+from relgym.model.files.upgrade import upgraded
 from relgym.scene.objects import Kinematics, ObjectType, Target
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Compound, ConvexPolyhedron, Prism, Shape, Sphere, Wedge
@@ -43,8 +44,9 @@ __all__ = [
 ]
 
 FORMAT: Final = "relgym-model"
-VERSION: Final = 2
-"""Version 1 had no checksum of the history; its files are still read."""
+VERSION: Final = 3
+"""Files of all versions are read: `relgym.model.files.upgrade` says what has changed. Version 1 had no checksum of the
+history."""
 
 _TEXT, _HISTORY = "model.json", "history.npz"
 
@@ -139,14 +141,14 @@ def _lost(said: str) -> ModelFileError:
 
 
 def _checked(path: str | os.PathLike[str], whole: Any, history: bytes | None) -> dict[str, Any]:
-    """The body of a file of a known version, whose checksum fits."""
+    """The body of a file of a known version whose checksum fits, as the present version has it."""
     if not isinstance(whole, dict) or whole.get("format") != FORMAT:
         raise ModelFileError(f"{path}: expected a relgym model file, got another kind of JSON")
     version, body = whole.get("version"), whole.get("body")
-    if isinstance(version, bool) or version not in (1, VERSION):
+    if type(version) is not int or not 1 <= version <= VERSION:
         raise ModelFileError(
-            f"{path}: expected format version {VERSION} or 1, got {version!r}; load it with the relgym version that "
-            "wrote it"
+            f"{path}: expected format version 1 to {VERSION}, got {version!r:.40}; load it with the relgym version "
+            "that wrote it"
         )
     digest = None if history is None else hashlib.sha256(history).hexdigest()
     content = body if version == 1 else {"body": body, "history": whole.get("history")}
@@ -158,7 +160,7 @@ def _checked(path: str | os.PathLike[str], whole: Any, history: bytes | None) ->
         raise ModelFileError(
             f"{path}: the checksum doesn't match: the file was edited or damaged; save it again"
         )
-    return body
+    return upgraded(body, version)
 
 
 def _canonical(data: Any) -> str:

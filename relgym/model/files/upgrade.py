@@ -1,0 +1,104 @@
+"""Bodies that earlier versions of the format held, as the present version holds them.
+
+A body is plain data of which nothing is known yet: what isn't as that version had it is left alone, and named by
+whoever checks the result against `relgym.model.files.format`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any, Final
+
+__all__ = ["upgraded"]
+
+_RETIRED: Final[dict[str, dict[str, Any]]] = {
+    "clustering": {"approximate": True, "stickiness": "simple", "review": True},
+    "classification": {
+        "votes": "soft",
+        "runoff": True,
+        "numeric_literals": True,
+        "mode_function_features": True,
+        "ambiguous": "drop",
+        "both_polarities": True,
+        "literal_choice": "gain",
+        "mdl": True,
+        "min_precision": 0.5,
+        "tree_errors": "class",
+        "class_balance": 0.0,
+        "repair": True,
+    },
+}
+"""Settings that there were before version 3, with the values of which the present rules are made."""
+
+
+def upgraded(body: dict[str, Any], version: int) -> dict[str, Any]:
+    """A body as the present version has it.
+
+    Parameters
+    ----------
+    body
+        Of a file whose checksum fits; it isn't changed.
+    version
+        Of the format that it was written in; 1 and 2 differ in the checksum alone.
+
+    Warns
+    -----
+    UserWarning
+        The model was learned with a setting that is gone, and with another value of it than the present rules have.
+    """
+    if version >= 3:
+        return body
+    found = dict(body)
+    if isinstance(body.get("config"), dict):
+        found["config"] = _without_retired(body["config"])
+    if isinstance(body.get("calibration"), dict):
+        found["calibration"] = {name: _with_runs(each) for name, each in body["calibration"].items()}
+    return found
+
+
+def _without_retired(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings without those that are gone."""
+    found, other = dict(config), []
+    for part, retired in _RETIRED.items():
+        given = config.get(part)
+        if not isinstance(given, dict):
+            continue
+        found[part] = {name: value for name, value in given.items() if name not in retired}
+        other += [
+            f"{part}.{name}={value!r:.40}"
+            for name, value in given.items()
+            if name in retired and value != retired[name]
+        ]
+    if other:
+        warnings.warn(
+            f"the model was learned with {', '.join(other)}, which relgym no longer has; it now predicts and learns "
+            "by the rules that all models have, and what it says may differ: learn it anew to be sure",
+            UserWarning,
+            stacklevel=2,
+        )
+    return found
+
+
+def _with_runs(calibration: Any) -> Any:
+    """A calibration with the fields that tell how often each kind of predictions comes, and in what runs.
+
+    Version 2 got them on the way. Where they are missing, a kind came as often as anybody's values in it were looked
+    back at, no run is known, and laws are as likely as modes.
+    """
+    if not isinstance(calibration, dict):
+        return calibration
+    cells = calibration.get("cells")
+    completed = [_cell(each) for each in cells] if isinstance(cells, list) else cells
+    return {"vouched": 0.0, **calibration, "cells": completed}
+
+
+def _cell(cell: Any) -> Any:
+    if not isinstance(cell, dict) or not isinstance(cell.get("records"), list):
+        return cell
+    records = [
+        [*each, [0.0] * 4] if isinstance(each, list) and len(each) == 5 else each for each in cell["records"]
+    ]
+    trials = [each[1] for each in records if isinstance(each, list) and len(each) == 6]
+    heard = max((each for each in trials if isinstance(each, (int, float))), default=0.0)
+    return {"heard": heard, **cell, "records": records}
