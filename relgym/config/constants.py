@@ -21,6 +21,7 @@ __all__ = [
     "ROUNDINGS",
     "SEARCHED_CELLS",
     "STDS",
+    "SUMMABLE",
     "TALLY_DIGITS",
     "TIE_BITS",
     "TOLD",
@@ -71,6 +72,9 @@ POWERS: Final = (1, 2, 3)
 TALLY_DIGITS: Final = 7
 """Decimals to which sums of examples' weights are compared. Weights are multiples of 1/64 or shares of 1; sums taken in
 another order differ by 1e-12 at most."""
+
+SUMMABLE: Final = 1e146
+"""Numbers up to this can be multiplied, and 2^53 of the products be summed, before a float64 overflows."""
 
 DIGITS: Final = 7
 """Significant digits of numbers in formulas, unless somebody asks for others."""

@@ -291,6 +291,11 @@ def test_modes_that_are_gone_are_forgotten() -> None:
         seen(known, values(own=1.0), 1.0, key=Key(0, -2, 7))
     known.keep((2, 3))
     assert {key.winner for key in known._cells if key.lead >= 0} == {-2}
+    # What all modes said tells a new one how to begin, whoever is gone.
+    assert {key for key in known._cells if key.lead == OF_FAMILY} == {
+        Key(0, 1, OF_FAMILY),
+        Key(0, -1, OF_FAMILY),
+    }
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.1, 0.25, 1.0, 7.9, 1e9, math.inf])
@@ -544,6 +549,19 @@ def test_leads_by_hand() -> None:
     assert found.lead(LINEAR, GUESS) == pytest.approx(0.5 * 6.0 * math.log2(1e300))
 
 
+@pytest.mark.parametrize("size", [1e11, 1e100, 1e150])
+def test_exact_laws_of_huge_changes_lead_by_finite_bits(size: float) -> None:
+    """What they leave of the squares is less than the smallest number there is."""
+    found, errors = _Cell.new(PERSISTENCE, len(EXPERTS)), [math.nan] * len(EXPERTS)
+    errors[OWN], errors[LINEAR], errors[PERSISTENCE] = 0.0, 0.0, size
+    for _ in range(300):
+        found.count(errors, 0.5)
+    assert found.speaker == OWN
+    assert found.lead(OWN, LINEAR) == found.lead(LINEAR, OWN) == 0.0
+    assert found.lead(OWN, PERSISTENCE) == pytest.approx(0.5 * 300 * math.log2(1e300))
+    assert found.lead(PERSISTENCE, OWN) == -found.lead(OWN, PERSISTENCE)
+
+
 def test_another_expert_takes_over_at_ten_bits() -> None:
     # A quarter of the squares are 1 bit for each trial.
     found, errors = _Cell.new(OWN, len(EXPERTS)), [math.nan] * len(EXPERTS)
@@ -755,6 +773,29 @@ def test_bits_that_vouch_are_for_laws() -> None:
     assert (known.claims(Key(0, 1, 7), told), known.claims(Key(0, -1, 7), told)) == (True, True)
 
 
+def test_bits_that_vouch_tell_what_is_claimed() -> None:
+    """One hit alone makes 11 / 12; of a law that described what came in six bits less, hardly any doubt is left."""
+    known, law = Calibration(probability=0.95), Key(0, -1, 7)
+    known._cells[law], known.trials = cell(1.0, 1.0, heard=1.0), 1
+    sure = Assessment(OWN, 1.0, math.nan, math.nan)
+    assert not known.claims(law, sure)
+    known.vouch(6.0)
+    assert known.claims(law, sure)
+
+
+def test_bits_vouch_for_no_one_who_speaks_in_a_laws_place() -> None:
+    known, law = Calibration(), Key(0, -1, 7)
+    known._cells[law], known.trials = cell(2.0, 2.0, speaker=LINEAR), 2
+    said = values(linear=1.0)
+    before = known.assess(law, said)
+    assert (before.speaker, before.probability) == (
+        LINEAR,
+        pytest.approx((5 / 6 * 3 / 8 + 1.0) / (3 / 8 + 1.0)),
+    )
+    known.vouch(9.0)
+    np.testing.assert_array_equal(known.assess(law, said), before)
+
+
 # ---------------------------------------------------------------------- a long memory, and what is forgotten
 def test_how_many_were_heard_is_halved_with_the_slips() -> None:
     known, other = right(MEMORY), KEY._replace(lead=4)
@@ -784,6 +825,18 @@ def test_cells_that_a_prediction_is_counted_in() -> None:
         Key(2, -3, 7): 1.0,
         Key(3, 0, 0): 1.0,
     }
+
+
+def test_all_modes_know_how_often_each_was_right_who_spoke() -> None:
+    known, spoke = Calibration(), []
+    for _ in range(30):
+        said = values(own=5.0, linear=1.0)
+        spoke.append(known.assess(KEY, said).speaker)
+        seen(known, said, 1.0)
+    (family,) = [c for key, c in known._cells.items() if key.lead == OF_FAMILY]
+    assert spoke.count(LINEAR) > 20
+    assert (family.records[LINEAR].trials, family.records[LINEAR].hits) == (spoke.count(LINEAR),) * 2
+    assert (family.records[OWN].trials, family.records[OWN].hits) == (30, 0)
 
 
 def test_a_renewed_expert_begins_with_ten_trials_of_who_speaks() -> None:

@@ -431,6 +431,9 @@ Expert: TypeAlias = Annotated[
     int, Meta(ge=0, description="who gave a value, as a place among all experts: six, and hypotheses")
 ]
 Bins: TypeAlias = list[tuple[int, Weight]]
+Squares: TypeAlias = Annotated[
+    float, Meta(ge=0.0, le=1e304, description="a sum of squares of errors, each of 1e150 at most")
+]
 
 
 class CellRecord(Record):
@@ -445,7 +448,7 @@ class CellRecord(Record):
     speaker: Expert
     heard: Weight
     records: list[tuple[Expert, Weight, Weight, int, Bins, tuple[Weight, Weight, Weight, Weight]]]
-    squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6)]
+    squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=6)]
 
 
 class CalibrationRecord(Record):
