@@ -33,7 +33,7 @@ def test_it_grows_and_keeps_what_it_has() -> None:
 
 
 def test_dropped_rows_take_their_examples_along() -> None:
-    """A target has no example of every row of its type's table, here none of row 1."""
+    """A target has no example of every row of its type's table, here none of the second row."""
     log = log_of(0, 2, 3, 4, 5, labels=(7, NOISE, 8, 7, NOISE))
     numbers = log.keep(np.array([False, True, True, False, True, False]))
     assert numbers.tolist() == [-1, 0, -1, 1, -1]

@@ -82,7 +82,7 @@ def test_a_mode_like_no_other_absorbs_none(rng: np.random.Generator) -> None:
     assert generalise(known, new, np.arange(20, 40), rng=rng) == (new, ())
 
 
-@pytest.mark.parametrize(("others", "unified"), [(8, True), (FAMILY - 1, False)])
+@pytest.mark.parametrize(("others", "unified"), [(8, True), (FAMILY, True), (FAMILY - 1, False)])
 def test_a_family_differs_in_its_constant_only(others: int, unified: bool, rng: np.random.Generator) -> None:
     """Friction is constant while an episode lasts: each teaches ``v' = v - c``, and many the law of c."""
     frictions = rng.uniform(0.1, 1.0, others + 1)
@@ -102,17 +102,21 @@ def test_a_family_differs_in_its_constant_only(others: int, unified: bool, rng: 
         assert (cluster.mode.formula(6), absorbed) == (modes[-1].formula(6), ())
 
 
-def test_modes_without_a_constant_are_no_family(rng: np.random.Generator) -> None:
-    """Nor are those that take part in another object already."""
-    frictions = rng.uniform(0.1, 1.0, 9)
+@pytest.mark.parametrize("missing", ["a constant", "plain terms"])
+def test_only_plain_functions_with_a_constant_are_a_family(missing: str, rng: np.random.Generator) -> None:
+    """Eight modes differ in their constant, which friction (or w) explains; the ninth one does not fit among them."""
+    frictions = np.append(rng.uniform(0.1, 1.0, 8), 0.0)
     x = rng.normal(size=(126, 3))
-    x[:, 2] = np.repeat(frictions, 14)
     labels = np.repeat(np.arange(1, 10), 14)
     labels[-14:] = 0
-    modes = [mode_of(("v", 1.0), constant=float(-2.5 * c)) for c in frictions[:-1]]
-    known = known_of(x, x[:, 0] - 2.5 * x[:, 2], labels.tolist(), *modes)
-    for new in (
-        mode_of(("v", 0.5)),
-        mode_of(("v", 1.0), others=[Role("box", (("friction", 1.0),))], constant=1.0),
-    ):
-        assert generalise(known, Cluster(new), np.arange(112, 126), rng=rng)[1] == ()
+    if missing == "a constant":
+        x[:, 2] = np.repeat(frictions, 14)
+        y, others = x[:, 0] - 2.5 * x[:, 2], []
+    else:  # they take part in another object already
+        x[:, 1] = np.repeat(frictions + 1.0, 14)
+        y, others = x[:, 0] + x[:, 2] - 2.5 * x[:, 1], [Role("box", (("friction", 1.0),))]
+        frictions = frictions + 1.0
+    modes = [mode_of(("v", 1.0), others=others, constant=float(-2.5 * c)) for c in frictions]
+    known = known_of(x, y, labels.tolist(), *modes[:-1])
+    assert modes[-1].intercept == 0.0 or missing == "plain terms"
+    assert generalise(known, Cluster(modes[-1]), np.arange(112, 126), rng=rng)[1] == ()

@@ -276,13 +276,13 @@ def test_wind_blows_where_it_blows() -> None:
 
 
 def test_of_a_type_never_seen_its_kin_tell() -> None:
-    kin = [ObjectType(name, MOVING, Box(), "thing", velocity=("vx", "vy", None)) for name in ("bar", "crate")]
+    kin = [ObjectType(name, MOVING, Box(), "thing", velocity=("vx", "vy", None)) for name in ("rod", "crate")]
     targets = tuple(Target(t.name, v) for t in kin for v in MOVING[-3:])
-    schema = SceneSchema(tuple(kin), (("a", "bar"), ("b", "crate")), planar=True, targets=targets)
+    schema = SceneSchema(tuple(kin), (("a", "rod"), ("b", "crate")), planar=True, targets=targets)
     book = LawBook(schema, {t.name: Sources.of(schema, t, targets) for t in kin})
     assert book.free_law("crate") is None
-    book.free["bar"] = FreeLaw("bar", KEPT)
-    assert book.free_law("crate") == book.free["bar"]
+    book.free["rod"] = FreeLaw("rod", KEPT)
+    assert book.free_law("crate") == book.free["rod"]
     alone = book_of(schema_of(a="block"), REST, SMOOTH)
     del alone.free["block"]
     assert alone.free_law("block") is None  # discs are no kin

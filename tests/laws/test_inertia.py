@@ -194,14 +194,14 @@ def test_a_hollow_one_is_harder_to_turn(rng: np.random.Generator) -> None:
 
 
 def test_a_number_for_each_type_and_what_never_turns(rng: np.random.Generator) -> None:
-    types = ["box"] * 20 + ["bar"] * 20 + ["sledge"] * 20 + ["rare"] * 3
+    types = ["box"] * 20 + ["rod"] * 20 + ["sledge"] * 20 + ["rare"] * 3
     gyration = np.array([0.5] * 20 + [2.0] * 20 + [np.inf] * 20 + [1.0] * 3)
     found = {
         g.types: g for g in find_gyrations(turned(gyration, seen(rng, 63), types, rng), TOLERANCE, rng=rng)
     }
-    assert set(found) == {("bar",), ("box",), ("sledge",)}  # three contacts found nothing
+    assert set(found) == {("rod",), ("box",), ("sledge",)}  # three contacts found nothing
     assert found["sledge",].piece is None
-    for name, expected in (("box", 0.5), ("bar", 2.0)):
+    for name, expected in (("box", 0.5), ("rod", 2.0)):
         piece = found[name,].piece
         assert piece is not None
         assert piece.terms == ((ONE, pytest.approx(expected)),)
@@ -218,10 +218,10 @@ def test_a_sum_of_two_terms_is_found(rng: np.random.Generator) -> None:
 
 
 def test_lengths_count_by_their_squares(rng: np.random.Generator) -> None:
-    """Of a bar of length s, however wide it is drawn, s^2 / 12."""
+    """Of a rod of length s, however wide it is drawn, s^2 / 12."""
     features = seen(rng, 40, sx=rng.uniform(1.0, 3.0, 40))
     (found,) = find_gyrations(
-        turned(features["sx"] ** 2 / 12.0, features, ["bar"] * 40, rng), TOLERANCE, rng=rng
+        turned(features["sx"] ** 2 / 12.0, features, ["rod"] * 40, rng), TOLERANCE, rng=rng
     )
     assert found.piece is not None
     assert found.piece.terms == (("sx^2", pytest.approx(1 / 12)),)
@@ -239,7 +239,7 @@ def test_ratios_of_what_is_seen_but_of_no_shapes() -> None:
 KNOWN = Inertia(
     Mass((("sx", 2), ("rho", 1)), "type", (("ball", 1.0), ("box", 0.25)), 30, 1),
     (
-        Gyration(("bar", "box"), Piece(((SQUARE, 2.0), (ONE, 0.5))), False, 12, 0),
+        Gyration(("box", "rod"), Piece(((SQUARE, 2.0), (ONE, 0.5))), False, 12, 0),
         Gyration(("sledge",), None, False, 9, 1),
     ),
 )
@@ -250,7 +250,7 @@ def test_saved_and_told() -> None:
     assert Inertia.from_json(NOTHING.to_json()) == NOTHING
     assert KNOWN.sentences() == (
         "masses go as sx^2 rho; by type, times ball: 1, box: 0.25",
-        "moment over mass of bar, box: 2 shape.r2 + 0.5",
+        "moment over mass of box, rod: 2 shape.r2 + 0.5",
         "moment over mass of sledge: infinite",
     )
     assert Inertia(Mass(()), (Gyration(("a",), Piece(((SQUARE, 1.0),)), True),)).sentences() == (

@@ -104,7 +104,7 @@ def test_surfaces_run_by_kind_of_contact() -> None:
 
 
 def test_on_a_belt_that_runs_for_others_a_new_type_runs_too() -> None:
-    ball, belt = ("ball", "belt"), ("bar", "belt")
+    ball, belt = ("ball", "belt"), ("rod", "belt")
     law = running((BELT, 0.5), (belt, 0.5 * (1 + 1e-9)))
     assert law.running([ball]).tolist() == [0.5]
     assert law.running([("belt", "ball")]).tolist() == [0.0]  # what runs is the second body

@@ -118,7 +118,7 @@ def test_another_law_must_save_as_much_again_and_say_which_proposal_it_was(kind:
         assert found._accepts(0, off_by(1.0, 9), shown()) is kept
 
 
-def test_least_squares_is_as_good_a_rival(kind: Offsets) -> None:
+def test_least_squares_competes_as_well(kind: Offsets) -> None:
     """A line through the examples takes nothing but its three numbers."""
     rng = np.random.default_rng(0)
     x = rng.normal(size=(64, 2))
@@ -133,7 +133,7 @@ def test_least_squares_is_as_good_a_rival(kind: Offsets) -> None:
     assert Candidates([kind.name])._accepts(0, Bend((0.0,), 1), bent)
 
 
-def test_a_law_of_other_columns_is_no_rival(kind: Offsets) -> None:
+def test_a_law_of_other_columns_is_not_compared(kind: Offsets) -> None:
     found = Candidates([kind.name])
     assert found._accepts(0, off_by(0.0, 0), shown())
     other = Examples(("v",), np.zeros((16, 1)), shown().y, shown().present, 1.0)
@@ -144,9 +144,9 @@ def test_a_law_of_other_columns_is_no_rival(kind: Offsets) -> None:
 
 def test_what_is_left_unsaid_costs_a_whole_number(kind: Offsets) -> None:
     """One NaN in sixteen takes 64 bits: 15 + 64, less than 112 by more than ten; of two it is 142."""
-    for silent, kept in ((1, True), (2, False)):
+    for unsaid, kept in ((1, True), (2, False)):
         values = [7.0 if k % 2 else -7.0 for k in range(16)]
-        values[:silent] = [math.nan] * silent
+        values[:unsaid] = [math.nan] * unsaid
         assert Candidates([kind.name])._accepts(0, Offset(tuple(values), 0), shown()) is kept
 
 
