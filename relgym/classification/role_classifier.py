@@ -151,7 +151,7 @@ class RoleClassifier:
         self._extensions.clear()
         self.learned, self.seen = float(weights[rows].sum()), max(self.seen, float(weights[rows].sum()))
         definitions = [d.definition for d in self.descriptions if d.definition is not None]
-        self.errors = sum(definition.errors for definition in definitions)
+        self.errors = sum((definition.errors for definition in definitions), 0.0)
         self.contradictions, self.stale = 0.0, False
         return work
 

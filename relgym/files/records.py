@@ -30,6 +30,7 @@ __all__ = [
     "Spread",
     "Weight",
     "checked",
+    "plain",
 ]
 
 _MOST = sys.float_info.max
@@ -57,8 +58,11 @@ Hex: TypeAlias = Annotated[str, Meta(pattern=r"^([0-9a-f]{2})*$", description="b
 Pair: TypeAlias = tuple[Name, Name]
 
 
-class Record(msgspec.Struct, forbid_unknown_fields=True):
-    """A JSON object with exactly the fields declared; those with a default may be missing."""
+class Record(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """A JSON object with exactly the fields declared; those with a default may be missing.
+
+    `plain` leaves those out, so that whoever reads a record meets what is missing every time, not in odd files alone.
+    """
 
 
 class _Pcg64(Record):
@@ -79,6 +83,12 @@ class Random(Record):
     state: _Pcg64
     has_uint32: Annotated[int, Meta(ge=0, le=1)]
     uinteger: Annotated[int, Meta(ge=0, le=2**32 - 1)]
+
+
+def plain(record: msgspec.Struct) -> dict[str, Any]:
+    """Plain data of a record: every number of the type declared, and nothing that a default says."""
+    found: dict[str, Any] = msgspec.to_builtins(record)
+    return found
 
 
 def checked(data: Any, kind: Any, what: str, *, error: type[RelgymError] = ModelFileError) -> Any:

@@ -6,7 +6,7 @@ import copy
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from typing import Any, Self
 
 import numpy as np
@@ -861,9 +861,6 @@ class WorldModel:
 
     def _restore_report(self, data: Mapping[str, Any]) -> None:
         if data:
-            known = {field.name for field in fields(Advice)}
-            if odd := {name for each in data.get("advice", ()) for name in each} - known:
-                raise ModelFileError(f"report.advice: unknown fields {sorted(odd)}; save the model again")
             advice = tuple(
                 Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
             )
@@ -918,13 +915,13 @@ class WorldModel:
     def _restored(cls, body: dict[str, Any], arrays: Mapping[str, NDArray[Any]] | None) -> WorldModel:
         """The model that a file's body and history stand for; `ModelFileError` unless all of it fits together."""
         try:
-            parts = parts_from_json(body, arrays)
-            restore_hindsight(parts, body.get("hindsight", {}))
-            restore_calibration(parts, body.get("calibration", {}))
+            parts, data = parts_from_json(body, arrays)
+            restore_hindsight(parts, data.get("hindsight", {}))
+            restore_calibration(parts, data.get("calibration", {}))
             model = cls(parts.schema, parts.config, targets=())
-            model._state, model.seen, model.frozen = parts, body["seen"], arrays is None
-            model.extra, model.condition_names = body["extra"], dict(body.get("names", {}))
-            model._restore_report(body.get("report", {}))
+            model._state, model.seen, model.frozen = parts, data["seen"], arrays is None
+            model.extra, model.condition_names = data["extra"], dict(data.get("names", {}))
+            model._restore_report(data.get("report", {}))
         except RelgymError as error:
             raise error if isinstance(error, ModelFileError) else ModelFileError(str(error)) from None
         return model

@@ -976,6 +976,23 @@ def test_what_two_models_know_is_united_in_either_order(
     assert json.dumps([one.to_json(), two.to_json()]) == before
 
 
+WINNERS = st.integers(-3, 3) | st.sampled_from([2**31 - 1, -(2**31)])
+MARGINS = st.sampled_from([0.0, 0.1, 1.0, 9.0, math.inf])
+
+
+@given(st.lists(st.tuples(st.integers(0, 7), WINNERS, MARGINS), max_size=20))
+def test_each_prediction_lies_in_one_cell_its_own(told: list[tuple[int, int, float]]) -> None:
+    outcomes = np.array([each[0] for each in told], dtype=np.int8)
+    winners = np.array([each[1] for each in told], dtype=np.int64)
+    found = {
+        k: key
+        for key, rows in keys_of(outcomes, winners, np.array([m for *_, m in told]))
+        for k in rows.tolist()
+    }
+    assert [found[k] for k in range(len(told))] == [key_of(*each) for each in told]
+    assert len(set(found.values())) == len({key_of(*each) for each in told})
+
+
 @given(st.lists(st.floats(0.0, 1e9) | st.just(math.inf), min_size=1, max_size=20))
 def test_bins_of_leads_are_the_same_in_arrays(margins: list[float]) -> None:
     bins = [key_of(0, 1, margin).lead for margin in margins]

@@ -58,10 +58,17 @@ def parts_to_arrays(parts: Parts) -> _Arrays:
     return arrays
 
 
-def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.generic]] | None) -> Parts:
+def parts_from_json(
+    given: Mapping[str, Any], arrays: Mapping[str, NDArray[np.generic]] | None
+) -> tuple[Parts, dict[str, Any]]:
     """Read what `parts_to_json` and `parts_to_arrays` wrote; without arrays it can only predict.
 
-    Everything is checked before anything is taken over (`relgym.model.files.format`, `relgym.model.files.checks`).
+    Everything is checked before anything is taken over (`relgym.model.files.format`, `relgym.model.files.checks`), and
+    what is taken over is what was checked: the records' plain data, not the file's.
+
+    Returns
+    -------
+    The parts, and all that the file says as plain data of the types declared, without what defaults say.
 
     Raises
     ------
@@ -69,12 +76,13 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
         Something is missing, malformed, out of range, or refers to what isn't there.
     """
     # msgspec is loaded with the first file, not with relgym.
-    from relgym.files.records import checked
+    from relgym.files.records import checked, plain
     from relgym.model.files.checks import check_body, check_settings
     from relgym.model.files.format import Body
 
-    body: Body = checked(data, Body, "the model")
-    check_settings(data["config"])
+    body: Body = checked(given, Body, "the model")
+    check_settings(given["config"])
+    data = plain(body)
     try:
         check_depth(body.extra)
     except ValueError as error:
@@ -94,12 +102,12 @@ def parts_from_json(data: Mapping[str, Any], arrays: Mapping[str, NDArray[np.gen
     parts.looks = [(name, prop, inert) for name, prop, inert in body.looks]
     if body.saved_cells is not None:
         parts.agenda.saved = body.saved_cells
-    if data.get("screen") is not None:
+    if "screen" in data:
         parts.screen.restore(data["screen"])
     if parts.laws is not None:
         parts.laws.restore(data["laws"], _of(arrays, "laws."))
         parts.laws.mark(parts.models)
-    return parts
+    return parts, data
 
 
 def _regressed(parts: Parts) -> list[str]:

@@ -25,7 +25,6 @@ from relgym.files.records import (
     Spread,
     Weight,
 )
-from relgym.model.reports.advice import Advice
 
 __all__ = [
     "Body",
@@ -54,6 +53,7 @@ Known: TypeAlias = Annotated[int, Meta(ge=-1, le=2**31 - 1, description="id of a
 Variable: TypeAlias = Annotated[int, Meta(ge=-1, le=63, description="number of a variable; -1: any object")]
 Node: TypeAlias = Annotated[int, Meta(ge=0, le=10_000, description="number of a node")]
 Context: TypeAlias = Literal["approached", "touching", "all"]
+Whole: TypeAlias = Annotated[int, Meta(ge=-(2**53), le=2**53, description="a whole number")]
 Terms: TypeAlias = list[tuple[Name, Finite]]
 Counts: TypeAlias = tuple[Weight, Weight]
 
@@ -430,9 +430,18 @@ class HindsightRecord(Record):
 Expert: TypeAlias = Annotated[
     int, Meta(ge=0, description="who gave a value, as a place among all experts: six, and hypotheses")
 ]
-Bins: TypeAlias = list[tuple[int, Weight]]
 Squares: TypeAlias = Annotated[
     float, Meta(ge=0.0, le=1e304, description="a sum of squares of errors, each of 1e150 at most")
+]
+Bin: TypeAlias = Annotated[int, Meta(ge=-(2**14), le=4 * 1022, description="quarter octaves of a size")]
+Bins: TypeAlias = list[tuple[Bin, Weight]]
+Kind: TypeAlias = tuple[
+    Annotated[int, Meta(ge=0, le=127, description="number of an outcome")],
+    Annotated[int, Meta(ge=-(2**31), le=2**31 - 1, description="id of a mode; a law is below 0; 0: nobody")],
+    Annotated[
+        int,
+        Meta(ge=-2, le=7, description="bin of the lead; below 0: all of a winner's, of all modes or laws"),
+    ],
 ]
 
 
@@ -444,10 +453,10 @@ class CellRecord(Record):
     nothing changes.
     """
 
-    key: tuple[int, int, int]
+    key: Kind
     speaker: Expert
     heard: Weight
-    records: list[tuple[Expert, Weight, Weight, int, Bins, tuple[Weight, Weight, Weight, Weight]]]
+    records: list[tuple[Expert, Weight, Weight, Whole, Bins, tuple[Weight, Weight, Weight, Weight]]]
     squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=6)]
 
 
@@ -603,11 +612,24 @@ class LawsRecord(Record):
 
 
 # ---------------------------------------------------------------------- the whole
+class AdviceRecord(Record):
+    """What a target lacks (`relgym.model.reports.advice`)."""
+
+    target: str
+    unexplained: float
+    left: float
+    features: tuple[str, ...]
+    law: str
+    remains: float
+    wrong: int = 0
+    spoken: int = 0
+
+
 class ReportRecord(Record):
     """What can't be told without the history: rules as text (`relgym.reporting.parse_rules`), and advice."""
 
     rules: str = ""
-    advice: list[Advice] = []
+    advice: list[AdviceRecord] = []
 
 
 class ScreenRecord(Record):
@@ -643,7 +665,7 @@ class Body(Record):
     seen: Count
     extra: dict[str, Any]
     looks: list[tuple[Name, Name, bool]] = []
-    saved_cells: int | None = None
+    saved_cells: Whole | None = None
     screen: ScreenRecord | None = None
     hindsight: dict[str, HindsightRecord] = {}
     calibration: dict[str, CalibrationRecord] = {}

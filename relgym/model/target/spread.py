@@ -117,7 +117,7 @@ class Spreads:
         """Read what `to_json` wrote."""
         found = {}
         for mode, whole, by_action, *rest in data:
-            split = Split.from_json(rest[1]) if len(rest) > 1 else None
+            split = Split.from_json(rest[1]) if len(rest) > 1 and rest[1] is not None else None
             actions = {tuple(map(float, a)): float(v) for a, v in by_action}
             found[int(mode)] = Spread(float(whole), actions, bool(rest and rest[0]), split)
         return cls(found)

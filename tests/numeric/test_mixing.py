@@ -1,0 +1,39 @@
+"""Numbers that look random: the generator's own, one by one and together."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from relgym.numeric.mixing import mixed
+
+WORD = st.integers(0, 2**64 - 1)
+
+
+def test_outputs_of_the_published_generator() -> None:
+    """From the state 1234567, as Vigna's program prints them."""
+    assert [mixed(k, 1234567) for k in range(1, 6)] == [
+        6457827717110365317,
+        3203168211198807973,
+        9817491932198370423,
+        4593380528125082431,
+        16408922859458223821,
+    ]
+
+
+@given(st.lists(WORD, min_size=1, max_size=9), WORD)
+def test_many_are_mixed_as_one_by_one(numbers: list[int], start: int) -> None:
+    found = mixed(np.array(numbers, dtype=np.uint64), np.full(len(numbers), start, dtype=np.uint64))
+    assert found.dtype == np.uint64
+    assert found.tolist() == [mixed(number, start) for number in numbers]
+
+
+@given(st.sets(WORD, min_size=2, max_size=50), WORD)
+def test_different_numbers_stay_different(numbers: set[int], start: int) -> None:
+    assert len({mixed(number, start) for number in numbers}) == len(numbers)
+
+
+def test_half_of_the_bits_are_set() -> None:
+    bits = np.unpackbits(mixed(np.arange(4096, dtype=np.uint64), np.zeros(1, dtype=np.uint64)).view(np.uint8))
+    assert abs(bits.reshape(-1, 64).mean(axis=0) - 0.5).max() < 4.5 * 0.5 / 64.0
