@@ -19,7 +19,7 @@ MOST = {
     "clustering": (71, 51),
     "hypotheses": (0, 3),
     "laws": (43, 42),
-    "logic": (17, 17),
+    "logic": (16, 12),
     "model": (94, 43),
     "numeric": (16, 25),
     "scheduling": (1, 1),

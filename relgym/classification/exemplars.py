@@ -28,7 +28,7 @@ from relgym.classification.columns import Column, Columns
 from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabulary, check_example
 from relgym.config import ClassificationConfig
 from relgym.config.constants import LEAST_EXEMPLARS
-from relgym.numeric.mixing import mixed
+from relgym.mixing import GOLDEN, mixed_one
 
 __all__ = ["COLUMNS", "Exemplars", "dyadic"]
 
@@ -369,4 +369,4 @@ def dyadic(weights: Floats) -> Floats:
 
 def _hash(key: bytes, count: float) -> int:
     """A number that looks random, the same in every process."""
-    return mixed(int(count), zlib.crc32(key))
+    return mixed_one(zlib.crc32(key) + int(count) * GOLDEN)

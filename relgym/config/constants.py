@@ -22,8 +22,6 @@ __all__ = [
     "ROUGH",
     "ROUNDINGS",
     "SEARCHED_CELLS",
-    "SPLITMIX",
-    "SPLITMIX_STEP",
     "STDS",
     "SUMMABLE",
     "TALLY_DIGITS",
@@ -79,12 +77,6 @@ another order differ by 1e-12 at most."""
 
 SUMMABLE: Final = 1e146
 """Numbers up to this can be multiplied, and 2^53 of the products be summed, before a float64 overflows."""
-
-SPLITMIX_STEP: Final = 0x9E3779B97F4A7C15
-"""What splitmix64 adds to its state for each output: 2^64 over the golden ratio."""
-
-SPLITMIX: Final = ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1))
-"""How splitmix64 mixes its state: each time with itself shifted right by so many bits, and multiplied."""
 
 PIVOT: Final = 1e-9
 """A column whose part orthogonal to others is relatively smaller is collinear with them: half of a float's digits."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
+from relgym.mixing import GOLDEN, mixed
 from relgym.model.target.property_model import PropertyModel
-from relgym.numeric.mixing import mixed
 
 __all__ = ["SLACK", "forget"]
 
@@ -69,4 +69,4 @@ def _indispensable(model: PropertyModel, bound: int) -> NDArray[np.int64]:
 
 def _lot(serials: NDArray[np.int64]) -> NDArray[np.uint64]:
     """A number that looks random for every serial number."""
-    return mixed(serials.astype(np.uint64) + np.uint64(1), np.zeros(1, dtype=np.uint64))
+    return mixed((serials.astype(np.uint64) + np.uint64(1)) * np.uint64(GOLDEN))
