@@ -64,8 +64,19 @@ def test_velocities_are_found_by_body_and_those_of_walls_are_none() -> None:
     expected = [[0.3, 0.0, 0.0, -0.6], [-0.4, 0.0, 0.0, 0.8], [7.0, 0.0, 8.0, 9.0]]
     assert state[cast.velocities][..., 0].tolist() == expected
     assert cast.dimensions == 2
-    one = cast.padded_one(VECTOR)
+    one = cast_of("ball").padded_one(VECTOR)
     assert np.isnan(one[-2]) and one[-1] == 0.0 and one[:-2].tolist() == VECTOR.tolist()
+
+
+@pytest.mark.parametrize("learned", [(), ("ball",), ("ball", "block")])
+def test_one_vector_is_padded_as_many(learned: tuple[str, ...]) -> None:
+    cast, rng = cast_of(*learned), np.random.default_rng(0)
+    vectors = rng.normal(size=(5, len(VECTOR)))
+    many = cast.padded(vectors)
+    for k, vector in enumerate(vectors):
+        assert cast.padded_one(vector).tobytes() == np.ascontiguousarray(many[:, k]).tobytes()
+    for _, places in cast.sources.values():
+        assert places.max() < len(many)
 
 
 def test_where_bodies_turn_drag_and_places_are_read_too() -> None:
