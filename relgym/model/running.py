@@ -56,7 +56,8 @@ long."""
 
 SETTLING = 64
 """Scenes asked one by one, since the model last changed, before the program is told how right its predictions were:
-to write that down takes about as long as to settle so many predictions without it."""
+to write that down takes about as long as to settle so many predictions without it. Nor does a program that couldn't
+tell scenes rest for more."""
 
 ASKING, SCENE = 5e-4, 6e-6
 """What arrays take to answer, in seconds: each time, and for each scene."""
@@ -85,6 +86,9 @@ class Programs:
         self._known: dict[int, _Known] = {}
         self._asked = 0
         self._looked = 0  # at the grounds, after so many changes
+        self._declined = self._resting = (
+            0  # scenes that programs couldn't tell lately; that they aren't asked for it
+        )
 
     def __reduce__(self) -> tuple[type[Programs], tuple[()]]:
         return Programs, ()
@@ -92,6 +96,27 @@ class Programs:
     def changed(self) -> None:
         """The model isn't what it was: programs may be out of date."""
         self.changes += 1
+
+    def one(self, parts: Parts, scene: Scene, percept: Callable[[Scene], Percept]) -> ScenePrediction | None:
+        """What the program says of one scene, whose numbers are finite; None: arrays must, or can say why not.
+
+        While the model learns, who gives a value is settled after the program has run. Where others than modes and
+        laws give many of them it can't tell what follows from those, and arrays answer after all: so after each time
+        in vain it rests for twice as many scenes as before, up to `SETTLING`.
+        """
+        if self._resting and self._looked != self.changes:
+            self._resting -= 1
+            return None
+        if (runner := self.of(parts, scene.layout, 1)) is None:
+            return None
+        if (said := runner.sure(scene)) is not None:
+            return said
+        if self._resting:
+            self._resting -= 1
+            return None
+        said = runner.argued(scene, percept(scene))
+        self._declined = self._resting = 0 if said is not None else min(2 * self._declined + 1, SETTLING)
+        return said
 
     def of(self, parts: Parts, layout: SceneLayout, scenes: int) -> Runner | None:
         """What runs the program for a layout; None: arrays answer.
@@ -163,12 +188,14 @@ class Kernel:
         self.module: ModuleType | None = None
         self.spent = 0.0
         self._missing = False
+        self._next = LOADING  # spent, when the disk is looked at again
 
     def after(self, scenes: int) -> ModuleType | None:
         """The kernel, if it pays to have it now that so many scenes more are asked."""
         if self.module is None and not self._missing:
             self.spent += ASKING + SCENE * scenes
-            if self.spent >= LOADING and (found := self._imported()) is not None:
+            if self.spent >= self._next and (found := self._imported()) is not None:
+                self._next = min(2.0 * self._next, COMPILING)
                 if self.spent >= COMPILING or found.is_compiled():
                     self.module = found
         return self.module
@@ -307,17 +334,6 @@ class Runner:
         self._settled = True
         return self._settling
 
-    def one(self, scene: Scene, percept: Percept | None = None) -> ScenePrediction | None:
-        """Predict what follows one scene, whose numbers are finite; None: arrays must, or can say why not.
-
-        What the program says is what arrays would have said of modes and laws; whose value counts is settled as there
-        (`relgym.model.querying.settled`), or by the program, where many scenes are asked of a model that stays as it
-        is. A percept of the scene may be given, for what isn't asked of the program.
-        """
-        if self._knows() and (known := self._sure(scene)) is not None:
-            return known
-        return self._argued(scene, percept)
-
     def _knows(self) -> bool:
         """Whether the program knows how right its predictions were, now that one more scene is asked."""
         if not self._settled and self._asked >= SETTLING:
@@ -325,11 +341,13 @@ class Runner:
         self._asked += 1
         return self._settled and self._believing
 
-    def _argued(self, scene: Scene, percept: Percept | None) -> ScenePrediction | None:
-        """`one` where whose value counts is settled here."""
+    def argued(self, scene: Scene, percept: Percept) -> ScenePrediction | None:
+        """Predict what follows one scene; None where the program can't tell it.
+
+        What the program says is what arrays would have said of modes and laws; whose value counts is settled here as
+        there (`relgym.model.querying.settled`). The percept is for what isn't asked of the program.
+        """
         now = scene.vector
-        if percept is None:
-            percept = self._parts.perception.percept(self._layout, now[None])
         told = self._told(now[None], settling=False, told=1)
         if told is None:
             return None
@@ -359,8 +377,13 @@ class Runner:
             wrap(self._layout, following)
         return ScenePrediction(Scene(scene.schema, self._layout, following), tuple(found))
 
-    def _sure(self, scene: Scene) -> ScenePrediction | None:
-        """`one` where the program knows how right its predictions are; None where it can't tell all that is asked."""
+    def sure(self, scene: Scene) -> ScenePrediction | None:
+        """Predict what follows one scene, if the program knows how right its predictions were; else None.
+
+        It is told that once many scenes were asked of a model that stays as it is.
+        """
+        if not self._knows():
+            return None
         now = scene.vector
         told = self._told(now[None], settling=True, told=1)
         if told is None:

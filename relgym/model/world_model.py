@@ -555,8 +555,7 @@ class WorldModel:
         parts = self._parts
         if not parts.admits(scene) or large(scene.layout):
             return None
-        runner = self._programs.of(parts, scene.layout, 1)
-        return None if runner is None else runner.one(scene, self._perceive(scene))
+        return self._programs.one(parts, scene, self._perceive)
 
     def _run_many(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """The same of n scenes; None too for what isn't an array of such."""

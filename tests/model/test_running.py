@@ -114,6 +114,41 @@ def test_the_kernel_is_there_once_it_pays(monkeypatch: pytest.MonkeyPatch, on_di
     assert kernel.after(1) is kernel.module
 
 
+def test_the_disk_is_looked_at_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[float] = []
+    kernel = running.Kernel()
+    monkeypatch.setattr("relgym.program.kernel.is_compiled", lambda: bool(looked.append(kernel.spent)))
+    while kernel.after(1) is None:
+        pass
+    assert kernel.spent == pytest.approx(running.COMPILING, abs=1e-3)
+    assert looked == pytest.approx([0.5, 1.0, 2.0, 4.0, 8.0, 16.0], abs=1e-3)
+
+
+def test_programs_that_cannot_tell_rest() -> None:
+    schema = schema_of(LINE_STEPS, LINE_TARGETS)
+    scene = transitions(schema, LINE_STEPS[:1])[0].before
+    asked: list[int] = []
+
+    class Runner:
+        def __init__(self, now: int) -> None:
+            self.now = now
+
+        def sure(self, _: Scene) -> None:
+            return None
+
+        def argued(self, *_: object) -> object:
+            asked.append(self.now)
+            return "told" if 191 <= self.now < 194 else None
+
+    programs = running.Programs()
+    for now in range(208):
+        programs.changed()
+        programs.of = lambda *_, now=now: Runner(now)  # type: ignore[method-assign]
+        programs.one(None, scene, lambda _: None)  # type: ignore[arg-type, return-value]
+    # Rests of 1, 3, 7, 15, 31, 63, then of 64; whoever can tell is asked each time, and rests shortly when he can't.
+    assert asked == [0, 2, 6, 14, 30, 62, 126, 191, 192, 193, 194, 196, 200]
+
+
 def test_without_numba_arrays_answer_and_a_warning_says_so_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running, "KERNEL", kernel := running.Kernel())
     kernel.spent = running.LOADING
