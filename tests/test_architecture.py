@@ -17,7 +17,9 @@ from typing import TypeGuard
 import pytest
 from source_tree import FOLDERS, ROOT, Import, Module, modules, package_of
 
-FOUNDATION = frozenset({"errors", "arguments", "config", "files", "html", "hypotheses", "scheduling"})
+FOUNDATION = frozenset(
+    {"errors", "arguments", "config", "files", "html", "hypotheses", "mixing", "scheduling"}
+)
 ENGINES = FOUNDATION | {"scene", "numeric", "logic"}
 LEARNERS = ENGINES | {"clustering", "classification", "laws"}
 CORE = LEARNERS | {"reporting", "program", "model"}
@@ -29,6 +31,7 @@ MAY_IMPORT = {
     "files": frozenset({"errors"}),
     "html": frozenset(),
     "hypotheses": frozenset({"errors"}),
+    "mixing": frozenset(),
     "scheduling": frozenset(),
     "scene": FOUNDATION,
     "numeric": FOUNDATION,

@@ -27,14 +27,12 @@ from numpy.typing import NDArray
 from relgym.classification.columns import Column, Columns
 from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabulary, check_example
 from relgym.config import ClassificationConfig
+from relgym.config.constants import LEAST_EXEMPLARS
+from relgym.mixing import GOLDEN, mixed_one
 
 __all__ = ["COLUMNS", "Exemplars", "dyadic"]
 
-_FEWEST: Final = 100
-"""So many examples are kept whatever memory they take; also the least `max_exemplars`."""
-
 _UNDEFINED: Final = float("nan")
-_MASK64: Final = (1 << 64) - 1
 COLUMNS: Final = {
     "table": Column("bool", ("R", "K", "K2")),
     "unary": Column("bool", ("U", "K")),
@@ -309,7 +307,7 @@ class Exemplars:
         shape = (bodies, *self.columns.sizes.values())
         if self._room_for[0] != shape:
             size = self.columns.row_bytes({"K": bodies, "K2": bodies})
-            most = max(_FEWEST, self.config.exemplar_memory * 2**20 // size)
+            most = max(LEAST_EXEMPLARS, self.config.exemplar_memory * 2**20 // size)
             self._room_for = shape, min(self.config.max_exemplars, most)
         return self._room_for[1]
 
@@ -370,8 +368,5 @@ def dyadic(weights: Floats) -> Floats:
 
 
 def _hash(key: bytes, count: float) -> int:
-    """A number that looks random, the same in every process (splitmix64 of key and count)."""
-    x = (zlib.crc32(key) + int(count) * 0x9E3779B97F4A7C15) & _MASK64
-    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & _MASK64
-    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & _MASK64
-    return x ^ (x >> 31)
+    """A number that looks random, the same in every process."""
+    return mixed_one(zlib.crc32(key) + int(count) * GOLDEN)

@@ -17,7 +17,8 @@ from relgym.classification.binary import BinaryClassifier
 from relgym.classification.examples import Bools, Example, ExampleBatch, Vocabulary
 from relgym.classification.plans import Key
 from relgym.classification.views import Context, View
-from relgym.logic.situations import mixed, situation
+from relgym.logic.situations import situation
+from relgym.mixing import mixed
 
 __all__ = ["Familiarity", "Used", "situations", "used_by"]
 

@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ClusteringConfig
+from relgym.config.constants import PIVOT
 from relgym.numeric.ransac import Consensus, consensus, refine
 from relgym.numeric.stepwise import (
-    PIVOT,
     LinearFit,
     fitting_cells,
     forward_stepwise,

@@ -68,7 +68,7 @@ def rounding_noise(
         were the responses, even if something was worked out from them since (an angle from its sine and cosine).
     """
     largest = float(np.abs(y).max(initial=0.0))
-    if bool((y.astype(np.float32).astype(np.float64) == y).all()) and bool(np.any(y != np.round(y))):
+    if bool(_single(y).all()) and bool(np.any(y != np.round(y))):
         return SINGLES * float(np.finfo(np.float32).eps) * max(largest, TINY)
     if recent is not None and _rounded(recent):
         return SINGLES * float(np.finfo(np.float32).eps) * max(largest, 1.0)
@@ -78,9 +78,16 @@ def rounding_noise(
 
 def _rounded(rows: NDArray[np.float64]) -> bool:
     """Whether float32 represents all values of some column exactly, and there are enough of them to tell."""
-    exact = (rows.astype(np.float32).astype(np.float64) == rows).all(axis=0)
+    exact = _single(rows).all(axis=0)
     columns = (rows[:, k] for k in np.flatnonzero(exact))
     return any(len(np.unique(column[column != np.round(column)])) >= MANY for column in columns)
+
+
+def _single(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which values float32 represents exactly."""
+    with np.errstate(over="ignore"):  # larger ones than it holds become infinite, and so aren't equal
+        found: NDArray[np.bool_] = values.astype(np.float32).astype(np.float64) == values
+    return found
 
 
 def estimate_noise(

@@ -7,6 +7,7 @@ from typing import Literal
 
 from relgym.arguments import refusing_fields
 from relgym.config.checks import at_least, at_most, one_of, plain, unit
+from relgym.config.constants import LEAST_EXEMPLARS
 from relgym.errors import ConfigError
 
 __all__ = ["ClassificationConfig"]
@@ -98,7 +99,7 @@ class ClassificationConfig:
         at_least(self, 1, "max_literals", "max_clauses", "beam", "tree_min_leaf", "tree_max_depth")
         at_least(self, 1, "exemplars_per_state", "exemplars_alone", "noise_per_state")
         at_least(self, 0, "max_new_variables")
-        at_least(self, 100, "max_exemplars")
+        at_least(self, LEAST_EXEMPLARS, "max_exemplars")
         at_least(self, 1, "exemplar_memory")
         # Searches may take long, but not for ever.
         at_most(self, max_literals=64, max_clauses=256, max_new_variables=4, beam=256, tree_max_depth=64)

@@ -15,12 +15,15 @@ __all__ = [
     "EXTRAPOLATED",
     "FIRST_ROOM",
     "HOPELESS",
+    "LEAST_EXEMPLARS",
     "LEFT_OPEN",
+    "PIVOT",
     "POWERS",
     "ROUGH",
     "ROUNDINGS",
     "SEARCHED_CELLS",
     "STDS",
+    "SUMMABLE",
     "TALLY_DIGITS",
     "TIE_BITS",
     "TOLD",
@@ -71,6 +74,15 @@ POWERS: Final = (1, 2, 3)
 TALLY_DIGITS: Final = 7
 """Decimals to which sums of examples' weights are compared. Weights are multiples of 1/64 or shares of 1; sums taken in
 another order differ by 1e-12 at most."""
+
+SUMMABLE: Final = 1e146
+"""Numbers up to this can be multiplied, and 2^53 of the products be summed, before a float64 overflows."""
+
+PIVOT: Final = 1e-9
+"""A column whose part orthogonal to others is relatively smaller is collinear with them: half of a float's digits."""
+
+LEAST_EXEMPLARS: Final = 100
+"""Classified examples that are kept whatever memory they take: some ten of each mode of a few."""
 
 DIGITS: Final = 7
 """Significant digits of numbers in formulas, unless somebody asks for others."""

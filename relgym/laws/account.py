@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.constants import DIGITS
-from relgym.laws.book import LawBook
+from relgym.laws.book import SPREAD, LawBook
 from relgym.laws.composition import Engaged, compose
 from relgym.laws.frames import axes_of, axis_names, turned
 from relgym.laws.impulses import solve
@@ -20,9 +20,6 @@ from relgym.laws.turning import eases, rows_of
 from relgym.scene.geometry.vectors import FloatArray, dot
 
 __all__ = ["AxisAccount", "ContactAccount", "accounts", "happens"]
-
-SLACK: Final = 100.0
-"""Velocities of so many tolerances of the laws count as 0."""
 
 NORMALS: Final = "nc"
 """Axes from one body to the other."""
@@ -141,7 +138,7 @@ def _of_points(
                     for values in (one.now, others)
                 )
                 told = _axes(
-                    engaged, pair, axes, before[:, None], without[:, None], digits, SLACK * book.tolerance,
+                    engaged, pair, axes, before[:, None], without[:, None], digits, SPREAD * book.tolerance,
                     one.gain[0, count + k, count + k] / one.gain[0, k, k],
                 )  # fmt: skip
                 names = [
@@ -168,7 +165,7 @@ def _of_group(
         joint = joints.at(np.zeros(1, dtype=np.intp), k, a, b, there.normal)
         others = joint.relative(velocity) - impulse[:, :, k]
         axes = axes_of(engaged.law.frame, there, others)
-        told = _axes(engaged, pair, axes, joint.relative(now), others, digits, SLACK * book.tolerance)
+        told = _axes(engaged, pair, axes, joint.relative(now), others, digits, SPREAD * book.tolerance)
         names = [cast.layout.names[cast.layout.bodies[body]] for body in (int(a[0]), int(b[0]))]
         yield ContactAccount((names[0], names[1]), engaged.law.frame, tuple(told))
 

@@ -26,10 +26,10 @@ from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.objects import SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["LawBook", "Motion"]
+__all__ = ["SPREAD", "LawBook", "Motion"]
 
 SPREAD = 100.0
-"""Alternative laws agree where their predictions differ by at most this many tolerances."""
+"""Velocities that differ by at most this many tolerances are the same: so far alternative laws agree."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,11 +129,9 @@ class EncounterStore:
         cast, pair, vector, after
             As of `add`.
         """
-        cell = self._cell(cast.kinds[pair], False)
-        if (place := self._store.draw(cell)) is None:
-            return
-        waiting = _Waiting(contacts, cast, pair, vector, after)
-        if waiting.finite():
+        cell, waiting = self._cell(cast.kinds[pair], False), _Waiting(contacts, cast, pair, vector, after)
+        # Before anything is drawn: what `add` wouldn't keep, it doesn't count either.
+        if waiting.finite() and (place := self._store.draw(cell)) is not None:
             self._store.put(place, np.zeros(self._store.shape[0]), cell=cell)
             self._waiting[place] = waiting
 

@@ -96,7 +96,10 @@ def find_regions(
     place: NDArray[np.float64],
     names: tuple[str, ...],
 ) -> tuple[Region, ...]:
-    """Where each law but the first one holds; none of a law that positions don't tell from the first one.
+    """Where each law but the first one holds; none of a law that positions don't tell from those before it.
+
+    Each law is told from all before it, and not from those that follow. So the last law's regions come first: of
+    several that a body is in the first one counts.
 
     Parameters
     ----------
@@ -113,7 +116,7 @@ def find_regions(
         # Examples that both explain (a body at rest, perhaps) don't tell where a region ends.
         rows = np.flatnonzero(own ^ known)
         tree = learn_tree(place[rows], own[rows], columns=names)
-        found += [Region(bounds, law) for bounds in _leaves(tree, place[rows])]
+        found[:0] = [Region(bounds, law) for bounds in _leaves(tree, place[rows])]
         known |= own
     return tuple(found)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import POWERS
+from relgym.config.constants import POWERS, TOLD
 from relgym.laws.records import Share
 from relgym.scene.geometry.vectors import FloatArray, dot
 
@@ -55,7 +55,7 @@ def find_share(
         Largest residual of an explained velocity.
     """
     size = dot(change, change)
-    told = np.sqrt(size) > 100.0 * tolerance
+    told = np.sqrt(size) > TOLD * tolerance
     if told.sum() < FEWEST:
         return None
     observed = dot(change_a, change)[told] / size[told]

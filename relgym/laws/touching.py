@@ -129,16 +129,18 @@ class Cast:
         """
         n = len(vectors)
         whole = np.concatenate([vectors.T, np.full((1, n), np.nan), np.zeros((1, n))])
-        if self.manifolds is None:
-            return whole
-        velocity = whole[self.velocities[: self.dimensions, list(self.movers)]]  # (d, movers, n)
-        dragged = (norm(velocity) * velocity).transpose(1, 0, 2).reshape(-1, n)
-        return np.concatenate([whole, dragged])
+        return whole if self.manifolds is None else np.concatenate([whole, self._dragged(whole)])
 
     def padded_one(self, vector: NDArray[np.float64]) -> FloatArray:
-        """`padded` of a single scene, shape ``(width + 2,)``."""
+        """`padded` of a single scene, shape ``(width + 2,)``, and more where bodies turn."""
         found = np.empty(len(vector) + 2)
         found[:-2], found[-2], found[-1] = vector, np.nan, 0.0
+        return found if self.manifolds is None else np.concatenate([found, self._dragged(found)])
+
+    def _dragged(self, whole: FloatArray) -> FloatArray:
+        """Each mover's velocity times its magnitude, mover by mover, of padded vectors ``(width + 2, ...)``."""
+        velocity = whole[self.velocities[: self.dimensions, list(self.movers)]]  # (d, movers, ...)
+        found: FloatArray = (norm(velocity) * velocity).swapaxes(0, 1).reshape(-1, *whole.shape[1:])
         return found
 
 

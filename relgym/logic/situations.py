@@ -11,12 +11,14 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["mixed", "situation"]
+from relgym.mixing import GOLDEN, mixed
+
+__all__ = ["situation"]
 
 _Hashes: TypeAlias = NDArray[np.uint64]
 _Bools: TypeAlias = NDArray[np.bool_]
 
-_GOLDEN: Final = np.uint64(0x9E3779B97F4A7C15)
+_GOLDEN: Final = np.uint64(GOLDEN)
 _NOTHING: Final = np.uint64(0)
 
 
@@ -47,13 +49,6 @@ def situation(table: _Bools, unary: _Bools, target: NDArray[np.int64], exists: _
     pairs = mixed(among + described[:, None, :])
     neighbours = _set_hash(np.where(exists[:, None, :], pairs, _NOTHING))
     return _set_hash(np.where(exists, mixed(described + neighbours), _NOTHING))
-
-
-def mixed(x: _Hashes) -> _Hashes:
-    """Scramble 64 bits (splitmix64); sums and products wrap around."""
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
 
 
 def _hash_bits(bits: _Bools) -> _Hashes:

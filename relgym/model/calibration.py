@@ -33,7 +33,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EVIDENCE
+from relgym.config.constants import EVIDENCE, SUMMABLE
 
 __all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
 
@@ -41,9 +41,9 @@ EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
 """Who may give a value: the winner of the vote (or the law); the guess; both regressions; the mode that held last,
 since what decides may be hidden, and a law that changed stays changed; and that nothing changes."""
 
-OWN, GUESS, LINEAR, LATEST, PERSISTENCE = 0, 1, 2, 4, 5
+OWN, GUESS, LINEAR, PRODUCTS, LATEST, PERSISTENCE = range(len(EXPERTS))
 
-_KNOWN: Final = (LINEAR, LINEAR + 1, PERSISTENCE)
+_KNOWN: Final = (LINEAR, PRODUCTS, PERSISTENCE)
 """What anybody would try first."""
 
 _BY_DEFAULT: Final = (OWN, GUESS, PERSISTENCE)
@@ -74,9 +74,9 @@ OCTAVE: Final = 4
 _EXACT: Final = -(1 << 14)
 """The bin of errors no larger than rounding."""
 
-_WIDEST: Final = 1022 * OCTAVE
-"""The bin of all errors beyond 2**1022: a number is read back from it."""
 
+NO_RUNNER_UP: Final = 7
+"""Bin of leads where there is nobody to lead."""
 
 OF_WINNER, OF_FAMILY = -1, -2
 """Bins of leads that stand for all of a winner's, and for those of all modes or all laws."""
@@ -123,7 +123,9 @@ def key_of(outcome: int, winner: int, margin: float) -> Key:
     """The cell of a prediction."""
     if not margin > 0.0:
         return Key(outcome, winner, 0)
-    return Key(outcome, winner, 7 if math.isinf(margin) else min(max(math.frexp(margin)[1] + 2, 1), 6))
+    if math.isinf(margin):
+        return Key(outcome, winner, NO_RUNNER_UP)
+    return Key(outcome, winner, min(max(math.frexp(margin)[1] + 2, 1), NO_RUNNER_UP - 1))
 
 
 def keys_of(
@@ -144,10 +146,10 @@ def _groups(codes: NDArray[np.int64]) -> Iterator[NDArray[np.intp]]:
 
 
 def lead_bins(margins: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Bins of leads. 0: no lead; else by octaves of the log-odds; 7: no runner-up."""
+    """Bins of leads. 0: no lead; else by octaves of the log-odds; `NO_RUNNER_UP`."""
     _, exponents = np.frexp(np.where(np.isfinite(margins), margins, 1.0))
-    found = np.where(margins > 0.0, np.clip(exponents + 2, 1, 6), 0)
-    return np.where(np.isposinf(margins), 7, found).astype(np.int64)
+    found = np.where(margins > 0.0, np.clip(exponents + 2, 1, NO_RUNNER_UP - 1), 0)
+    return np.where(np.isposinf(margins), NO_RUNNER_UP, found).astype(np.int64)
 
 
 @dataclass(slots=True)
@@ -284,7 +286,9 @@ class _Cell:
         trials, own, base = self.squares[expert]
         if not trials:
             return math.inf
-        return (own + 1e-300) / (base + 1e-300)
+        return max(
+            (own + 1e-300) / (base + 1e-300), math.ulp(0.0)
+        )  # of huge changes an exact law leaves less
 
     def lead(self, expert: int, other: int) -> float:
         """Bits by which one expert codes the trials better than another one (normal errors of unknown size)."""
@@ -658,7 +662,7 @@ def _place(error: float) -> int:
     """The bin of an error's size."""
     if error <= 0.0:
         return _EXACT
-    return math.ceil(OCTAVE * math.log2(error)) if error < 2.0**1022 else _WIDEST
+    return math.ceil(OCTAVE * math.log2(min(error, SUMMABLE)))
 
 
 def _counted(bins: dict[int, float], place: int) -> dict[int, float]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
+from relgym.mixing import GOLDEN, mixed
 from relgym.model.target.property_model import PropertyModel
 
 __all__ = ["SLACK", "forget"]
@@ -67,8 +68,5 @@ def _indispensable(model: PropertyModel, bound: int) -> NDArray[np.int64]:
 
 
 def _lot(serials: NDArray[np.int64]) -> NDArray[np.uint64]:
-    """A number that looks random for every serial number (splitmix64)."""
-    x = (serials.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
+    """A number that looks random for every serial number."""
+    return mixed((serials.astype(np.uint64) + np.uint64(1)) * np.uint64(GOLDEN))

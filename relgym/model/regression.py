@@ -98,8 +98,9 @@ class Regression:
         self._waiting = []
 
     def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
-        z = self._scaled(x[None])
-        for ridge, columns in zip(self._ridges, self._shown(z), strict=False):
+        with np.errstate(over="ignore"):  # what isn't finite is left out
+            shown = self._shown(self._scaled(x[None]))
+        for ridge, columns in zip(self._ridges, shown, strict=False):
             ridge.add(columns[0], y)
 
     def _scaled(self, x: NDArray[np.float64]) -> NDArray[np.float64]:

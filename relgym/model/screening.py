@@ -41,8 +41,8 @@ REPEATED = 5
 RUN = 8
 """... nor so many in successive transitions: another scale."""
 
-MOST = 1e100
-"""Larger numbers are always set aside: their squares may overflow."""
+MOST = 1e75
+"""Larger numbers are always set aside: searches square products of two, whose sums may overflow."""
 
 
 class Screen:

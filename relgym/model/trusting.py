@@ -12,6 +12,7 @@ import numpy as np
 
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
+from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.regression import Regression
 from relgym.model.target.property_model import PropertyModel
 from relgym.program import records as ir
@@ -19,7 +20,7 @@ from relgym.scene.objects import SceneLayout
 
 __all__ = ["trusting"]
 
-KINDS = 6
+KINDS = OUTCOMES.index(Outcome.UNSURE)
 """Outcomes before what is known of them is asked: all but `Outcome.UNSURE`."""
 
 

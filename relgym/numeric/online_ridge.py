@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import SUMMABLE
+
 __all__ = ["OnlineRidge"]
 
 PENALTY = 1.0
@@ -65,9 +67,14 @@ class OnlineRidge:
         return len(self._gram) - 1
 
     def add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
-        """Take in one row of columns, shape ``(d,)``, and its responses, shape ``(responses,)``."""
+        """Take in one row of columns, shape ``(d,)``, and its responses, shape ``(responses,)``.
+
+        One with a number beyond `SUMMABLE` is left out: of infinite sums no weights are ever solved again.
+        """
         row = np.concatenate([[1.0], x])
         self._widen(len(y))
+        if not (np.abs(row).max() <= SUMMABLE and np.abs(y).max(initial=0.0) <= SUMMABLE):
+            return
         self._gram += row[:, None] * row
         self._moments += y[:, None] * row
         self.rows += 1

@@ -13,17 +13,19 @@ large samples can't, and a draw that doesn't reproduce its own rows costs no cou
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EXTRAPOLATED
+from relgym.config.constants import EXTRAPOLATED, STDS
 from relgym.numeric.stepwise import (
     COARSE,
     MANY,
     LinearFit,
     eliminate_backward,
+    equal_gains,
     fitting_cells,
     least_squares,
     varying_columns,
@@ -32,10 +34,9 @@ from relgym.scheduling.work import CALL, Steps, resumable
 
 __all__ = ["Consensus", "consensus", "draw_samples", "refine"]
 
-TIGHT, CLOSE = 4.0, 0.01
-"""... but not so wide, where there is noise, that it tells nothing: no wider than this share of the responses' spread,
-unless a few standard deviations are."""
-
+CLOSE = 0.01
+"""Samples are extrapolated with a wider tolerance (`EXTRAPOLATED`), but not so wide, where there is noise, that it
+tells nothing: no wider than this share of the responses' spread, unless a few standard deviations are."""
 
 DRAWN = 250_000
 """So many random numbers are drawn in a piece of work: some ten milliseconds."""
@@ -79,9 +80,7 @@ def draw_samples(
     first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
     style = np.arange(draws) % 3
     found = np.empty((draws, min(size, n)), dtype=np.intp)
-    step = max(16, DRAWN // n)
-    for begin in range(0, draws, step):
-        part = slice(begin, begin + step)
+    for part in _pieces(draws, DRAWN, n):
         base, how = first[part], style[part, None]
         keys = rng.random((len(base), n))
         if strata is not None:
@@ -144,7 +143,7 @@ def consensus(
     n = len(y)
     if n < size:
         return None
-    loose = EXTRAPOLATED if misfit else min(EXTRAPOLATED, max(TIGHT, CLOSE * float(np.ptp(y)) / sigma))
+    loose = EXTRAPOLATED if misfit else min(EXTRAPOLATED, max(STDS, CLOSE * float(np.ptp(y)) / sigma))
     columns = varying_columns(x)
     samples = yield from draw_samples.steps(
         n, size, draws, rng=rng, strata=strata, apart=apart, anchors=anchors
@@ -197,14 +196,12 @@ def _forward_batch(
     enough = size * (loose * sigma) ** 2
     choose = _choose_among_many if x.shape[1] > MANY else _choose
     every = np.empty((draws, max(terms, 1)), dtype=np.intp)
-    step = max(16, CHUNK // max(1, size * x.shape[1]))
-    for begin in range(0, draws, step):
-        part = samples[begin : begin + step]
-        a, b = x[part], y[part]
+    for part in _pieces(draws, CHUNK, size * x.shape[1]):
+        a, b = x[samples[part]], y[samples[part]]
         a -= a.mean(axis=1, keepdims=True)
         chosen, left = choose(a, b - b.mean(axis=1, keepdims=True), terms, sigma, enough)
         chosen[left > enough, 0] = -2
-        every[begin : begin + step] = chosen
+        every[part] = chosen
         yield CALL + 4 * a.size * max(terms, 1)
     return every
 
@@ -269,8 +266,14 @@ def _best_columns(
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """The earliest of each sample's best columns, and whether there is any."""
     best = gains.max(axis=1)
-    slack = np.maximum(4.0 * floor, 1e-12 * left)
+    slack = equal_gains(np.full(len(left), floor), left)
     return np.argmax(usable & (gains >= (best - slack)[:, None]), axis=1), best > 0.0
+
+
+def _pieces(count: int, room: int, cells: int) -> Iterator[slice]:
+    """Slices of so many samples, each of as many as there is room for with so many cells, but of 16 at least."""
+    step = max(16, room // max(1, cells))
+    return (slice(begin, begin + step) for begin in range(0, count, step))
 
 
 def _distinct(

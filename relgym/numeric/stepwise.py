@@ -14,15 +14,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import PIVOT
 from relgym.scheduling.work import CALL, Steps, resumable
 
 __all__ = [
     "LinearFit",
     "eliminate_backward",
+    "equal_gains",
     "fitting_cells",
     "forward_order",
     "forward_stepwise",
@@ -30,8 +33,7 @@ __all__ = [
     "varying_columns",
 ]
 
-PIVOT = 1e-9
-"""A column whose part orthogonal to the chosen ones is relatively smaller is collinear with them."""
+_Size = TypeVar("_Size", float, NDArray[np.float64])
 
 MANY, COARSE = 64, 1e-6
 """More candidates than this, non-linear features, are chosen from in a cheaper way that tells collinear columns by so
@@ -291,12 +293,18 @@ def _choose_among_many(
     return chosen
 
 
+def equal_gains(noise: _Size, whole: _Size) -> _Size:
+    """Gains that differ by no more are equal: four times what noise leaves in the rows, or rounding of the whole."""
+    found: _Size = np.maximum(4.0 * noise, 1e-12 * whole)
+    return found
+
+
 def _first_of_the_best(gains: NDArray[np.float64], rows: int, sigma: float) -> int | None:
     """The candidate that lowers Cp most, the earliest among equals; None if none lowers it."""
     best = float(gains.max(initial=0.0))
     if best / sigma**2 <= 2.0:  # Cp would not fall
         return None
-    least = best - max(4.0 * rows * sigma**2, 1e-12 * best)
+    least = best - equal_gains(rows * sigma**2, best)
     return int(np.argmax(gains >= max(least, 2.0 * sigma**2)))
 
 

@@ -21,7 +21,8 @@ from relgym.laws.touching import Contacts
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause
 from relgym.logic.facts import Facts
-from relgym.logic.situations import mixed, situation
+from relgym.logic.situations import situation
+from relgym.mixing import mixed
 from relgym.reporting.conditions import Condition, Test
 from relgym.reporting.functions import Column, Sum, evaluated
 from relgym.reporting.motion import MotionRules

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.mixing import GOLDEN, mixed
 from relgym.scene.objects import SceneLayout
 
 if TYPE_CHECKING:
@@ -198,9 +199,5 @@ def _around(
 
 
 def _mix(a: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Scatter the bits of each number (the finaliser of SplitMix64)."""
-    a = a + np.uint64(0x9E3779B97F4A7C15)
-    a = (a ^ (a >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    a = (a ^ (a >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    mixed: NDArray[np.uint64] = a ^ (a >> np.uint64(31))
-    return mixed
+    """Scatter the bits of each number."""
+    return mixed(a + np.uint64(GOLDEN))

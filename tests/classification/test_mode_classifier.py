@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import pickle
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -349,3 +349,110 @@ def test_what_a_covering_mode_fails_to_explain_teaches_the_two_apart() -> None:
         observe(at, both=False)
     assert [0, 1] in classifier.to_dict()["covered"]
     assert sum(map(sum, classifier.classifiers[0].counts)) == 4
+
+
+# ---------------------------------------------------------------------- contradictions, by hand
+def _speeds(modes: Sequence[int] = (1, 2, 3)) -> tuple[ModeClassifier, Callable[..., int]]:
+    """Slow, middling and fast examples in one relational state, and how to observe more."""
+    classifier = _empty(modes)
+    item = next(ball_stream(1, rng=np.random.default_rng(0)))
+    count = iter(range(10_000))
+
+    def observe(vx: float, mode: int, *others: int, also: Sequence[int] = ()) -> int:
+        example = replace(item.example, own=np.array([vx, 0.0]), row=next(count))
+        fits = np.array([m == mode or m in (*others, *also) for m in modes])
+        return classifier.observe(example, mode, fits, np.zeros(len(modes)))
+
+    for k in range(12):
+        for mode in modes:
+            observe(mode - 2.0 + 0.02 * k, mode)
+    classifier.refresh()
+    assert classifier.stale == ()
+    return classifier, observe
+
+
+def test_an_example_contradicts_each_pair_that_it_loses() -> None:
+    classifier, observe = _speeds()
+    assert observe(-0.95, 1) == 0
+    assert observe(1.1, 1) == 2  # as fast as 3 is: 1 loses to 2 and to 3
+    assert set(classifier.stale) == {(1, 2), (1, 3)}
+    assert observe(0.9, 2) == 1  # 2 loses to 3; of 1 and 3 neither is right
+    assert set(classifier.stale) == {(1, 2), (1, 3), (2, 3)}
+    assert classifier.counts == {1: 14.0, 2: 13.0, 3: 12.0}
+
+
+def test_what_several_explain_contradicts_none_of_their_pairs() -> None:
+    classifier, observe = _speeds()
+    before = [pair.counts for pair in copy.deepcopy(classifier.classifiers)]
+    assert observe(1.1, 1, 2, 3) == 0  # both others explain it
+    assert [pair.counts for pair in classifier.classifiers] == before
+    assert observe(1.1, 1, 3) == 1  # 2 doesn't
+    assert classifier.stale == ((1, 2),)
+
+
+def test_noise_contradicts_nothing_and_is_remembered() -> None:
+    classifier, observe = _speeds()
+    slots = len(classifier.exemplars)
+    assert observe(1.1, NOISE, 1) == 0
+    assert (classifier.stale, sum(classifier.counts.values())) == ((), 36.0)
+    assert len(classifier.exemplars) == slots + 1
+
+
+def test_a_contradiction_is_remembered_first() -> None:
+    classifier, observe = _speeds()
+    for _ in range(40):
+        observe(-0.9, 1)
+    observe(1.1, 1)
+    for _ in range(60):
+        observe(-0.9, 1)
+    hard = classifier.exemplars.columns["hard"]
+    assert 1.1 in classifier.exemplars.columns["own"][hard, 0].tolist()
+
+
+def test_what_is_remembered_and_how_it_is_ranked() -> None:
+    classifier, _ = _speeds()
+    view, weights, ranking = classifier.remembered()
+    assert len(view) == len(weights) == len(ranking) == len(classifier.exemplars)
+    assert weights.sum() == pytest.approx(36.0, abs=0.5)
+    assert ranking.modes[:, 0].tolist() == classifier.exemplars.assigned.tolist()
+
+
+def test_which_relations_are_looked_at() -> None:
+    classifier, _ = _speeds()
+    assert classifier.relations == frozenset()  # numbers alone tell these apart
+    names, seen = classifier.experience()
+    assert all(relations == unary == () for _, relations, unary in names)
+    assert len(seen) == 1
+    touching = _empty((FLY, BOUNCE))
+    for item in ball_stream(400, rng=np.random.default_rng(3), ramp_share=0.0):
+        if item.mode in (FLY, BOUNCE):
+            touching.observe(item.example, item.mode, item.fits[[FLY, BOUNCE]], item.values[[FLY, BOUNCE]])
+    touching.refresh()
+    used = {
+        literal.relation
+        for c in touching.classifiers
+        for clause in c.definition.clauses
+        for literal in clause
+    }
+    assert touching.relations == used & set(BALL_VOCABULARY.relations)
+    ((_, relations, unary), *_) = touching.experience()[0]
+    assert set(relations) == touching.relations and set(unary) == used & set(BALL_VOCABULARY.unary)
+
+
+def test_another_own_feature_is_learned_from_what_is_remembered() -> None:
+    """Only the feature that comes later tells the modes apart."""
+    rng, classifier = np.random.default_rng(1), _empty((1, 2))
+    item = next(ball_stream(1, rng=np.random.default_rng(0)))
+    for k in range(40):
+        example = replace(item.example, own=rng.normal(size=2), row=k)
+        classifier.observe(example, 1 + k % 2, np.array([k % 2 == 0, k % 2 == 1]), np.zeros(2))
+    classifier.refresh()
+    wider = replace(BALL_VOCABULARY, own=("vx", "vy", "light"))
+    own = np.column_stack([classifier.exemplars.columns["own"], classifier.exemplars.rows % 2])
+    classifier.widen(wider, own)
+    assert classifier.vocabulary == wider
+    assert classifier.stale == ((1, 2),)
+    classifier.refresh()
+    assert "light" in str(classifier.classifiers[0].definition)
+    asked = [replace(item.example, own=np.array([9.0, 9.0, light])) for light in (0.0, 1.0)]
+    assert [classifier.rank(example, [0.0, 0.0]).modes[0] for example in asked] == [1, 2]

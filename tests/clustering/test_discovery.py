@@ -2,13 +2,31 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from relgym.clustering.discovery import WIDE, Scale, counts, find_mode, identified, least_examples, plans
+from relgym.clustering.discovery import (
+    SEARCH,
+    WIDE,
+    Scale,
+    counts,
+    find_mode,
+    identified,
+    is_law,
+    least_examples,
+    likeness,
+    plans,
+    searched,
+    verifying_bits,
+)
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, least_squares
+from relgym.scheduling.work import Task
 
 SCALE = Scale(1e-13, 4.0, 8.0)
 CONFIG = ClusteringConfig()
@@ -183,3 +201,100 @@ def test_among_many_columns_a_few_examples_show_a_constant(rng: np.random.Genera
     )
     assert found is not None
     assert (found.fit.columns, found.fit.intercept, found.size) == ((), 1.0, 5)
+
+
+# ---------------------------------------------------------------------- which rows are searched
+@given(st.integers(0, 5_000), st.integers(1, 6_000), st.integers(0, 2**32 - 1))
+def test_so_many_rows_are_searched_the_newest_among_them(n: int, fresh: int, seed: int) -> None:
+    rows = searched(n, fresh, np.random.default_rng(seed))
+    assert (np.diff(rows) > 0).all()
+    assert len(rows) == 0 or (rows[0] >= 0 and rows[-1] == n - 1)
+    if n <= SEARCH:
+        assert len(rows) == n
+        return
+    newest = min(max(fresh, SEARCH // 2), SEARCH)
+    np.testing.assert_array_equal(rows[-newest:], np.arange(n - newest, n))
+    assert len(rows) == newest + min(n - newest, SEARCH // 2)
+    assert len(rows) <= SEARCH + SEARCH // 2
+
+
+def test_all_of_few_rows_are_searched_without_a_draw() -> None:
+    rng = np.random.default_rng(3)
+    before = rng.bit_generator.state
+    assert searched(SEARCH, 1, rng).tolist() == list(range(SEARCH))
+    assert rng.bit_generator.state == before
+    older = [searched(5_000, 1, np.random.default_rng(k))[:200].tolist() for k in (3, 3, 4)]
+    assert older[0] == older[1] != older[2]
+    assert min(older[0]) < 1_000 and max(older[0]) > 4_000  # from all of them
+
+
+# ---------------------------------------------------------------------- in pieces
+@pytest.mark.parametrize("kind", ["a law", "nothing", "a law that lacks a term"])
+def test_a_mode_searched_for_in_pieces_is_the_one_found_at_once(kind: str) -> None:
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(150, 24)) * np.array([100.0, 2.0, 0.2] + 21 * [1.0])
+    y, scale = rng.normal(size=150), SCALE
+    if kind == "a law":
+        y[70:] = 0.5 * x[70:, 0] - 2.0 * x[70:, 1]
+    if kind == "a law that lacks a term":
+        scale = Scale(1e-4, 4.0, 6.0)
+        y = x[:, 0] + 0.2 * x[:, 1] + 0.01 * x[:, 2] + rng.normal(scale=2e-5, size=150)
+    given_ = {"stages": (3, 24), "fresh": 150, "scale": scale, "config": CONFIG}
+    strata = np.arange(150) % 2
+    own = np.random.default_rng(7)
+    whole = find_mode(x, y, strata, rng=own, **given_)
+    task = Task(find_mode, x, y, strata, rng=np.random.default_rng(7), **given_)
+    while not task.done:
+        task.advance(1)
+        if task.pieces % 7 == 3:  # saved and read while it is under way
+            task = pickle.loads(pickle.dumps(task))
+    assert task.pieces > 5
+    assert task.rng is None or task.rng.bit_generator.state == own.bit_generator.state
+    if whole is None or task.result is None:
+        assert kind == "nothing" and whole is task.result is None
+        return
+    assert task.result.fit == whole.fit
+    np.testing.assert_array_equal(task.result.inliers, whole.inliers)
+    assert whole.fit.columns == ((0, 1) if kind == "a law" else (0, 1, 2))
+
+
+# ---------------------------------------------------------------------- laws and tangents
+def test_a_tangent_is_given_away_by_near_misses() -> None:
+    # Tail 8 σ; near misses are those up to 16 tails. Twenty are explained, so ten near misses are no more than half.
+    scale = Scale(1.0, 4.0, 8.0)
+    fit = LinearFit((), (), 0.0, 0.0)
+    for misses, law in ((10, True), (11, False)):
+        y = np.r_[np.zeros(20), np.full(misses, 128.0), np.full(50, 129.0), np.full(50, 7.9)]
+        found = Consensus(fit, np.arange(len(y)) < 20)
+        assert is_law(np.zeros((len(y), 1)), y, found, 1, scale) is law
+
+
+def test_a_tangent_is_given_away_by_residuals_that_are_alike() -> None:
+    scale, x = Scale(1.0, 4.0, 8.0), np.linspace(-1.0, 1.0, 41)[:, None]
+    fit, inliers = LinearFit((), (), 0.0, 0.0), np.ones(41, dtype=bool)
+    curve, zigzag = np.square(x[:, 0]) - 1.0 / 3.0, np.where(np.arange(41) % 2, 0.5, -0.5)
+    assert not is_law(x, curve, Consensus(fit, inliers), 1, scale)
+    assert is_law(x, zigzag, Consensus(fit, inliers), 1, scale)
+    assert is_law(x, 0.5 * curve, Consensus(fit, inliers), 1, scale)  # less than a quarter of σ: rounding
+
+
+def test_likeness_by_hand() -> None:
+    x = np.array([[0.0], [0.1], [1.0], [1.1]])
+    # Neighbours are 0 and 1, 2 and 3.
+    assert likeness(x, np.array([1.0, 1.0, -1.0, -1.0])) == 1.0
+    assert likeness(x, np.array([1.0, -1.0, 1.0, -1.0])) == -1.0
+    # About the mean, 1/2: (1.5 · -0.5 · 2 + -0.5 · -0.5 · 2) / (1.5^2 + 3 · 0.5^2) of the means.
+    assert likeness(x, np.array([2.0, 0.0, 0.0, 0.0])) == pytest.approx((-1.5 + 0.5) / 3.0)
+    assert likeness(x, np.array([3.0, 3.0, 3.0, 3.0])) == 0.0
+    assert likeness(np.ones((4, 1)), np.arange(4.0)) == 0.0  # nothing says which are close
+    assert likeness(x[:1], np.ones(1)) == 0.0
+
+
+def test_bits_that_an_example_verifies_by() -> None:
+    scale = Scale(0.25, 4.0, 8.0)  # tolerance 1
+    assert verifying_bits(np.array([0.0, 64.0, 3.0]), scale) == 6.0
+    assert verifying_bits(np.array([5.0, 5.5]), scale) == 1.0
+    assert verifying_bits(np.empty(0), scale) == 1.0
+    # 24 bits need ten examples, each of 12 bits less 2.5 more.
+    for bits, needed in ((24, 10), (18, 25), (12, 40), (6, 40), (30, 10)):
+        assert least_examples(np.array([0.0, 2.0**bits]), scale, CONFIG) == needed

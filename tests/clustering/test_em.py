@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from streams import ALONE, BALL, Stream, mode_of
 
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.discovery import Scale
-from relgym.clustering.em import Cluster, preferred, refit
+from relgym.clustering.em import MOST_REFIT, Cluster, preferred, refit, role_matrix
 from relgym.clustering.mode import Role
 from relgym.scene.objects import ObjectType
 from relgym.scene.shapes import Box
@@ -87,3 +89,57 @@ def test_idle_is_where_no_term_acts() -> None:
     assert Cluster(mode_of(("v", -0.9))).idle(stream.table, rows, 1e-12).tolist() == [True, False, True]
     both = Cluster(mode_of(("v", -0.9), ("w", 0.1)))
     assert both.idle(stream.table, rows, 1e-12).tolist() == [False, False, True]
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["own", "a role", "no such object"]))
+def test_the_error_of_one_example_is_that_of_many_to_the_bit(seed: int, kind: str) -> None:
+    rng = np.random.default_rng(seed)
+    signature = SlotSignature((BALL, BOX, BOX))
+    x = rng.normal(size=(6, 4))
+    stream, rows = filled(signature, x)
+    others = {
+        "own": [],
+        "a role": [Role("box", (("friction", -2.5),))],
+        "no such object": [Role("lid", (("x", 1.0),))],
+    }
+    cluster = Cluster(mode_of(("v", 0.7), ("w", -0.3), others=others[kind], constant=0.1))
+    y = rng.normal(size=6)
+    errors, assignments = cluster.errors(stream.table, rows, y, SCALE)
+    for k, row in enumerate(rows.tolist()):
+        one = cluster.error_one(stream.table, row, stream.table.x[row].tolist(), float(y[k]), SCALE)
+        assert one == errors[k]
+        assert cluster.closest_one(stream.table, row, float(y[k]), SCALE) == (errors[k], assignments[k])
+    assert np.isinf(errors).all() == (kind == "no such object")
+
+
+def test_columns_of_a_regression_are_read_from_the_players() -> None:
+    signature = SlotSignature((BALL, BOX, BOX))
+    stream, rows = filled(signature, np.array([[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]]))
+    mode = mode_of(("w", 1.0), ("v", 2.0), others=[Role("box", (("friction", -2.5),))])
+    found = role_matrix(mode, stream.table, rows, np.array([1, 0]), Cluster(mode))
+    assert found.tolist() == [[2.0, 1.0, 4.0], [6.0, 5.0, 7.0]]
+
+
+def test_few_examples_are_not_refitted_and_of_many_some(rng: np.random.Generator) -> None:
+    x = rng.normal(size=(2 * MOST_REFIT, 2))
+    stream, rows = filled(ALONE, x)
+    loose = Scale(1e-3, 4.0, 8.0)
+    rough = Cluster(mode_of(("v", 0.5001)), fitted=7, unfitted=9)
+    y = 0.5 * x[:, 0]
+    few = refit(rough, stream.table, rows[:2], y[:2], loose)
+    assert (few.mode, few.fitted, few.unfitted) == (rough.mode, 2, 0)
+    assert refit(rough, stream.table, rows[:0], y[:0], loose).fitted == 1
+    y[1] += 1.0  # not among those that are evenly spread
+    many = refit(rough, stream.table, rows, y, loose)
+    assert many.fitted == 2 * MOST_REFIT
+    assert dict(many.mode.roles[0].terms) == pytest.approx({"v": 0.5}, abs=1e-12)
+    assert many.mode.sigma < 1e-12
+
+
+def test_errors_of_two_sigma_are_ties_and_larger_ones_are_not() -> None:
+    clusters = {1: Cluster(mode_of(("v", 1.0))), 2: Cluster(mode_of(("v", 1.0), ("w", 1.0), id=2))}
+    scale = Scale(0.01, 4.0, 8.0)
+    assert preferred([1, 2], {1: 0.02, 2: 0.0}, clusters, scale) == 1
+    assert preferred([1, 2], {1: 0.021, 2: 0.0}, clusters, scale) == 2
+    assert preferred([1, 2], {1: 0.03, 2: 0.035}, clusters, scale) == 1
+    assert preferred([2], {2: 9.0}, clusters, scale) == 2

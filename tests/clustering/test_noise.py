@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.clustering.noise import estimate_noise, rounding_noise
+from relgym.clustering.noise import MANY, WINDOW, _quartile, _windows, estimate_noise, refuted, rounding_noise
 
 EPS = float(np.finfo(np.float64).eps)
 EPS32 = float(np.finfo(np.float32).eps)
@@ -20,6 +20,26 @@ def test_single_precision_is_recognised_and_coarser() -> None:
     y = np.array([0.1, 0.2, 0.3], dtype=np.float32).astype(float)
     noise = rounding_noise(np.ones((3, 1)), y)
     assert 0.5 * EPS32 < noise < 4.0 * EPS32
+
+
+def test_what_single_precision_cannot_hold_was_not_rounded_to_it() -> None:
+    """Nor does asking overflow."""
+    for size in (1e39, 1e75):
+        assert rounding_noise(np.ones((2, 1)), np.array([0.5, size])) == pytest.approx(32 * EPS * size)
+        own = np.array([[0.5 + 0.25 * k] for k in range(MANY)] + [[size]])
+        assert rounding_noise(np.ones((2, 1)), np.array([0.1, 0.3]), own) == pytest.approx(32 * EPS)
+
+
+def test_a_column_that_was_rounded_tells_of_responses_worked_out_from_it() -> None:
+    y = np.array([0.1, 0.2])  # an angle, say, of a sine and a cosine in single precision
+    fractions = np.array([[0.125 * k + 0.0625] for k in range(MANY)])
+    for rows, coarse in ((fractions, True), (fractions[1:], False), (np.arange(20.0)[:, None], False)):
+        expected = 2.0 * EPS32 if coarse else 32.0 * EPS * 5.0
+        assert rounding_noise(np.full((1, 1), 5.0), y, rows) == pytest.approx(expected)
+    both = np.concatenate([np.pi * fractions, fractions], axis=1)
+    assert rounding_noise(np.full((1, 1), 5.0), np.array([0.1, 30.1]), both) == pytest.approx(
+        2.0 * EPS32 * 30.1
+    )
 
 
 def test_whole_numbers_are_not_taken_for_single_precision() -> None:
@@ -53,3 +73,43 @@ def test_changes_of_mode_are_no_noise(rng: np.random.Generator) -> None:
 def test_too_few_examples_give_no_estimate(rng: np.random.Generator) -> None:
     x = rng.normal(size=(10, 2))
     assert estimate_noise(x, x[:, 0], np.zeros(10, dtype=int), floor=3e-14) is None
+
+
+def test_windows_hold_examples_of_one_state() -> None:
+    strata = np.arange(2 * WINDOW + 5) % 2
+    first, second = _windows(np.concatenate([strata, np.full(WINDOW - 1, 7)]))
+    assert first.tolist() == list(range(0, 2 * WINDOW, 2))
+    assert second.tolist() == list(
+        range(1, 2 * WINDOW, 2)
+    )  # of the rest, and of the third state, too few are left
+    many = _windows(np.zeros(100 * WINDOW, dtype=int))
+    assert len(many) == 20 and [w[0] for w in many[:2]] == [0, 5 * WINDOW]  # every fifth
+
+
+def test_the_lower_quartile_of_spreads_is_that_of_estimates(rng: np.random.Generator) -> None:
+    """Spreads of a unit normal from eleven degrees of freedom each: what is told is the unit."""
+    for count, close in ((4, 0.15), (24, 0.05), (400, 0.02)):
+        told = [
+            _quartile([(float(np.sqrt(x / 11.0)), 11) for x in rng.chisquare(11, count)]) for _ in range(200)
+        ]
+        assert np.median(told) == pytest.approx(1.0, abs=close)
+
+
+@pytest.mark.parametrize(
+    ("estimate", "explained", "n", "expected"),
+    [
+        (2.1, 0.0, 200, True),
+        (1.9, 0.0, 200, False),  # not clearly larger
+        (99.0, 0.5, 200, True),  # of the same order: it may have hidden examples of what is known
+        (101.0, 0.5, 200, False),  # of another order, and yet much is explained
+        (101.0, 0.05, 200, True),
+        (60.0, 0.0, 200, True),
+        (60.0, 0.0, 100, False),  # so few say nothing of noise that is as large as the signal, 100
+        (40.0, 0.0, 100, True),
+    ],
+)
+def test_when_an_estimate_refutes_what_was_assumed(
+    estimate: float, explained: float, n: int, expected: bool
+) -> None:
+    y = np.resize([100.0, -100.0], n)
+    assert refuted(1.0, estimate, explained=explained, y=y) is expected

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from streams import ALONE, Stream, V, mode_of
+from streams import ALONE, BALL, Stream, V, mode_of
 
+from relgym.clustering.columns import SlotSignature
 from relgym.clustering.discovery import Scale
 from relgym.clustering.em import Cluster
 from relgym.clustering.mode import Mode
-from relgym.clustering.unification import covering, reordered, unified, unified_family
+from relgym.clustering.unification import SIDE, _spread, covering, reordered, unified, unified_family
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
+from relgym.scene.objects import ObjectType
+from relgym.scene.shapes import Box
 
 SCALE = Scale(1e-13, 4.0, 8.0)
 CONFIG = ClusteringConfig()
@@ -117,3 +120,66 @@ def test_a_family_of_constants_gives_their_law_and_leaves_strangers_out(rng: np.
 def test_reordering_puts_columns_back() -> None:
     fit = reordered(LinearFit((0, 2), (1.5, -0.5), 3.0, 0.0), np.array([4, 1, 0]))
     assert fit == LinearFit((0, 4), (-0.5, 1.5), 3.0, 0.0)
+
+
+def test_a_function_covers_no_examples_at_all() -> None:
+    assert covered(mode_of(("v", -0.8)), np.empty((0, 2)), np.empty(0))
+
+
+@pytest.mark.parametrize(("resting", "covers"), [(10, True), (11, False)])
+def test_half_of_the_examples_must_not_be_at_rest(
+    resting: int, covers: bool, rng: np.random.Generator
+) -> None:
+    x = rng.normal(size=(20, 2))
+    x[:resting, 0] = 0.0
+    assert covered(mode_of(("v", -0.9)), x, -0.9 * x[:, 0]) is covers
+
+
+def test_one_in_ten_of_either_side_may_be_a_coincidence_of_the_general_function(
+    rng: np.random.Generator,
+) -> None:
+    """Persistence: of twenty on the worse side two may be another matter, of the better side none is."""
+    for odd, found in ((2, True), (3, False)):
+        x = np.repeat([[3.0, 1.0], [5.0, 1.0]], 20, axis=0)
+        y = x[:, 0].copy()
+        x[:odd, 0] = 4.0
+        fit = both(x, y, (mode_of(constant=3.0), mode_of(constant=5.0)))
+        assert (fit == LinearFit((0,), (1.0,), 0.0, 0.0)) is found
+
+
+def test_examples_that_share_no_signature_do_not_unify(rng: np.random.Generator) -> None:
+    boxed = SlotSignature((BALL, ObjectType("box", ("friction",), Box())))
+    stream, x = Stream(), rng.normal(size=(40, 3))
+    rows = [stream.table.add(ALONE, row[:2], b"", [-1]) for row in x[:20]]
+    rows += [stream.table.add(boxed, row, b"", [-1, -1]) for row in x[20:]]
+    new, old = np.split(np.arange(40), 2)
+    modes = mode_of(constant=1.0), mode_of(constant=2.0)
+    arguments = {"target": V, "scale": SCALE, "config": CONFIG, "simpler_than": modes}
+    assert unified(stream.table, np.array(rows), x[:, 0].copy(), new, old, **arguments) is None
+    # Where a few examples of the one are of the other's kind, these decide.
+    mixed = np.concatenate([new, old[:8]])
+    found = unified(stream.table, np.array(rows), x[:, 0].copy(), mixed, old[8:], **arguments)
+    assert found == (1, LinearFit((0,), (1.0,), 0.0, 0.0))
+
+
+def test_if_asked_for_only_the_objects_own_properties_are_looked_at(rng: np.random.Generator) -> None:
+    boxed = SlotSignature((BALL, ObjectType("box", ("friction",), Box())))
+    stream, x = Stream(boxed), rng.uniform(1.0, 2.0, size=(40, 3))
+    rows = np.array([stream.table.add(boxed, row, b"", [-1, -1]) for row in x])
+    y = x[:, 0] - 2.5 * x[:, 2]
+    new, old = np.split(np.arange(40), 2)
+    modes = mode_of(("v", 1.0), ("w", 1.0)), mode_of(("v", 1.0), ("w", 2.0))
+    for own_only in (False, True):
+        config = ClusteringConfig(own_only=own_only)
+        found = unified(
+            stream.table, rows, y, new, old, target=V, scale=SCALE, config=config, simpler_than=modes
+        )
+        assert (found is None) is own_only
+        assert found is None or found[1].columns == (0, 2)
+
+
+def test_of_many_examples_some_evenly_spread_are_regressed() -> None:
+    assert _spread(np.arange(SIDE)).tolist() == list(range(SIDE))
+    some = _spread(np.arange(1_000))
+    assert len(some) == SIDE and (some[0], some[-1]) == (0, 999)
+    assert set(np.diff(some)) <= {16, 17}

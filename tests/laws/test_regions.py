@@ -10,7 +10,7 @@ import pytest
 from relgym.laws.columns import Sources
 from relgym.laws.free import FreeLearner, free_motion
 from relgym.laws.records import ONE, Bound, FreeLaw, Piece, Region
-from relgym.laws.regions import find_regions
+from relgym.laws.regions import find_laws, find_regions
 from relgym.reporting.motion import MotionRules, parse_motion
 from relgym.scene.objects import POSE, Kinematics, ObjectType, Target
 from relgym.scene.schema import SceneSchema
@@ -109,3 +109,70 @@ def test_first_components_alone(count: int) -> None:
     law = WINDY.first(count)
     assert (len(law.components), len(law.regions[0].components)) == (count, count)
     assert law.reads() == {"vx", "vy", "px", "py"} | ({"spin"} if count == 3 else set())
+
+
+# ---------------------------------------------------------------------- by hand
+def constant(value: float) -> tuple[Piece, ...]:
+    return (Piece(((ONE, value),)),)
+
+
+def in_bands(values: np.ndarray, place: np.ndarray, fewest: int = 6) -> list[float]:
+    """Constants found, one for each law: a stretch has one if all of it agrees."""
+
+    def fit(rows: np.ndarray) -> tuple[Piece, ...] | None:
+        return constant(float(values[rows[0]])) if np.ptp(values[rows]) == 0.0 else None
+
+    def obeys(law: tuple[Piece, ...]) -> np.ndarray:
+        return values == law[0].terms[0][1]
+
+    return [law[0].terms[0][1] for law in find_laws(fit, obeys, place, fewest=fewest)]
+
+
+def test_laws_of_bands_are_found_the_largest_first() -> None:
+    place = np.stack([np.linspace(0.0, 1.0, 160), np.random.default_rng(0).uniform(size=160)], axis=1)
+    values = np.select([place[:, 0] < 0.2, place[:, 0] < 0.75], [1.0, 2.0], 3.0)
+    assert in_bands(values, place) == [2.0, 3.0, 1.0]
+    assert in_bands(values, place[:, ::-1]) == [2.0, 3.0, 1.0]  # along whichever axis
+    shuffled = np.random.default_rng(1).permutation(160)
+    assert in_bands(values[shuffled], place) == []  # where it is says nothing
+    assert in_bands(values, place, fewest=81) == []  # no stretch is so long
+
+
+def test_four_laws_at_most() -> None:
+    place = np.linspace(0.0, 1.0, 320)[:, None]
+    values = np.floor(8.0 * place[:, 0]).clip(0, 7)
+    assert len(in_bands(values, place)) == 4
+
+
+def test_regions_by_hand() -> None:
+    """Elsewhere below 3, the second law from 4 to 6, the third from 7 on."""
+    place = np.arange(10.0)[:, None].repeat(5, axis=0)
+    x = place[:, 0]
+    held = [x <= 3.0, (x >= 4.0) & (x <= 6.0), x >= 7.0]
+    laws = [constant(0.0), constant(1.0), constant(2.0)]
+    found = find_regions(laws, held, place, ("px",))
+    # The first one that holds counts. So the third one, which is told from both others, comes before the second.
+    assert [(r.components, r.bounds) for r in found] == [
+        (laws[2], (Bound("px", True, 6.0, 7.0),)),
+        (laws[1], (Bound("px", True, 3.0, 4.0),)),
+    ]
+    both = held[1] | (x == 2.0)  # what both explain tells no border
+    found = find_regions(laws[:2], [held[0], both], place, ("px",))
+    assert [r.bounds for r in found] == [(Bound("px", True, 3.0, 4.0),)]
+
+
+@pytest.mark.parametrize("borders", [(-0.3, 0.4), (-0.5, -0.1), (-0.2, 0.2), (-0.5, 0.0, 0.5)])
+def test_bands_side_by_side_whichever_is_the_widest(
+    borders: tuple[float, ...], rng: np.random.Generator
+) -> None:
+    learner, x = FreeLearner(sources(BLOCK), seed=0), rng.uniform(-1.0, 1.0, (500, 7))
+    after = x[:, :3].copy()
+    after[:, 0] += 0.125 * np.searchsorted(borders, x[:, 5])
+    for one, following in zip(x, after, strict=True):
+        learner.store.add(np.concatenate([one, following]), cell=0)
+    learner.fit(1e-12)
+    assert learner.law is not None and learner.law.unexplained == 0
+    said = free_motion(learner.law, learner.sources.names, x.T)
+    known = ~np.isnan(said[0])
+    assert known.mean() > 0.97
+    np.testing.assert_allclose(said[:, known].T, after[known], atol=1e-12)

@@ -8,13 +8,19 @@ import pytest
 from relgym.experiments.bodies import learned, rolled, tally
 from relgym.experiments.body_worlds import Setting, body_rooms
 from relgym.laws.account import accounts
+from relgym.laws.book import LawBook
+from relgym.laws.columns import Sources
 from relgym.laws.inertia import Gyration, Inertia, Mass
 from relgym.laws.learner import LawLearner
-from relgym.laws.records import Piece
+from relgym.laws.records import ONE, AxisLaw, FreeLaw, PairLaw, Piece
 from relgym.laws.text import law_rows
 from relgym.laws.touching import Contacts
+from relgym.laws.turning import _running, _Seen
 from relgym.reporting.motion import MotionRules, parse_motion
+from relgym.scene.objects import POSE, Kinematics, ObjectType, Target
 from relgym.scene.relations import Extractor
+from relgym.scene.schema import SceneSchema
+from relgym.scene.shapes import Box, Sphere
 
 TWO = Setting(("box", "box"), friction=0.5)
 
@@ -162,6 +168,100 @@ def test_what_is_printed_is_read_back(rough: LawLearner) -> None:
     assert "moment over mass of disc: infinite" in text
     lines = [line for line in text.split("\n") if not line.strip().startswith("#")]
     assert parse_motion(lines).text() == text
+
+
+# ---------------------------------------------------------------------- conveyors
+DISC, FLAT = (
+    ObjectType(name, (*POSE, "vx", "vy", "spin"), shape, velocity=("vx", "vy", None))
+    for name, shape in (("disc", Sphere()), ("flat", Box()))
+)
+YARD = SceneSchema(
+    (DISC, FLAT, ObjectType("belt", POSE, Box()), ObjectType("floor", POSE, Box())),
+    (("a", "disc"), ("b", "flat"), ("belt", "belt"), ("floor", "floor")),
+    planar=True,
+    kinematics=tuple(
+        Kinematics(t, place, rate)
+        for t in ("disc", "flat")
+        for place, rate in (("px", "vx"), ("py", "vy"), ("rz", "spin"))
+    ),
+    targets=tuple(Target(t, rate) for t in ("disc", "flat") for rate in ("vx", "vy", "spin")),
+)
+
+
+def yard_laws(speed: float) -> LawBook:
+    """Discs fall, stop where they land, and slip with friction on a floor and on a belt that runs."""
+    targets = YARD.targets or ()
+    book = LawBook(YARD, {t.name: Sources.of(YARD, t, targets) for t in (DISC, FLAT)})
+    free = (Piece((("vx", 1.0),)), Piece((("vy", 1.0), (ONE, -0.01))), Piece((("spin", 1.0),)))
+    book.free = {name: FreeLaw(name, free) for name in ("disc", "flat")}
+    kinds, zero = (("disc", "belt"), ("disc", "floor")), Piece(())
+    normal = AxisLaw((Piece((("u_n", 1.0),)), zero), "max", kinds, examples=9)
+    slip = AxisLaw((Piece((("u_t", 1.0), ("J_n", -0.5))), zero), "max", kinds, examples=9)
+    book.pair = PairLaw("point", ((normal,), (slip,)), 1.0, surfaces=((kinds[0], speed),))
+    book.inertia = Inertia(Mass(()), (Gyration(("disc", "flat"), Piece((("shape.r2", 1.0),)), whole=True),))
+    book.tolerance = 1e-12
+    return book
+
+
+def yard_step(book: LawBook, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, Contacts]:
+    """A disc on the belt, on the floor or in the air, what comes next, and who touches whom."""
+    layout, x = YARD.layout(), float(rng.choice([-5.0, 5.0, 100.0]))
+    moving = (0.1 * rng.normal(), -0.05 * abs(rng.normal()), 0.2 * rng.normal())
+    parts = {
+        "a": [x, 0.5 if x < 50.0 else 30.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, *moving],
+        "b": [50.0, 20.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, *0.1 * rng.normal(size=3)],
+        "belt": [-5.0, -0.5, 0.0, 0.0, 0.0, 0.0, 6.0, 1.0, 1.0],
+        "floor": [5.0, -0.5, 0.0, 0.0, 0.0, 0.0, 6.0, 1.0, 1.0],
+    }
+    now = np.concatenate([parts[name] for name in layout.names])
+    cast = book.cast(layout)
+    contacts = Contacts.of(cast, Extractor(YARD).extract(layout, now[None]), now[None])
+    motion, after = book.motion(contacts, now[None]), now.copy()
+    for name in ("a", "b"):
+        at = layout.places[name, "vx"]
+        after[at : at + 3] = motion.velocity[:, 0, cast.bodies[name]]
+    return now, after, contacts
+
+
+@pytest.mark.parametrize("speed", [0.1, -0.08, 0.0])
+def test_a_belts_speed_is_found_from_what_it_takes_along(speed: float, rng: np.random.Generator) -> None:
+    book, learner = yard_laws(speed), LawLearner(YARD, YARD.targets or (), seed=0)
+    stays = dict.fromkeys(range(len(YARD.objects)), True)
+    for _ in range(80):
+        now, after, contacts = yard_step(book, rng)
+        cast = learner.book.cast(YARD.layout())
+        learner.learn_one(Contacts.of(cast, contacts.relations, now[None]), now, after, stays)
+    found = learner.book.pair
+    assert found is not None
+    assert [law.formula(6) for axis in found.axes for law in axis] == ["max(u_n, 0)", "max(0, u_t - 0.5 J_n)"]
+    assert dict(found.surfaces) == ({("disc", "belt"): pytest.approx(speed, abs=1e-9)} if speed else {})
+    for _ in range(20):  # and it says of others what comes next
+        now, after, contacts = yard_step(book, rng)
+        cast = learner.book.cast(YARD.layout())
+        motion = learner.book.motion(Contacts.of(cast, contacts.relations, now[None]), now[None])
+        at = YARD.layout().places["a", "vx"]
+        assert motion.known[0, 0]
+        np.testing.assert_allclose(motion.velocity[:, 0, 0], after[at : at + 3], atol=1e-9)
+
+
+def test_speeds_of_surfaces_by_hand() -> None:
+    """Most of what ends on the second kind's belt ends at 0.3; on the first kind's floor all is explained."""
+    names = (("disc", "floor"), ("disc", "belt"), ("block", "belt"))
+    kinds = np.array([0] * 6 + [1] * 8 + [2] * 3)
+    ends = np.array([0.0] * 6 + [0.3] * 5 + [0.7, -0.2, 0.1] + [0.3, 0.5, 0.6])
+    after, n = np.stack([np.zeros(17), ends]), np.zeros((2, 17))
+    explained = kinds == 0
+
+    def found(push: float = 0.01, tolerance: float = 1e-6, ends: np.ndarray = after) -> dict[int, float]:
+        return _running(_Seen(n, n, ends, np.full(17, push), kinds, tolerance), explained, names)
+
+    assert found() == {1: 0.3, 2: 0.3}  # all that touch it are taken along
+    assert found(push=0.0) == {}  # nothing holds them
+    assert found(tolerance=0.0031) == {}  # it hardly moves: less than a hundred tolerances
+    apart = after.copy()
+    apart[1, 8:11] = [0.31, 0.32, 0.33]
+    assert found(ends=apart) == {}  # three alike are a coincidence
+    assert _running(_Seen(n, n, after, np.full(17, 0.01), kinds, 1e-6), np.ones(17, dtype=bool), names) == {}
 
 
 @pytest.mark.slow

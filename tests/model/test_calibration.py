@@ -8,25 +8,40 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from relgym.model.calibration import (
+    _EXACT,
     ENOUGH,
     EXPERTS,
     FEW,
+    GUESS,
+    LATEST,
+    LEAVE,
     LINEAR,
     MEMORY,
+    OF_FAMILY,
+    OF_WINNER,
     OWN,
     PERSISTENCE,
+    Assessment,
     Audit,
     Calibration,
     Key,
+    _Cell,
+    _counted,
+    _place,
+    _quantile,
+    _Record,
     key_of,
     keys_of,
+    lead_bins,
 )
 
 KEY = Key(0, 1, 3)
+CLAIMS = (0.9, 0.0075)
+"""Least probability of a claim, and share of predictions that may slip."""
 
 
 def values(own: float = math.nan, linear: float = math.nan, now: float = 0.0) -> tuple[float, ...]:
@@ -276,6 +291,11 @@ def test_modes_that_are_gone_are_forgotten() -> None:
         seen(known, values(own=1.0), 1.0, key=Key(0, -2, 7))
     known.keep((2, 3))
     assert {key.winner for key in known._cells if key.lead >= 0} == {-2}
+    # What all modes said tells a new one how to begin, whoever is gone.
+    assert {key for key in known._cells if key.lead == OF_FAMILY} == {
+        Key(0, 1, OF_FAMILY),
+        Key(0, -1, OF_FAMILY),
+    }
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.1, 0.25, 1.0, 7.9, 1e9, math.inf])
@@ -331,3 +351,653 @@ def test_united_records_keep_both_models_cells() -> None:
     assert both.assess(KEY, values(own=1.0)) == known.assess(KEY, values(own=1.0))
     assert both.assess(Key(0, 9, 1), values(own=1.0)).probability < 0.5
     assert copy.deepcopy(known).to_json() == known.to_json()
+
+
+# ---------------------------------------------------------------------- records of one expert
+def record(hits: int, misses: int, *, hits_first: bool = True) -> _Record:
+    """What was counted of a run of hits and one of misses."""
+    found = _Record()
+    for hit in [True] * hits + [False] * misses if hits_first else [False] * misses + [True] * hits:
+        found.count(0.0 if hit else 2.0, 1.0)
+    return found
+
+
+@pytest.mark.parametrize(("hits", "misses"), [(255, 2), (11, 3)])
+def test_a_run_of_misses_ends_a_record_at_ten_bits(hits: int, misses: int) -> None:
+    # A miss after n hits has the probability 1/2 / (n + 1), so m of them say m (1 + log2(n + 1)) bits; that they begin
+    # after just so many takes log2(n + 1) of these. After 255 hits two misses say 2 * 9 - 8 = 10, after 254 a little
+    # less; after 11 hits three say 3 + 2 * 3.58 = 10.2, after 10 hits 9.9.
+    for n, ended in ((hits, True), (hits - 1, False)):
+        found = record(n, misses - 1)
+        assert (found.trials, found.hits, found.run) == (n + misses - 1, n, 1 - misses)
+        assert found.count(2.0, 1.0) is ended
+        assert (found.trials, found.hits) == ((misses, 0) if ended else (n + misses, n))
+
+
+def test_a_run_of_hits_ends_a_record_when_it_is_no_short_one() -> None:
+    # After 255 misses two hits say ten bits, too, but only so many as tell a record of their own are believed. The new
+    # one begins with the miss before them: what failed once isn't always right.
+    found = record(FEW - 1, 255, hits_first=False)
+    assert (found.trials, found.hits) == (255 + FEW - 1, FEW - 1)
+    assert found.count(0.0, 1.0)
+    assert (found.trials, found.hits, found.runs) == (FEW + 1, FEW, [0.0] * 4)
+
+
+def test_hits_alone_end_nothing() -> None:
+    found = _Record()
+    assert not any(found.count(0.0, 1.0) for _ in range(MEMORY))
+    assert (found.trials, found.hits, found.run) == (MEMORY, MEMORY, MEMORY)
+
+
+def test_runs_are_counted_when_they_are_over() -> None:
+    found = _Record()
+    for hit, length in ((True, 3), (False, 2), (True, 2), (False, 1)):
+        for _ in range(length):
+            found.count(0.0 if hit else 2.0, 1.0)
+    assert found.runs == [2.0, 5.0, 1.0, 2.0]  # the last one isn't over
+    assert (found.trials, found.hits, found.run) == (8, 5, -1)
+
+
+def test_where_misses_come_in_long_runs_another_one_is_no_news() -> None:
+    # 32 hits and 8 misses; a first miss has the probability 1 - 32.5 / 41 = 8.5 / 41, and says 2.27 bits.
+    # Where the misses came one by one each other one says as much, and 7 in a row, less the log2(41) = 5.36 bits of
+    # when they begin, are 10.5 bits; where they came in one run, each other one has the probability
+    # (8 - 1 + 8.5 / 41) / 9 = 0.80 and says 0.32 bits: it takes 42 of them until 2.27 + 41 * 0.32 - 5.36 > 10.
+    first, after = math.log2(41 / 8.5), math.log2(9.0 / (7.0 + 8.5 / 41.0))
+    alone = math.ceil((10.0 + math.log2(41)) / first)
+    together = 1 + math.ceil((10.0 + math.log2(41) - first) / after)
+    assert (alone, together) == (7, 42)
+    for runs, length in (([8.0, 31.0, 8.0, 9.0], alone), ([8.0, 31.0, 1.0, 2.0], together)):
+        known = _Record(40.0, 32.0, 1, {}, list(runs))
+        ended = [known.count(2.0, 1.0) for _ in range(length)]
+        assert ended == [False] * (length - 1) + [True]
+
+
+def test_the_older_half_of_a_record_counts_half() -> None:
+    found = record(768, 0)
+    for _ in range(256):  # one miss in four from here on: nothing that ends a record
+        found.count(2.0 if found.trials % 4 == 3 else 0.0, 1.0)
+    assert (found.trials, found.hits) == (1024, 960)
+    found.count(0.0, 1.0)
+    assert (found.trials, found.hits) == (512.5, 480.5)
+    assert sum(found.errors.values()) == 512.5
+
+
+def test_runs_are_halved_with_what_they_are_of() -> None:
+    # 513 hits, a miss, 511 hits: the first run of hits is over. The miss after them ends the second one, and 1,025
+    # trials in runs are more than are remembered.
+    found = _Record(600.0, 540.0, 511, {}, [1.0, 513.0, 1.0, 1.0])
+    found.count(2.0, 1.0)
+    assert found.runs == [0.5, 512.0, 0.5, 1.0]
+
+
+def test_shares_by_hand() -> None:
+    # Jeffreys' prior: n hits in a row have the probability 1/2 3/4 5/6 ..., where hits come in some share; that what
+    # speaks is always right is as likely before.
+    assert _Record().share(0.3) == 0.3
+    assert _Record().mean(0.3) == 0.3
+    assert record(1, 0).share(0.5) == pytest.approx((0.75 * 0.5 + 1.0) / 1.5)
+    assert record(2, 0).share(0.5) == pytest.approx((5 / 6 * 3 / 8 + 1.0) / (3 / 8 + 1.0))
+    assert record(2, 0).share(0.5, bits=3.0) == pytest.approx((5 / 6 * 3 / 64 + 1.0) / (3 / 64 + 1.0))
+    assert _Record().share(0.5, bits=3.0) == pytest.approx((0.5 / 8 + 1.0) / (1 / 8 + 1.0))
+    # A miss ends that hope, however sure: what is left is the mean.
+    assert record(2, 1).share(0.8, bits=99.0) == record(2, 1).mean(0.8) == pytest.approx(2.8 / 4)
+
+
+@given(st.lists(st.booleans(), max_size=300), st.floats(0.0, 1.0), st.floats(0.0, 50.0))
+def test_shares_are_probabilities_and_records_bounded(hits: list[bool], prior: float, bits: float) -> None:
+    known = _Record()
+    for hit in hits:
+        known.count(0.0 if hit else 2.0, 1.0)
+    assert 0.0 <= known.hits <= known.trials <= MEMORY
+    assert 0.0 <= known.mean(prior) <= known.share(prior, bits) <= 1.0
+    assert known.share(prior, bits) <= known.share(prior, bits + 1.0)
+    assert known.run == (0 if not hits else len(hits) if False not in hits else _run(hits))
+
+
+def _run(hits: list[bool]) -> int:
+    length = 0
+    for hit in reversed(hits):
+        if hit != hits[-1]:
+            break
+        length += 1
+    return length if hits[-1] else -length
+
+
+# ---------------------------------------------------------------------- sizes of errors
+def test_bins_are_quarters_of_octaves() -> None:
+    assert [_place(x) for x in (0.0, 0.25, 0.5, 1.0, 1.0001, 2.0**0.25, 1.2, 2.0, 2.1)] == [
+        _EXACT,
+        -8,
+        -4,
+        0,
+        1,
+        1,
+        2,
+        4,
+        5,
+    ]
+
+
+def test_of_many_sizes_the_older_ones_count_half_and_few_nothing() -> None:
+    known = {0: 1023.0, 5: 2.0**-10, 6: 2.0**-8}
+    found = _counted(known, 7)
+    assert found == {0: 511.5, 6: 2.0**-9, 7: 0.5}
+    assert _counted({0: 1022.0}, 7) == {0: 1022.0, 7: 1.0}
+
+
+def test_quantiles_by_hand() -> None:
+    assert _quantile({}, 0.95) == 0.0
+    # 19 sizes in (2^-1/4, 1] and one more: 95 % of 20 are 19, all of them.
+    assert _quantile({0: 19.0}, 0.95) == 1.0
+    # Half of 4 and one more is 2.5: 2.5 / 4 of the way through the bin.
+    assert _quantile({0: 4.0}, 0.5) == pytest.approx(2.0 ** ((-1.0 + 2.5 / 4.0) / 4.0))
+    # Of 8 and one more 4.5: a half of the way through the second one.
+    assert _quantile({-4: 4.0, 3: 1.0, 8: 3.0}, 0.5) == pytest.approx(2.0 ** (2.5 / 4.0))
+    # More is asked for than there is: the largest.
+    assert _quantile({0: 3.0, 4: 1.0}, 0.95) == 2.0
+    # Exact ones are sizes of 0, unless they are left aside.
+    assert _quantile({_EXACT: 10.0, 0: 4.0}, 0.5) == 0.0
+    assert _quantile({_EXACT: 10.0, 0: 4.0}, 0.5, exact=10.0) == _quantile({0: 4.0}, 0.5)
+    assert _quantile({_EXACT: 10.0}, 0.5, exact=10.0) == 0.0
+
+
+@given(st.lists(st.floats(1e-12, 1e12), min_size=1, max_size=200), st.sampled_from([0.5, 0.95]))
+def test_quantiles_are_within_a_bin_of_the_order_statistic(sizes: list[float], share: float) -> None:
+    bins: dict[int, float] = {}
+    for size in sizes:
+        bins = _counted(bins, _place(size))
+    place = math.ceil(share * (len(sizes) + 1.0))  # split conformal prediction
+    exact = sorted(sizes)[min(place, len(sizes)) - 1]
+    assert abs(math.log2(_quantile(bins, share) / exact)) <= 0.25 + 1e-9
+
+
+def test_what_mostly_changes_is_a_median_of_changes() -> None:
+    known = Calibration()
+    assert known.change == 0.0
+    for came in [0.0] * 50 + [1.0] * 2 + [8.0] * 2 + [64.0]:
+        seen(known, values(own=came), came)
+    # Five changes and one more, half of which is 3: the second half-way through the bin of 8.
+    assert known.change == pytest.approx(2.0 ** ((12 - 1 + 0.5) / 4.0))
+    known = Calibration()
+    for _ in range(5):
+        seen(known, values(own=0.0), 1e-10)  # less than rounding
+    assert known.change == 0.0
+
+
+# ---------------------------------------------------------------------- who speaks
+def cell(hits: float, trials: float, *, heard: float = 0.0, speaker: int = OWN) -> _Cell:
+    """A cell of a winner that was right so often, and leaves nothing of what persistence leaves."""
+    found = _Cell.new(speaker, len(EXPERTS))
+    found.records[speaker] = _Record(trials, hits)
+    found.squares[speaker] = [trials, 0.0, trials]
+    found.squares[PERSISTENCE] = [trials, trials, trials]
+    found.heard = heard
+    return found
+
+
+def test_leads_by_hand() -> None:
+    found = _Cell.new(OWN, len(EXPERTS))
+    found.squares[OWN] = [8.0, 4.0, 32.0]
+    found.squares[LINEAR] = [6.0, 1.0, 32.0]
+    assert (found.left(OWN), found.left(LINEAR)) == (1 / 8, 1 / 32)
+    # Normal errors of unknown size: half of log2(left / left) bits for each trial of who was heard less.
+    assert found.lead(LINEAR, OWN) == pytest.approx(0.5 * 6.0 * 2.0)
+    assert found.lead(OWN, LINEAR) == pytest.approx(-6.0)
+    # Who was never heard has left everything: any other one leads.
+    assert found.left(GUESS) == math.inf
+    assert found.lead(LINEAR, GUESS) == pytest.approx(0.5 * 6.0 * math.log2(1e300))
+
+
+@pytest.mark.parametrize("size", [1e11, 1e100, 1e150])
+def test_exact_laws_of_huge_changes_lead_by_finite_bits(size: float) -> None:
+    """What they leave of the squares is less than the smallest number there is."""
+    found, errors = _Cell.new(PERSISTENCE, len(EXPERTS)), [math.nan] * len(EXPERTS)
+    errors[OWN], errors[LINEAR], errors[PERSISTENCE] = 0.0, 0.0, size
+    for _ in range(300):
+        found.count(errors, 0.5)
+    assert found.speaker == OWN
+    assert found.lead(OWN, LINEAR) == found.lead(LINEAR, OWN) == 0.0
+    assert found.lead(OWN, PERSISTENCE) == pytest.approx(0.5 * 300 * math.log2(1e300))
+    assert found.lead(PERSISTENCE, OWN) == -found.lead(OWN, PERSISTENCE)
+
+
+def test_another_expert_takes_over_at_ten_bits() -> None:
+    # A quarter of the squares are 1 bit for each trial.
+    found, errors = _Cell.new(OWN, len(EXPERTS)), [math.nan] * len(EXPERTS)
+    errors[OWN], errors[LINEAR], errors[PERSISTENCE] = 2.0, 1.0, 4.0
+    spoke = []
+    for _ in range(11):
+        found.count(errors, 0.5)
+        spoke.append(found.speaker)
+    assert spoke == [OWN] * 9 + [LINEAR] * 2
+    # Its record begins where it takes over; that of the winner stays.
+    assert (found.records[OWN].trials, found.records[LINEAR].trials) == (11.0, 1.0)
+
+
+def test_squares_of_many_trials_are_halved() -> None:
+    found, errors = _Cell.new(OWN, len(EXPERTS)), [math.nan] * len(EXPERTS)
+    errors[OWN], errors[PERSISTENCE] = 0.0, 2.0
+    found.squares[OWN], found.squares[PERSISTENCE] = [1024.0, 8.0, 4096.0], [1023.0, 4092.0, 4092.0]
+    found.count(errors, 0.5)
+    assert found.squares[OWN] == [513.0, 4.0, 2052.0]
+    assert found.squares[PERSISTENCE] == [1024.0, 4096.0, 4096.0]
+    assert found.squares[LINEAR] == [0.0, 0.0, 0.0]  # had nothing to say
+
+
+def test_a_law_that_broke_is_measured_anew() -> None:
+    found, errors = _Cell.new(OWN, len(EXPERTS)), [math.nan] * len(EXPERTS)
+    errors[PERSISTENCE] = 4.0
+    for own in [0.0] * 255 + [4.0, 4.0]:  # see above: the second miss ends the record
+        errors[OWN] = own
+        found.count(errors, 0.5)
+    assert found.squares[OWN] == [1.0, 16.0, 16.0]
+    assert found.squares[PERSISTENCE][0] == 257.0
+
+
+def test_a_law_keeps_the_word_by_hand() -> None:
+    """It must be likely enough, and leave at most `LEAVE` times as much as what anybody would try."""
+
+    def prefers(share: float, left: float, other: float = 0.5, able: tuple[int, ...] = (0, 2, 5)) -> int:
+        found = _Cell.new(LINEAR, len(EXPERTS))
+        found.records = {
+            OWN: _Record(99.0, 100.0 * share - 0.5),
+            LINEAR: _Record(99.0, 100.0 * other - 0.5),
+        }
+        found.squares[OWN] = [99.0, left * left, 1.0]
+        found.squares[LINEAR] = [99.0, 1e-4, 1.0]
+        found.squares[PERSISTENCE] = [99.0, 1.0, 1.0]
+        return found.preferred(able, CLAIMS)
+
+    least = 0.01 * LEAVE
+    assert prefers(0.905, 0.999 * least) == OWN
+    assert prefers(0.905, 1.001 * least) == LINEAR  # leaves too much
+    assert prefers(0.895, 0.999 * least) == LINEAR  # can't be claimed
+    assert prefers(0.955, 0.999 * least, other=0.96) == LINEAR  # is right less often than who codes best
+    assert prefers(0.965, 0.999 * least, other=0.96) == OWN
+    assert prefers(0.9935, 0.999 * least, other=0.999) == OWN  # often enough for all to be claimed
+    assert prefers(0.9915, 0.999 * least, other=0.999) == LINEAR
+    assert prefers(0.999, 0.999 * least, able=(LINEAR, PERSISTENCE)) == LINEAR  # has no value
+    assert prefers(0.5, 0.02, able=(OWN, PERSISTENCE)) == OWN  # who speaks has none: the next best
+
+
+def test_a_guess_takes_no_law_the_word_but_an_added_class_does() -> None:
+    """What nobody would have tried first says nothing of a law that is right often enough."""
+    for other, speaker in ((GUESS, OWN), (LATEST, OWN), (PERSISTENCE, LINEAR), (len(EXPERTS), LINEAR)):
+        found = _Cell.new(LINEAR, len(EXPERTS) + 1)
+        found.records[OWN] = _Record(99.0, 99.0)
+        for expert, left in ((OWN, 0.5), (LINEAR, 0.5), (other, 0.1)):
+            found.squares[expert] = [99.0, left, 1.0]
+        assert found.preferred((OWN, LINEAR, other), CLAIMS) == speaker
+
+
+def test_the_first_who_has_a_value_speaks_before_anything_is_known() -> None:
+    known = Calibration()
+    some = list(values())
+    assert known.assess(KEY, some).speaker == PERSISTENCE
+    some[LINEAR], some[LATEST] = 1.0, 1.0
+    assert known.assess(Key(1, 0, 0), some).speaker == PERSISTENCE
+    some[GUESS] = 1.0
+    assert known.assess(Key(2, 0, 0), some).speaker == GUESS
+    some[OWN] = 1.0
+    assert known.assess(Key(3, 0, 0), some).speaker == OWN
+
+
+def test_a_cell_of_few_trials_lets_its_winner_tell_who_speaks() -> None:
+    known = Calibration()
+    winner, here = KEY._replace(lead=OF_WINNER), KEY
+    known._cells = {winner: cell(60.0, 64.0, speaker=LINEAR), here: cell(31.0, 31.0, speaker=OWN)}
+    known.trials = 64
+    said = values(own=1.0, linear=1.0)
+    assert known.assess(here, said).speaker == LINEAR
+    known = copy.deepcopy(known)
+    known._cells[here] = cell(float(FEW), float(FEW), speaker=OWN)
+    assert known.assess(here, said).speaker == OWN
+
+
+def test_whose_record_is_asked_by_hand() -> None:
+    """The share of a cell, begun with that of all modes; of the winner's where the cell has no trials."""
+    known = Calibration()
+    family, winner = Key(0, 1, OF_FAMILY), KEY._replace(lead=OF_WINNER)
+    known._cells = {family: cell(59.5, 99.0), winner: cell(10.0, 19.0)}
+    known.trials = 99
+    # All modes: (59.5 + 1/2) / 100 = 0.6; this one's: (10 + 0.6) / 20.
+    assert known.assess(KEY, values(own=1.0)).probability == pytest.approx(10.6 / 20)
+    known = copy.deepcopy(known)
+    known._cells[KEY] = cell(3.0, 9.0)
+    assert known.assess(KEY, values(own=1.0)).probability == pytest.approx(3.6 / 10)
+    assert known.assess(KEY._replace(winner=2), values(own=1.0)).probability == pytest.approx(0.6)
+    assert known.assess(KEY._replace(winner=-2), values(own=1.0)).probability == 0.5  # a law
+
+
+def test_intervals_and_spread_by_hand() -> None:
+    known = Calibration()
+    found = cell(10.0, 40.0)
+    found.records[OWN].errors = {0: float(ENOUGH - 1)}
+    found.squares[OWN] = [40.0, 90.0, 160.0]
+    known._cells, known.trials = {KEY: found}, 40
+    told = known.assess(KEY, values(own=1.0))
+    assert math.isnan(told.interval)
+    assert told.spread == 1.5  # sqrt(90 / 40)
+    found.records[OWN].errors = {0: float(ENOUGH)}
+    assert copy.deepcopy(known).assess(KEY, values(own=1.0)).interval == 1.0
+
+
+# ---------------------------------------------------------------------- what is claimed
+def rationed(slips: float, *, extra: float = 0.0) -> Calibration:
+    """Four kinds of predictions, right in 99, 98, 96 and 95 of 100."""
+    known = Calibration(slips=slips)
+    kinds = ((0.99, 600.0), (0.98, 250.0), (0.96, 50.0), (0.95, 100.0))
+    for lead, (share, heard) in enumerate(kinds):
+        known._cells[Key(0, 1, lead)] = cell(100.0 * share - 0.5, 99.0, heard=heard)
+    if extra:
+        known._cells[Key(0, 2, 0)] = cell(9.5, 19.0, heard=extra)
+    known.trials = 1000
+    return known
+
+
+def claimed(known: Calibration, who: int = 1) -> list[bool]:
+    """Which kinds of a winner's are claimed, whatever their family says."""
+    sure = Assessment(OWN, 1.0, math.nan, math.nan)
+    return [known.claims(Key(0, who, lead), sure) for lead in range(4)]
+
+
+def test_claims_are_rationed_by_hand() -> None:
+    # Of 1,000 predictions 10 may slip, and 1.5 more. The first kind takes 6 of them, the second one 5; of the third
+    # one 2 would slip, and 0.5 are left.
+    assert claimed(rationed(0.01)) == [True, True, False, False]
+    # 2.5 for the third; of the last one 5 would slip, for which there are 21.5 - 13.
+    assert claimed(rationed(0.02)) == [True] * 4
+    assert claimed(rationed(0.016)) == [True, True, True, False]
+    assert claimed(rationed(0.0)) == [False] * 4  # 1.5 for the 6 of the first kind
+    # Predictions that can't be claimed count among those of which a share may slip.
+    assert claimed(rationed(0.01, extra=160.0)) == [True, True, True, False]
+
+
+def test_rations_are_each_familys_own() -> None:
+    known = rationed(0.01)
+    for lead in range(4):
+        known._cells[Key(0, -3, lead)] = cell(95.5 - 0.5, 99.0, heard=10_000.0)
+    assert claimed(known) == [True, True, False, False]
+    assert claimed(copy.deepcopy(known), -3) == [False] * 4
+
+
+def test_one_miss_is_left_to_every_kind() -> None:
+    # A single kind, right in 99 of 100: 1.5 may slip though the share is 0, hence 150 predictions and no more.
+    for heard, expected in ((149.0, True), (151.0, False)):
+        known = Calibration(slips=0.0)
+        known._cells[KEY] = cell(98.5, 99.0, heard=heard)
+        known.trials = 99
+        assert known.claims(KEY, Assessment(OWN, 1.0, math.nan, math.nan)) is expected
+
+
+def test_what_is_no_kind_of_its_own_is_claimed_when_it_is_as_sure() -> None:
+    known, other = rationed(0.01), Key(0, 7, 3)
+    assert known.claims(other, Assessment(OWN, 0.965, math.nan, math.nan))
+    assert not known.claims(other, Assessment(OWN, 0.96, math.nan, math.nan))
+    assert not known.claims(other, Assessment(LINEAR, 0.99, math.nan, math.nan))
+    assert known.claims(other, Assessment(LATEST, 0.99, math.nan, math.nan))
+    assert known.claims(other, Assessment(len(EXPERTS), 0.99, math.nan, math.nan))  # an added class' law
+
+
+def test_the_least_probability_holds_of_both() -> None:
+    known = Calibration()
+    known._cells[KEY], known.trials = cell(98.5, 99.0, heard=1.0), 99
+    assert known.claims(KEY, Assessment(OWN, 0.9, math.nan, math.nan))
+    assert not known.claims(KEY, Assessment(OWN, 0.899, math.nan, math.nan))
+    known = Calibration()
+    known._cells[KEY], known.trials = cell(89.0, 99.0, heard=1.0), 99
+    assert not known.claims(KEY, Assessment(OWN, 0.99, math.nan, math.nan))
+
+
+def test_how_sure_a_cell_is() -> None:
+    assert cell(98.5, 99.0).sure(CLAIMS, 0.0) == pytest.approx(0.99)
+    assert cell(98.5, 99.0, speaker=LATEST).sure(CLAIMS, 0.0) == pytest.approx(0.99)
+    assert cell(98.5, 99.0, speaker=LINEAR).sure(CLAIMS, 0.0) == 0.0  # nothing is claimed then
+    # Two hits of what is right always, by 8 to 1: see `test_shares_by_hand`.
+    assert cell(2.0, 2.0).sure(CLAIMS, 3.0) == pytest.approx((5 / 6 * 3 / 64 + 1.0) / (3 / 64 + 1.0))
+    assert _Cell.new(OWN, len(EXPERTS)).sure(CLAIMS, 0.0) == 0.5  # nobody was heard
+
+
+def test_bits_that_vouch_are_for_laws() -> None:
+    known = Calibration()
+    for who in (1, -1):
+        known._cells[Key(0, who, 7)] = cell(2.0, 2.0, heard=2.0)
+    known.trials = 4
+    before = known.assess(Key(0, 1, 7), values(own=1.0)).probability
+    known.vouch(6.0)
+    assert known.assess(Key(0, 1, 7), values(own=1.0)).probability == before
+    chance = 3 / 8 / 64
+    told = known.assess(Key(0, -1, 7), values(own=1.0))
+    assert told.probability == pytest.approx((5 / 6 * chance + 1.0) / (chance + 1.0))
+    assert (known.claims(Key(0, 1, 7), told), known.claims(Key(0, -1, 7), told)) == (True, True)
+
+
+def test_bits_that_vouch_tell_what_is_claimed() -> None:
+    """One hit alone makes 11 / 12; of a law that described what came in six bits less, hardly any doubt is left."""
+    known, law = Calibration(probability=0.95), Key(0, -1, 7)
+    known._cells[law], known.trials = cell(1.0, 1.0, heard=1.0), 1
+    sure = Assessment(OWN, 1.0, math.nan, math.nan)
+    assert not known.claims(law, sure)
+    known.vouch(6.0)
+    assert known.claims(law, sure)
+
+
+def test_bits_vouch_for_no_one_who_speaks_in_a_laws_place() -> None:
+    known, law = Calibration(), Key(0, -1, 7)
+    known._cells[law], known.trials = cell(2.0, 2.0, speaker=LINEAR), 2
+    said = values(linear=1.0)
+    before = known.assess(law, said)
+    assert (before.speaker, before.probability) == (
+        LINEAR,
+        pytest.approx((5 / 6 * 3 / 8 + 1.0) / (3 / 8 + 1.0)),
+    )
+    known.vouch(9.0)
+    np.testing.assert_array_equal(known.assess(law, said), before)
+
+
+# ---------------------------------------------------------------------- a long memory, and what is forgotten
+def test_how_many_were_heard_is_halved_with_the_slips() -> None:
+    known, other = right(MEMORY), KEY._replace(lead=4)
+    assert known._cells[KEY].heard == MEMORY
+    seen(known, values(own=1.0), 1.0, key=other)
+    assert (known._cells[KEY].heard, known._cells[other].heard) == (MEMORY / 2, 1.0)
+    assert known._slips == [(MEMORY + 1) / 2, 0.0]
+
+
+def test_cells_that_a_prediction_is_counted_in() -> None:
+    known = right(1)
+    seen(known, values(own=1.0), 1.0, key=Key(2, -3, 7))
+    seen(known, values(), 1.0, key=Key(3, 0, 0))
+    assert sorted(known._cells) == [
+        Key(0, 1, OF_FAMILY),
+        Key(0, 1, OF_WINNER),
+        Key(0, 1, 3),
+        Key(2, -3, OF_WINNER),
+        Key(2, -3, 7),
+        Key(2, -1, OF_FAMILY),
+        Key(3, 0, OF_FAMILY),
+        Key(3, 0, OF_WINNER),
+        Key(3, 0, 0),
+    ]
+    assert {key: c.heard for key, c in known._cells.items() if c.heard} == {
+        Key(0, 1, 3): 1.0,
+        Key(2, -3, 7): 1.0,
+        Key(3, 0, 0): 1.0,
+    }
+
+
+def test_all_modes_know_how_often_each_was_right_who_spoke() -> None:
+    known, spoke = Calibration(), []
+    for _ in range(30):
+        said = values(own=5.0, linear=1.0)
+        spoke.append(known.assess(KEY, said).speaker)
+        seen(known, said, 1.0)
+    (family,) = [c for key, c in known._cells.items() if key.lead == OF_FAMILY]
+    assert spoke.count(LINEAR) > 20
+    assert (family.records[LINEAR].trials, family.records[LINEAR].hits) == (spoke.count(LINEAR),) * 2
+    assert (family.records[OWN].trials, family.records[OWN].hits) == (30, 0)
+
+
+def test_a_renewed_expert_begins_with_ten_trials_of_who_speaks() -> None:
+    known = Calibration(hypotheses=1)
+    many, few, none = Key(0, 1, 1), Key(0, 1, 2), Key(0, 1, 3)
+    for key, squares in ((many, [40.0, 8.0, 80.0]), (few, [4.0, 2.0, 8.0]), (none, [0.0, 0.0, 0.0])):
+        known._cells[key] = _Cell.new(OWN, known.experts)
+        known._cells[key].squares[OWN] = squares
+    known.renewed(len(EXPERTS))
+    found = [known._cells[key].squares[len(EXPERTS)] for key in (many, few, none)]
+    assert found == [[10.0, 2.0, 20.0], [4.0, 2.0, 8.0], [0.0, 0.0, 0.0]]
+    assert known._cells[many].squares[OWN] == [40.0, 8.0, 80.0]
+
+
+def test_what_another_model_says_is_no_known_kind() -> None:
+    known = right(40)
+    known.vouch(5.0)
+    change = known.change
+    known.forget()
+    assert (known.trials, known.change) == (0, change)
+    told = known.assess(KEY, values(own=1.0))
+    assert math.isnan(told.probability) and math.isnan(told.interval) and math.isnan(told.spread)
+    assert known.claims(KEY, told)
+
+
+def test_shares_of_an_outcome_and_doubts() -> None:
+    known = Calibration(slips=0.05)
+    assert math.isnan(known.share(0))
+    assert not known.doubts(0)  # nothing was said
+    for k in range(20):
+        seen(known, values(own=1.0), 2.0 if k == 10 else 1.0)
+    assert known.share(0) == 0.95
+    assert not known.doubts(0)
+    seen(known, values(own=1.0), 2.0)
+    assert known.share(0) == pytest.approx(19 / 21)
+    assert known.doubts(0)
+    assert math.isnan(known.share(1))
+    sure = right(40)
+    assert not sure.doubts(0)
+    sure._cells[KEY].speaker = LATEST
+    assert sure.doubts(0)
+    assert not sure.doubts(1)
+
+
+def test_who_speaks_in_how_many_trials() -> None:
+    known = right(40)
+    for _ in range(50):
+        seen(known, values(own=5.0, linear=1.0), 1.0, key=Key(0, 2, 3))
+    assert known.speakers() == {OWN: 40.0, LINEAR: 50.0}
+    kinds = {key: (heard, told.speaker) for key, heard, told in known.kinds(0)}
+    assert kinds == {KEY: (40.0, OWN), Key(0, 2, 3): (50.0, LINEAR)}
+    assert list(known.kinds(1)) == []
+
+
+# ---------------------------------------------------------------------- one by one, together, and as a table
+@st.composite
+def calibrations(draw: st.DrawFn) -> tuple[Calibration, int]:
+    """What is known after some predictions of few winners, and who had values, as bits."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    known = Calibration(slips=draw(st.sampled_from([0.0, 0.0075, 0.1])))
+    if draw(st.booleans()):
+        known.vouch(draw(st.floats(0.0, 20.0)))
+    able = draw(st.integers(0, 31))
+    having = np.array([bool(able >> k & 1) for k in range(PERSISTENCE)] + [True])
+    sizes = rng.choice([1e-12, 0.01, 1.0], size=(4, len(EXPERTS)))
+    for _ in range(draw(st.integers(0, 120))):
+        winner, lead = int(rng.integers(-1, 3)), int(rng.choice(4))
+        said = sizes[lead] * rng.normal(size=len(EXPERTS))
+        said[~having | (rng.random(len(EXPERTS)) < 0.2)] = math.nan
+        said[PERSISTENCE] = 1.0
+        key = Key(int(rng.integers(2)), winner, 7 if winner < 0 else lead)
+        seen(known, tuple(said.tolist()), 0.0, key=key)
+    return known, able
+
+
+@settings(max_examples=40)
+@given(calibrations())
+def test_the_table_says_what_assess_and_claims_say(made: tuple[Calibration, int]) -> None:
+    """As kernels read it: a cell, else its winner's, else its family's."""
+    known, able = made
+    sets = [bits for bits in range(able + 1) if bits & ~able == 0]
+    rows = {(key, bits): (told, sure) for key, bits, told, sure in known.table(3, sets)}
+    assert len(rows) == len(list(known.table(3, sets)))  # nothing is listed twice
+    for outcome in range(3):
+        for winner in range(-3, 4):
+            for lead in (0, 1, 2, 3, 5, 7):
+                key = Key(outcome, winner, lead)
+                who = (winner > 0) - (winner < 0)
+                chain = (key, key._replace(lead=OF_WINNER), Key(outcome, who, OF_FAMILY))
+                for bits in sets:
+                    told, sure = next(rows[each, bits] for each in chain if (each, bits) in rows)
+                    said = [1.0 if bits >> k & 1 else math.nan for k in range(PERSISTENCE)] + [1.0]
+                    expected = known.assess(key, said)
+                    np.testing.assert_array_equal(told, expected)
+                    assert sure == known.claims(key, expected)
+
+
+@given(calibrations(), st.lists(st.lists(st.booleans(), min_size=5, max_size=5), min_size=1, max_size=9))
+def test_many_are_assessed_as_one_by_one(made: tuple[Calibration, int], having: list[list[bool]]) -> None:
+    known, _ = made
+    rows = np.where([[*each, True] for each in having], 2.0, np.nan)
+    told: dict[int, Assessment] = {}
+    for which, each in known.assess_many(KEY, rows):
+        assert not told.keys() & set(which.tolist())
+        told |= dict.fromkeys(which.tolist(), each)
+    expected = [known.assess(KEY, row.tolist()) for row in rows]
+    np.testing.assert_array_equal([told[k] for k in range(len(rows))], expected)
+
+
+@given(calibrations())
+def test_what_is_read_says_what_was_saved(made: tuple[Calibration, int]) -> None:
+    known, _ = made
+    text = json.dumps(known.to_json())
+    again = Calibration.from_json(json.loads(text), known.probability, known.allowed)
+    assert json.dumps(again.to_json()) == text
+    for a, b in zip(known.table(3, [0, 31]), again.table(3, [0, 31]), strict=True):
+        assert (a[0], a[1], a[3]) == (b[0], b[1], b[3])
+        np.testing.assert_array_equal(a[2], b[2])
+    assert (known.slips, known.change, known.speakers()) == (again.slips, again.change, again.speakers())
+
+
+@settings(max_examples=40)
+@given(calibrations(), calibrations())
+def test_what_two_models_know_is_united_in_either_order(
+    first: tuple[Calibration, int], second: tuple[Calibration, int]
+) -> None:
+    one, two = first[0], second[0]
+    before = json.dumps([one.to_json(), two.to_json()])
+    both = one.united(two)
+    assert both._cells.keys() == one._cells.keys() | two._cells.keys()
+    more, less = (one, two) if one.trials >= two.trials else (two, one)
+    for key, found in both._cells.items():
+        assert found == more._cells.get(key, less._cells.get(key))
+    assert both.trials == one.trials + two.trials
+    if one.trials != two.trials:
+        assert both.to_json() == two.united(one).to_json()
+    assert json.dumps([one.to_json(), two.to_json()]) == before
+
+
+WINNERS = st.integers(-3, 3) | st.sampled_from([2**31 - 1, -(2**31)])
+MARGINS = st.sampled_from([0.0, 0.1, 1.0, 9.0, math.inf])
+
+
+@given(st.lists(st.tuples(st.integers(0, 7), WINNERS, MARGINS), max_size=20))
+def test_each_prediction_lies_in_one_cell_its_own(told: list[tuple[int, int, float]]) -> None:
+    outcomes = np.array([each[0] for each in told], dtype=np.int8)
+    winners = np.array([each[1] for each in told], dtype=np.int64)
+    found = {
+        k: key
+        for key, rows in keys_of(outcomes, winners, np.array([m for *_, m in told]))
+        for k in rows.tolist()
+    }
+    assert [found[k] for k in range(len(told))] == [key_of(*each) for each in told]
+    assert len(set(found.values())) == len({key_of(*each) for each in told})
+
+
+@given(st.lists(st.floats(0.0, 1e9) | st.just(math.inf), min_size=1, max_size=20))
+def test_bins_of_leads_are_the_same_in_arrays(margins: list[float]) -> None:
+    bins = [key_of(0, 1, margin).lead for margin in margins]
+    assert lead_bins(np.array(margins)).tolist() == bins
+    for margin, place in zip(margins, bins, strict=True):
+        assert place == (7 if math.isinf(margin) else 0 if margin == 0.0 else place)
+        if 1 < place < 6:  # octaves of the log-odds, from an eighth
+            assert 2.0 ** (place - 3) <= margin < 2.0 ** (place - 2)

@@ -20,16 +20,19 @@ from relgym.clustering.mode import NOISE
 from relgym.config import ModelConfig
 from relgym.envs.dreams.setting import recorded
 from relgym.laws.book import LawBook
+from relgym.laws.inertia import Inertia
 from relgym.laws.records import Share
 from relgym.logic.clause import Definition
 from relgym.model import running
 from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
+from relgym.model.parts import Parts
 from relgym.model.prediction import ScenePrediction
 from relgym.model.querying import predict
 from relgym.model.running import Runner
 from relgym.model.target.hindsight import Hindsight
 from relgym.model.target.limits import Limits
+from relgym.model.target.property_model import PropertyModel
 from relgym.model.target.scope import Scope
 from relgym.model.target.spread import Spreads
 from relgym.model.target.stops import Stop, Stops
@@ -280,3 +283,130 @@ def test_no_program_outlives_its_laws(change: str) -> None:
     assert assert_nothing_stale(model, scene)
     found = fresh_and_kept(model, scene)
     assert found is not None and found[1] is not pair[1]
+
+
+# ---------------------------------------------------------------------- what is read, thing by thing
+def role_model() -> Parts:
+    """Modes with roles; a copy."""
+    return copy.deepcopy(line_model()._parts)
+
+
+def lawful_model() -> Parts:
+    """Laws that govern; a copy."""
+    return copy.deepcopy(room_model("auto")._parts)
+
+
+def part_of(parts: Parts) -> PropertyModel:
+    """A target of several modes, some of which have roles."""
+    return next(m for m in parts.models.values() if m.casting.classifiers and len(m.classifier.modes) > 1)
+
+
+def another_mode(part: PropertyModel) -> None:
+    """The same function, refitted: another record."""
+    cluster = next(iter(part.clusterer.clusters.values()))
+    cluster.mode = replace(cluster.mode, sigma=0.5)
+
+
+def renumbered(part: PropertyModel) -> None:
+    clusters = part.clusterer.clusters
+    number = max(clusters)
+    clusters[number + 1] = clusters.pop(number)
+
+
+def relearned(part: PropertyModel) -> None:
+    pair = next(iter(part.classifier._pairs.values()))
+    pair.classifier = copy.copy(pair.classifier)
+
+
+def seen_more(part: PropertyModel) -> None:
+    part.classifier._familiarity().seen.add(-12345)
+
+
+def cast_anew(part: PropertyModel) -> None:
+    cast = next(iter(part.casting.classifiers.values()))
+    cast.descriptions[0].definition = Definition(())
+
+
+def less_in_common(part: PropertyModel) -> None:
+    cast = next(iter(part.casting.classifiers.values()))
+    described = cast.descriptions[0]
+    assert described.common is not None
+    described.common = np.zeros_like(described.common) if described.common.any() else ~described.common
+
+
+def cast_wrongly(part: PropertyModel) -> None:
+    cast = next(iter(part.casting.classifiers.values()))
+    cast.errors = 0.0 if cast.errors else 1.0
+
+
+def set_(name: str, value: Callable[[], object]) -> Callable[[PropertyModel], None]:
+    return lambda part: setattr(part, name, value())
+
+
+OTHERWISE: dict[str, Callable[[PropertyModel], None]] = {
+    "a mode": another_mode,
+    "an id": renumbered,
+    "limits": set_("limits", Limits),
+    "stops": set_("stops", Stops),
+    "spreads": set_("spreads", Spreads),
+    "surmise": lambda part: setattr(part, "surmise", not part.surmise),
+    "approximate": lambda part: setattr(part.clusterer.population, "approximate", True),
+    "scope": lambda part: setattr(part.fallback, "scope", copy.copy(part.fallback.scope)),
+    "a pair": relearned,
+    "a situation": seen_more,
+    "a role": cast_anew,
+    "what players share": less_in_common,
+    "how roles are bound": cast_wrongly,
+}
+
+
+@pytest.mark.parametrize("name", sorted(OTHERWISE))
+def test_whatever_is_said_otherwise_is_noticed(name: str) -> None:
+    parts = role_model()
+    known = Grounds.of(parts)
+    assert known.same(Grounds.of(parts))
+    OTHERWISE[name](part_of(parts))
+    assert not known.same(Grounds.of(parts))
+
+
+def test_votes_are_followed_without_lowering_anew() -> None:
+    parts = role_model()
+    known = Grounds.of(parts)
+    for pair in part_of(parts).classifier._pairs.values():
+        pair.classifier.count(0, True)
+        pair.contradictions += 1.0
+    assert known.same(Grounds.of(parts))
+
+
+LAWS: dict[str, Callable[[Parts], None]] = {
+    "pairs": lambda parts: setattr(book(parts), "pair", replace(book(parts).pair, bits=1.0)),  # type: ignore[type-var]
+    "inertia": lambda parts: setattr(book(parts), "inertia", Inertia()),
+    "free": lambda parts: book(parts).free.update(
+        {k: replace(v, bits=1.0) for k, v in book(parts).free.items()}
+    ),
+    "shares": lambda parts: book(parts).shares.update({("a", "b"): Share()}),
+    "tolerance": lambda parts: setattr(book(parts), "tolerance", 0.5),
+    "who is governed": lambda parts: setattr(parts.laws, "governed", frozenset()),
+}
+
+
+def book(parts: Parts):  # type: ignore[no-untyped-def]
+    assert parts.laws is not None
+    return parts.laws.learner.book
+
+
+@pytest.mark.parametrize("name", sorted(LAWS))
+def test_another_law_is_noticed(name: str) -> None:
+    parts = lawful_model()
+    known = Grounds.of(parts)
+    assert known.same(Grounds.of(parts))
+    LAWS[name](parts)
+    assert not known.same(Grounds.of(parts))
+
+
+def test_where_laws_govern_votes_are_not_read() -> None:
+    parts = lawful_model()
+    known = Grounds.of(parts)
+    (governed, *_) = [m for t, m in parts.models.items() if parts.governs(t)]
+    governed.latest = 99
+    assert known.same(Grounds.of(parts))

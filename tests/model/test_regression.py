@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from points import schema_of, transitions
 
 from relgym.model.fitting import compare_and_learn
@@ -91,3 +94,80 @@ def test_what_no_law_explains_is_predicted_by_them_and_not_claimed() -> None:
     assert error < 0.5 * np.sqrt(np.square(now - came).mean())
     inside = np.mean([abs(p.value - y) <= p.interval for p, y in zip(parts, came, strict=True)])
     assert inside > 0.85
+
+
+@pytest.mark.parametrize("wild", [1e30, 1e140, 1e155, 1e200, 1.7e308, -1.7e308])
+def test_of_a_gross_error_nothing_is_said_or_what_was_seen(wild: float) -> None:
+    """No number beyond what changes were, no overflow, and no other row's values change for it."""
+    found, rng = taught(150), np.random.default_rng(7)
+    calm = rng.normal(size=(12, len(SIGNATURE.columns)))
+    before = found.values(SIGNATURE, calm)
+    least, most = found._range
+    slack = 0.5 * (most - least)
+    for column in range(len(SIGNATURE.columns)):
+        rows = calm.copy()
+        rows[5, column] = wild
+        said = found.values(SIGNATURE, rows)
+        assert before is not None and said is not None
+        told = said[5][~np.isnan(said[5])]
+        assert ((told >= np.min(least - slack)) & (told <= np.max(most + slack))).all()
+        others = np.arange(12) != 5
+        assert said[others].tobytes() == before[others].tobytes()
+
+
+@pytest.mark.parametrize("wild", [1e155, 1e300])
+def test_a_gross_error_that_is_learned_leaves_what_is_known_as_it_is(wild: float) -> None:
+    """Its squares would be infinite, and so would be what is summed from then on."""
+    hit, calm = taught(150), taught(150)
+    rows = np.random.default_rng(7).normal(size=(100, len(SIGNATURE.columns)))
+    for k, row in enumerate(rows):
+        if k == 3:
+            hit.learn_one(SIGNATURE, np.full(len(row), wild), {"x": 0.0, "y": 0.0})
+        for each in (hit, calm):
+            each.learn_one(SIGNATURE, row, {"x": row[0], "y": row[1]})
+    said = [each.values(SIGNATURE, rows) for each in (hit, calm)]
+    assert said[0] is not None and said[1] is not None
+    assert said[0].tobytes() == said[1].tobytes()
+    assert all(np.isfinite(array).all() for array in hit.to_arrays().values())
+
+
+@given(st.integers(FIRST, 130), st.integers(0, 2**32 - 1))
+def test_sums_say_what_values_say(n: int, seed: int) -> None:
+    """Columns, centres, scales, weights and bounds are all that kernels read."""
+    found = taught(n, seed=seed % 7)
+    rows = 3.0 * np.random.default_rng(seed).normal(size=(4, len(SIGNATURE.columns)))
+    said = found.values(SIGNATURE, rows)
+    assert said is not None
+    for k, target in enumerate(found.targets):
+        told = found.sums(SIGNATURE, target)
+        assert told is not None
+        places, centre, scale, weights, (least, most) = told
+        for row, expected in zip(rows, said, strict=True):
+            z = [(row[p] - c) / s for p, c, s in zip(places, centre, scale, strict=True)]
+            products = [a * b for i, a in enumerate(z) for b in z[i:]]
+            for kind, columns in enumerate(([1.0, *z], [1.0, *z, *products])):
+                value = sum(w * c for w, c in zip(weights[kind], columns, strict=True))
+                assert min(max(value, least), most) == pytest.approx(expected[kind, k], rel=1e-9, abs=1e-9)
+
+
+def test_bounds_are_half_a_range_beyond_what_was_seen() -> None:
+    found = taught(100)
+    least, most = found._range[:, 1]
+    told = found.sums(SIGNATURE, "y")
+    assert told is not None
+    assert told[4] == pytest.approx((1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
+    far = np.zeros((2, len(SIGNATURE.columns)))
+    far[:, SIGNATURE.column(0, "y")] = -1e3, 1e3
+    said = found.values(SIGNATURE, far)
+    assert said is not None
+    assert said[:, 0, 1].tolist() == list(told[4])
+
+
+def test_of_other_columns_nothing_is_said() -> None:
+    other = WorldModel(schema_of(("x",), ("a",)))._parts.signature_of(("self", "action"))
+    found = taught(100)
+    assert found.values(other, np.zeros((1, len(other.columns)))) is None
+    assert found.sums(other, "x") is None
+    seen = found.seen
+    found.learn_one(other, np.zeros(len(other.columns)), {"x": 1.0})
+    assert found.seen == seen

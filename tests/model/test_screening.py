@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relgym.model.screening import ALIKE, FACTOR, RUN, Screen
+from relgym.model.fitting import compare_and_learn
+from relgym.model.screening import ALIKE, FACTOR, GENEROUS, MOST, RUN, START, Screen
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
@@ -94,6 +96,97 @@ def test_plain_data_bring_it_back() -> None:
     both.absorb(screen)
     assert both.set_aside == 1
     assert not admits(both, 1e4)
+
+
+def seen(*scenes: tuple[float, float]) -> Screen:
+    """A screen that took in transitions between equal scenes."""
+    screen = Screen()
+    for x, v in scenes:
+        screen.admits(layout(), np.array([x, v]), np.array([x, v]))
+    return screen
+
+
+def limits(screen: Screen) -> list[float]:
+    """Largest x and v that are admitted."""
+    places = screen._places(layout())
+    return screen._limit()[places].tolist()
+
+
+def test_limits_by_hand() -> None:
+    # The fifth largest of each property counts, where a scene that stays is seen before and after its step.
+    assert limits(Screen()) == [GENEROUS] * 2
+    assert (
+        limits(seen((2.0, 0.5), (3.0, 0.0), (4.0, 0.25))) == [GENEROUS * 2.0] * 2
+    )  # 2 2 3 3 4 4: the fifth is 2
+    screen = seen(*[(4.0, 0.5)] * START)
+    # The median of 4 and 0.5 is 2.25, and v is allowed as much as a property usually is.
+    assert limits(screen) == [FACTOR * 4.0, FACTOR * 2.25]
+    still = seen(*[(4.0, 0.0)] * START)
+    assert limits(still) == [FACTOR * 4.0] * 2  # never moved: the largest of all others stands in
+    assert limits(seen(*[(0.0, 0.0)] * START)) == [GENEROUS] * 2
+    assert limits(seen(*[(1e-3, 1e-4)] * (START - 1))) == [GENEROUS] * 2  # of the first scenes 1 is the least
+
+
+def test_at_the_limit_a_number_is_admitted_and_beyond_it_not() -> None:
+    screen = seen(*[(4.0, 4.0)] * START)
+    at = FACTOR * 4.0
+    assert screen.plausible(layout(), np.array([at, -at]))
+    assert not screen.plausible(layout(), np.array([np.nextafter(at, np.inf), 0.0]))
+    assert not screen.plausible(layout(), np.array([0.0, -np.nextafter(at, np.inf)]))
+    assert not screen.plausible(layout(), np.array([np.nan, 0.0]))
+    assert screen.to_json() == seen(*[(4.0, 4.0)] * START).to_json()  # it took note of nothing
+
+
+def test_equal_numbers_are_believed_the_fifth_time_though_others_come_between() -> None:
+    screen = seen(*[(4.0, 4.0)] * START)
+    taken = []
+    for k in range(6):
+        taken.append(screen.admits(layout(), np.array([4.0, 4.0]), np.array([4.0, 1e4])))
+        screen.admits(layout(), np.array([4.0, 4.0]), np.array([4.0 + k, 4.0]))
+    assert taken == [False] * 4 + [True] * 2
+    assert screen.set_aside == 4
+    assert limits(screen)[1] == FACTOR * 1e4
+
+
+def test_the_run_is_broken_by_what_is_plain() -> None:
+    screen = seen(*[(4.0, 4.0)] * START)
+    taken = []
+    for k in range(3 * RUN):
+        taken.append(screen.admits(layout(), np.array([4.0, 4.0]), np.array([1e4 * 5.0**k, 4.0])))
+        if k % (RUN - 1) == RUN - 2:
+            assert screen.admits(layout(), np.array([4.0, 4.0]), np.array([4.0, 4.0]))
+    assert not any(taken)
+
+
+def test_what_two_screens_know_is_the_largest_of_both() -> None:
+    one, other = seen(*[(4.0, 1.0)] * 10), seen(*[(2.0, 3.0)] * 10)
+    other.set_aside = 3
+    one.absorb(other)
+    assert limits(one) == [FACTOR * 4.0, FACTOR * 3.5]  # at least the median of 4 and 3
+    assert one.set_aside == 3
+
+
+def test_another_scale_however_large_is_learned_and_saved(tmp_path: Path) -> None:
+    """What is believed doesn't overflow, nor make a file that can't be read."""
+    model, rng = WorldModel(SCHEMA), np.random.default_rng(2)
+    for k in range(90):
+        size = 1.0 if k < 60 else 1e70
+        x, v, noise = size * rng.normal(size=3)
+        now = scene(x, v)
+        compare_and_learn(
+            model, Transition(now, scene(x + np.tanh(v / size) * size, noise)), model.predict_one(now)
+        )
+    assert model.set_aside == RUN - 1
+    model.save(tmp_path / "model.relgym", history=True)
+    again = WorldModel.load(tmp_path / "model.relgym")
+    asked = scene(0.3e70, -0.2e70)
+    assert again.predict_one(asked).scene == model.predict_one(asked).scene
+
+
+def test_the_largest_that_may_come_can_be_squared_twice() -> None:
+    rows = np.full((4_000, 2), MOST)
+    with np.errstate(all="raise"):
+        assert np.isfinite(np.square((rows[:, 0] * rows[:, 1]).sum()))
 
 
 def stream(steps: int) -> list[Transition]:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import gymnasium as gym
 import pytest
 
-import relgym
+from relgym.experiments.body_worlds import Setting, body_rooms
 from relgym.model.files.archive import parts_to_arrays, parts_to_json
 from relgym.model.fitting import compare_and_learn
 from relgym.model.motion import Laws
 from relgym.model.prequential import compared
 from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Scene, Transition
 from relgym.wrappers import ModelLearner
 
 
 @pytest.fixture(scope="module")
-def stream() -> list[relgym.Transition]:  # type: ignore[name-defined]
+def stream() -> list[Transition]:
     learner = ModelLearner(gym.make("relgym/BallBoxRamp-v0"), predict=False)
     learner.reset(seed=3)
     found = []
@@ -34,7 +37,19 @@ def written(model: WorldModel) -> tuple[object, dict[str, bytes]]:
     return parts_to_json(model._parts, history=True), flat
 
 
-def test_taking_up_is_looking_back_and_learning(stream: list, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[type-arg]
+@pytest.fixture(scope="module")
+def boxes() -> list[Transition]:
+    """Two boxes and a disc that turn, pushed about."""
+    (room,) = body_rooms(Setting(("box", "box"), friction=0.5), 1, seed=1)
+    scenes = [Scene(room.schema, room.layout, vector) for vector in room.vectors[:40]]
+    return [Transition(before, after) for before, after in pairwise(scenes)]
+
+
+@pytest.mark.parametrize(("name", "share"), [("stream", 0.4), ("boxes", 0.1)])
+def test_taking_up_is_looking_back_and_learning(
+    name: str, share: float, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stream = request.getfixturevalue(name)
     confirmed = 0
     whole = Laws._confirmed
 
@@ -52,5 +67,5 @@ def test_taking_up_is_looking_back_and_learning(stream: list, monkeypatch: pytes
         compare_and_learn(quick, transition, said)
         slow.look_back(studied, compared(studied, transition.after)[0])
         slow.learn_one(transition)
-    assert confirmed > 0.4 * len(stream)
+    assert confirmed > share * len(stream)
     assert written(quick) == written(slow)

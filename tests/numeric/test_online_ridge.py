@@ -5,7 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import pytest
 
+from relgym.config.constants import SUMMABLE
 from relgym.numeric.online_ridge import GROWTH, PENALTY, OnlineRidge
 
 
@@ -81,3 +83,39 @@ def test_what_was_saved_learns_on_to_the_bit() -> None:
         ridge.add(one, response)
         again.add(one, response)
     assert ridge.predict(x).tobytes() == again.predict(x).tobytes()
+
+
+def test_weights_by_hand() -> None:
+    """x = 0, 2 has mean 1 and spread 1, y = 1, 5 a slope of 2; of four rows the penalty of one takes a fifth."""
+    ridge = OnlineRidge(1)
+    for x, y in ((0.0, 1.0), (2.0, 5.0), (0.0, 1.0), (2.0, 5.0)):
+        ridge.add(np.array([x]), np.array([y]))
+    assert (ridge.rows, ridge.due, ridge.columns) == (4, 5, 1)
+    np.testing.assert_allclose(ridge.weights, [[3.0 - 1.6, 1.6]], rtol=1e-15)
+    np.testing.assert_allclose(ridge.predict(np.array([[1.0], [11.0]])), [[3.0], [19.0]], rtol=1e-15)
+
+
+@pytest.mark.parametrize("wild", [1.1 * SUMMABLE, 1e300, np.inf, -np.inf, np.nan])
+@pytest.mark.parametrize("where", ["column", "response"])
+def test_a_row_whose_sums_would_overflow_is_left_out(wild: float, where: str) -> None:
+    x, y = rows(60)
+    calm, hit = OnlineRidge(3), OnlineRidge(3)
+    for k, (one, response) in enumerate(zip(x, y, strict=True)):
+        calm.add(one, response)
+        hit.add(one, response)
+        if k == 30:
+            bad = (
+                (np.array([0.0, wild, 0.0]), response) if where == "column" else (one, np.array([0.0, wild]))
+            )
+            hit.add(*bad)
+    assert hit.rows == calm.rows == 60
+    assert hit.predict(x).tobytes() == calm.predict(x).tobytes()
+
+
+def test_the_largest_numbers_that_are_taken_give_finite_weights() -> None:
+    ridge, rng = OnlineRidge(2), np.random.default_rng(0)
+    for x in rng.uniform(-SUMMABLE, SUMMABLE, size=(50, 2)):
+        ridge.add(x, x[:1])
+    ridge.solve()
+    assert all(np.isfinite(array).all() for array in ridge.to_arrays().values())
+    np.testing.assert_allclose(ridge.weights[0, 1:], [1.0, 0.0], atol=0.1)

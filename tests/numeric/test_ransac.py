@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relgym.numeric.ransac import Consensus, consensus, draw_samples, refine
-from relgym.numeric.stepwise import LinearFit
+from relgym.numeric import ransac
+from relgym.numeric.ransac import (
+    Consensus,
+    _choose,
+    _choose_among_many,
+    _distinct,
+    consensus,
+    draw_samples,
+    refine,
+)
+from relgym.numeric.stepwise import LinearFit, least_squares
+from relgym.scheduling.work import Task
 
 SIGMA, TOLERANCE = 1e-13, 4e-13
 
@@ -147,3 +157,102 @@ def test_the_order_of_rows_decides_nothing_when_all_obey(seed: int, order: list[
     assert found is not None
     assert found.inliers.all()
     assert found.fit.columns == (1, 3)
+
+
+# ---------------------------------------------------------------------- in pieces
+@settings(max_examples=50)
+@given(
+    st.integers(1, 120),
+    st.integers(1, 8),
+    st.integers(1, 90),
+    st.sets(st.sampled_from(["strata", "apart", "anchors"])),
+    st.integers(0, 2**32 - 1),
+)
+def test_samples_drawn_in_pieces_are_those_drawn_whole(
+    n: int, size: int, draws: int, told: set[str], seed: int
+) -> None:
+    given_ = np.random.default_rng(seed)
+    strata = given_.integers(4, size=n)
+    arguments = {
+        "strata": strata,
+        "apart": np.abs(strata[:, None] - strata),
+        "anchors": given_.integers(n, size=3),
+    }
+    some = {name: arguments[name] for name in sorted(told)}
+    found, states, pieces = [], [], []
+    for drawn in (1, 10**9):  # sixteen samples at a time, and all of them
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(ransac, "DRAWN", drawn)
+            task = Task(draw_samples, n, size, draws, rng=np.random.default_rng(seed), **some)
+            task.advance(10**12)
+        found.append(task.result)
+        states.append(task.rng.bit_generator.state)
+        pieces.append(task.pieces)
+    np.testing.assert_array_equal(*found)
+    assert states[0] == states[1]
+    assert pieces == [-(-draws // 16), 1]
+    assert found[0].shape == (draws, min(size, n))
+    assert all(len(set(row)) == len(row) for row in found[0].tolist())
+    if "anchors" in some:
+        anchors = set(arguments["anchors"].tolist())
+        assert all(anchors & set(row) for row in found[0].tolist())
+
+
+@pytest.mark.parametrize("columns", [6, 60])
+def test_samples_are_fitted_in_pieces_as_whole(columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(2)
+    x = rng.normal(size=(80, columns))
+    y = np.where(np.arange(80) < 60, 2.0 * x[:, 1] - x[:, 4], rng.normal(size=80))
+    found = []
+    for chunk in (1, 10**9):
+        monkeypatch.setattr(ransac, "CHUNK", chunk)
+        found.append(search(x, y, np.random.default_rng(0), draws=200))
+    assert found[0] is not None and found[1] is not None
+    assert found[0].fit == found[1].fit
+    np.testing.assert_array_equal(found[0].inliers, found[1].inliers)
+    assert found[0].fit.columns == (1, 4) and found[0].size == 60
+
+
+@settings(max_examples=40)
+@given(st.integers(1, 3), st.integers(0, 2**32 - 1))
+def test_among_many_columns_samples_choose_what_they_choose_among_few(terms: int, seed: int) -> None:
+    """Sums in another order: the columns that are chosen explain all of it either way."""
+    rng = np.random.default_rng(seed)
+    a = rng.normal(size=(20, 12, 50))
+    a -= a.mean(axis=1, keepdims=True)
+    picked = np.array([rng.choice(50, terms, replace=False) for _ in range(20)])
+    weights = rng.uniform(0.5, 2.0, size=(20, terms)) * rng.choice([-1.0, 1.0], size=(20, terms))
+    y = (np.take_along_axis(a, picked[:, None, :], axis=2) * weights[:, None]).sum(axis=2)
+    told = [choose(a.copy(), y.copy(), terms, 1e-9, 1e-16) for choose in (_choose, _choose_among_many)]
+    np.testing.assert_array_equal(told[0][0], told[1][0])
+    np.testing.assert_allclose(told[0][1], told[1][1], rtol=1e-6, atol=1e-20)
+    for (columns, left), sample in ((each, k) for each in told for k in range(20)):
+        fit = least_squares(a[sample], y[sample], tuple(sorted(columns[sample].tolist())))
+        np.testing.assert_allclose(
+            left[sample], np.square(y[sample] - fit.predict(a[sample])).sum(), atol=1e-9
+        )
+
+
+def test_a_verified_sample_stops_choosing() -> None:
+    """The third sample is a constant, the second one column's, the first one obeys nothing."""
+    a = np.array([[-1.0, 0.0, 1.0, 0.0], [1.0, -1.0, 1.0, -1.0]]).T[None].repeat(3, axis=0)
+    a -= a.mean(axis=1, keepdims=True)
+    y = np.array([[1.0, 5.0, -2.0, 0.5], [2.0, -2.0, 2.0, -2.0], [0.0, 0.0, 0.0, 0.0]])
+    y -= y.mean(axis=1, keepdims=True)
+    chosen, left = _choose(a.copy(), y, 1, 1e-9, 1e-12)
+    assert chosen[1:].tolist() == [[1], [-1]]
+    assert chosen[0, 0] >= 0 and left[0] > 1.0
+    assert left[1:] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_of_the_same_columns_few_samples_are_tried() -> None:
+    """Fewest terms first, and what isn't verified not at all."""
+    samples = np.arange(20)[:, None]
+    chosen = np.array([[-2, 5]] * 3 + [[4, 2]] * 8 + [[1, -1]] * 7 + [[-1, -1]] * 2)
+    kept = [(int(sample[0]), columns) for sample, columns in _distinct(samples, chosen, 99)]
+    assert kept == [
+        *((k, []) for k in (18, 19)),
+        *((k, [1]) for k in range(11, 17)),
+        *((k, [2, 4]) for k in range(3, 9)),
+    ]
+    assert [int(sample[0]) for sample, _ in _distinct(samples, chosen, 3)] == [18, 19, 11]

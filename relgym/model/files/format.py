@@ -430,7 +430,10 @@ class HindsightRecord(Record):
 Expert: TypeAlias = Annotated[
     int, Meta(ge=0, description="who gave a value, as a place among all experts: six, and hypotheses")
 ]
-Bin: TypeAlias = Annotated[int, Meta(ge=-(2**14), le=4 * 1022, description="quarter octaves of a size")]
+Squares: TypeAlias = Annotated[
+    float, Meta(ge=0.0, le=1e304, description="a sum of squares of errors, each of 1e150 at most")
+]
+Bin: TypeAlias = Annotated[int, Meta(ge=-(2**14), le=2**11, description="quarter octaves of a size")]
 Bins: TypeAlias = list[tuple[Bin, Weight]]
 Kind: TypeAlias = tuple[
     Annotated[int, Meta(ge=0, le=127, description="number of an outcome")],
@@ -454,7 +457,7 @@ class CellRecord(Record):
     speaker: Expert
     heard: Weight
     records: list[tuple[Expert, Weight, Weight, Whole, Bins, tuple[Weight, Weight, Weight, Weight]]]
-    squares: Annotated[list[tuple[Weight, Weight, Weight]], Meta(min_length=6)]
+    squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=6)]
 
 
 class CalibrationRecord(Record):
