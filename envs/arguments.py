@@ -37,6 +37,7 @@ __all__ = [
     "per_object",
     "physical_action",
     "refuse_vector_env",
+    "stepped",
     "takes",
 ]
 
@@ -173,6 +174,19 @@ def refuse_vector_env(env: Any) -> None:
             "expected a single env, got a vector env: let make_vec wrap each of its envs, "
             "gym.make_vec(id, num_envs=n, vectorization_mode='sync', wrappers=[...])"
         )
+
+
+def stepped(
+    env: gym.vector.VectorEnv[Any, Any, Any], actions: Any
+) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+    """A step of a vector env; `ActionError` where it fails for actions that are none of its space."""
+    try:
+        return env.step(actions)
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:
+        with suppress(TypeError, ValueError, AttributeError):
+            if env.action_space.contains(actions):
+                raise
+        raise ActionError(f"expected actions of {env.action_space}, got {reprlib.repr(actions)}") from error
 
 
 def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:

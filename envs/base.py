@@ -12,6 +12,7 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.envs.arguments import checked_action, checked_options
 from relgym.envs.flat import FlatSpec
 from relgym.envs.tasks import Task, TaskOutcome
@@ -192,6 +193,7 @@ class SceneEnv(gym.Env[Observation, Any]):
         vector.flags.writeable = False
         return EnvState(vector, self._hidden(), self.np_random.bit_generator.state, self._steps)
 
+    @refusing(ObservationError)
     def set_state(self, state: EnvState | Scene) -> Observation:
         """Continue from `state`: of this env or of another one with the same schema.
 

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
+from relgym.config.checks import checked_count
 from relgym.envs.tasks import Region
 from relgym.errors import ConfigError
 from relgym.scene.axes import Axes
@@ -79,6 +81,7 @@ class _Drawn:
     wheeled: bool = False
 
 
+@refusing(ConfigError)
 def render_scene(
     scene: Scene,
     *,
@@ -114,9 +117,10 @@ def render_scene(
     ConfigError
         pygame isn't installed.
     """
+    width, height = (checked_count("size", length, 1, 10**5) for length in size)
     pygame = _pygame()
     surface = _draw(
-        pygame, scene, size, view or scene_view(scene), marks, labels=labels, velocities=velocities
+        pygame, scene, (width, height), view or scene_view(scene), marks, labels=labels, velocities=velocities
     )
     return np.ascontiguousarray(np.transpose(pygame.surfarray.array3d(surface), (1, 0, 2)), dtype=np.uint8)
 

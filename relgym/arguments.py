@@ -31,10 +31,11 @@ from typing import (
 )
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relgym.errors import RelgymError
 
-__all__ = ["misfit", "refusing", "refusing_fields", "unfit", "whole"]
+__all__ = ["array_of", "misfit", "refusing", "refusing_calls", "refusing_fields", "unfit", "whole"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -79,6 +80,22 @@ def refusing(error: type[RelgymError]) -> Callable[[Callable[_P, _R]], Callable[
     return decorate
 
 
+def refusing_calls(error: type[RelgymError]) -> Callable[[_C], _C]:
+    """The same for a class: its constructor, if it has one of its own, and every public method that it defines."""
+
+    def decorate(kind: _C) -> _C:
+        for name, method in list(vars(kind).items()):
+            if name != "__init__" and name.startswith("_"):
+                continue
+            if isinstance(method, (classmethod, staticmethod)):
+                setattr(kind, name, type(method)(refusing(error)(method.__func__)))
+            elif inspect.isfunction(method):
+                setattr(kind, name, refusing(error)(method))
+        return kind
+
+    return decorate
+
+
 def refusing_fields(error: type[RelgymError], *, always: bool = False) -> Callable[[_C], _C]:
     """The same for a record: what its fields are given; `always`: also where it doesn't fail for it itself."""
 
@@ -113,6 +130,26 @@ def whole(what: str, value: Any, least: int, below: int, error: type[RelgymError
     if not _is_whole(value) or not least <= value < below:
         raise error(f"{what}={_shown(value)}: expected a whole number from {least} to {below - 1}")
     return int(value)
+
+
+def array_of(
+    what: str, value: Any, shape: tuple[int | None, ...], error: type[RelgymError]
+) -> NDArray[np.float64]:
+    """`value` as finite floats of some shape; None there: any length. `error` for anything else."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise error(f"{what}={_shown(value)}: expected an array of numbers") from None
+    fits = array.ndim == len(shape) and all(
+        n is None or n == m for n, m in zip(shape, array.shape, strict=True)
+    )
+    if not fits or not np.isfinite(array).all():
+        lengths = ", ".join("n" if n is None else str(n) for n in shape)
+        said = f"shape {array.shape}" if not fits else "some that aren't finite"
+        raise error(
+            f"{what}: expected finite numbers of shape ({lengths}{',' * (len(shape) == 1)}), got {said}"
+        )
+    return array
 
 
 def _diagnosis(function: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> str:

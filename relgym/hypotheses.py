@@ -26,6 +26,7 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
 from relgym.errors import ConfigError
 
 __all__ = [
@@ -106,6 +107,7 @@ class HypothesisClass(Protocol):
 _classes: dict[str, HypothesisClass] = {}
 
 
+@refusing(ConfigError)
 def register_hypothesis(kind: HypothesisClass) -> None:
     """Make a class of hypotheses available under its name; one of the same name is replaced.
 
@@ -130,6 +132,7 @@ def register_hypothesis(kind: HypothesisClass) -> None:
     _classes[kind.name] = kind
 
 
+@refusing(ConfigError)
 def registered(name: str) -> HypothesisClass:
     """The class of that name; `ConfigError` when there is none in this process."""
     if name not in _classes:
@@ -140,6 +143,7 @@ def registered(name: str) -> HypothesisClass:
     return _classes[name]
 
 
+@refusing(ConfigError)
 def code_length(errors: NDArray[np.float64], resolution: float, parameters: int = 0) -> float:
     """Bits that it takes to state errors, and the numbers of the law that made them.
 

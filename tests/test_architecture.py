@@ -30,7 +30,7 @@ MAY_IMPORT = {
     "config": frozenset({"errors", "arguments"}),
     "files": frozenset({"errors"}),
     "html": frozenset(),
-    "hypotheses": frozenset({"errors"}),
+    "hypotheses": frozenset({"errors", "arguments"}),
     "mixing": frozenset(),
     "scheduling": frozenset(),
     "scene": FOUNDATION,

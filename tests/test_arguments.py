@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from relgym.arguments import misfit, refusing, refusing_fields, unfit, whole
+from relgym.arguments import array_of, misfit, refusing, refusing_calls, refusing_fields, unfit, whole
 from relgym.errors import ConfigError, QueryError, SchemaError
 
 
@@ -124,3 +124,62 @@ def test_whole_numbers_within_limits() -> None:
     for bad in (4, -1, True, 2.0, None, "1"):
         with pytest.raises(QueryError, match="expected a whole number from 0 to 3"):
             whole("n", bad, 0, 4, QueryError)
+
+
+def test_every_public_call_of_a_class_refuses() -> None:
+    @refusing_calls(ConfigError)
+    class Share:
+        def __init__(self, whole: float) -> None:
+            self.whole = 1.0 / whole
+
+        def of(self, part: float) -> float:
+            return part * self.whole
+
+        @classmethod
+        def full(cls, size: float) -> Share:
+            return cls(size)
+
+        @staticmethod
+        def half(size: float) -> float:
+            return size / 2
+
+        def _own(self, part: float) -> float:
+            return part / self.whole
+
+    assert Share(4).of(2) == 0.5 and Share.full(2).of(1) == 0.5 and Share.half(3) == 1.5
+    bad: list[tuple[str, Callable[[], object]]] = [
+        ("whole='x'", lambda: Share("x")),  # type: ignore[arg-type]
+        ("part='x'", lambda: Share(4).of("x")),  # type: ignore[arg-type]
+        ("size='x'", lambda: Share.full("x")),  # type: ignore[arg-type]
+        ("size='x'", lambda: Share.half("x")),  # type: ignore[arg-type]
+    ]
+    for said, call in bad:
+        with pytest.raises(ConfigError, match=said):
+            call()
+    with pytest.raises(TypeError):  # nobody else's business
+        Share(4)._own("x")  # type: ignore[arg-type]
+    with pytest.raises(ZeroDivisionError):  # it fits, so that is a defect
+        Share(0)
+
+
+@pytest.mark.parametrize(
+    ("value", "shape"), [([1, 2], (2,)), ([[1.0], [2.0]], (None, 1)), (np.zeros((0, 3)), (None, 3)), (1, ())]
+)
+def test_arrays_of_a_shape(value: Any, shape: tuple[int | None, ...]) -> None:
+    found = array_of("x", value, shape, ConfigError)
+    assert found.dtype == np.float64 and found.shape == np.shape(value)
+
+
+@pytest.mark.parametrize(
+    ("value", "shape", "said"),
+    [
+        ("a", (1,), "an array of numbers"),
+        ([1, 2], (3,), r"shape \(3,\), got shape \(2,\)"),
+        ([1, 2], (None, 2), r"shape \(n, 2\), got shape \(2,\)"),
+        ([1, np.inf], (2,), "aren't finite"),
+        ([10**400], (1,), "an array of numbers"),
+    ],
+)
+def test_arrays_of_no_such_shape(value: Any, shape: tuple[int | None, ...], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        array_of("x", value, shape, ConfigError)

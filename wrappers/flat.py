@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from relgym.arguments import refusing
-from relgym.envs.arguments import refuse_vector_env
+from relgym.envs.arguments import refuse_vector_env, stepped
 from relgym.envs.flat import FlatSpec, Flattener
 from relgym.errors import ConfigError
 from relgym.scene.schema import SceneSchema
@@ -124,16 +124,17 @@ class VectorFlatView(gym.vector.VectorWrapper[Any, Any, Any, Any, Any], RecordCo
         self.single_observation_space = self.flattener.space
         self.observation_space = batch_space(self.flattener.space, self.num_envs)
 
+    @refusing(ConfigError)
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin episodes; flat observations, shape ``(num_envs, len(flattener.names))``."""
-        observations, infos = self.env.reset(seed=seed, options=options)
+        observations, infos = self.env.reset(seed=None if seed is None else int(seed), options=options)
         return self._flat(observations), infos
 
     def step(self, actions: Any) -> tuple[NDArray[np.float32], Any, Any, Any, dict[str, Any]]:
         """Step all envs; see `reset` for the observations."""
-        observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        observations, rewards, terminated, truncated, infos = stepped(self.env, actions)
         if "final_obs" in infos:
             final = np.full(self.num_envs, None, dtype=object)
             for k in np.flatnonzero(infos["_final_obs"]).tolist():

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.arguments import refusing
 from relgym.config import ModelConfig
+from relgym.envs.arguments import stepped
 from relgym.envs.model_files import made_how
 from relgym.errors import ConfigError
 from relgym.model.protocol import SceneLearner
@@ -100,13 +101,23 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
         )
 
     # ------------------------------------------------------------------ the Gymnasium contract
-    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    @refusing(ConfigError)
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes: in all envs, or in those of ``options["reset_mask"]``."""
+        given: Any = seed
+        if isinstance(given, np.integer):  # Gymnasium takes Python's own alone
+            given = int(given)
+        if isinstance(seed, Sequence) and len(seed) != self.num_envs:
+            raise ConfigError(
+                f"seed: expected a number, or one for each of {self.num_envs} envs, got {len(seed)}"
+            )
         mask = (options or {}).get("reset_mask")
         begun = range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist()
         for number in begun:
             self._observer.followers[number].forget()
-        observations, infos = self.env.reset(seed=seed, options=options)
+        observations, infos = self.env.reset(seed=given, options=options)
         seen = self._single(observations)
         self._observer.begin({k: (seen[k], info_at(infos, k)) for k in begun})
         return observations, infos
@@ -124,7 +135,7 @@ class VectorModelLearner(Learning, gym.vector.VectorWrapper[Any, Any, Any, Any, 
         """
         observer, count = self._observer, self.num_envs
         given = [readable(self.single_action_space, action) for action in self._actions(actions)]
-        observations, rewards, terminated, truncated, infos = self.env.step(actions)
+        observations, rewards, terminated, truncated, infos = stepped(self.env, actions)
         steps: dict[int, Step] = {}
         firsts: dict[int, First] = {}
         for k, seen in enumerate(self._single(observations)):

@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from relgym.arguments import refusing
 from relgym.envs.agents import AgentsSpace
 from relgym.envs.arguments import checked_action, checked_function
 from relgym.envs.model_files import made_how
@@ -39,6 +40,7 @@ ViewLike: TypeAlias = View | Mapping[str, Any] | Callable[[spaces.Space[Any], sp
 """A view, its JSON form, or a function of (observation space, action space) that makes one; ``None``: chosen."""
 
 
+@refusing(ConfigError)
 def view_of(
     env: gym.Env[Any, Any], given: ViewLike = None, *, reward: bool = False, terminated: bool = False
 ) -> View:

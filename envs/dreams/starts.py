@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from relgym.arguments import refusing
 from relgym.errors import ConfigError
 from relgym.scene.objects import Float1D, Float2D, Scene
 
@@ -37,7 +38,7 @@ class Drawn:
                 f"expected scenes, or an array of state vectors, got {given!r}; take env.scene, or "
                 "schema.scene(observation)"
             )
-        if not len(scenes) or (isinstance(scenes, np.ndarray) and scenes.ndim != 2):
+        if (isinstance(scenes, np.ndarray) and scenes.ndim != 2) or not len(scenes):
             came = f"an array of shape {scenes.shape}" if isinstance(scenes, np.ndarray) else "none"
             raise ConfigError(f"expected some scenes with the same objects, got {came}")
         self._scenes = scenes
@@ -61,6 +62,7 @@ class Drawn:
         return drawn
 
 
+@refusing(ConfigError)
 def drawn_from(scenes: Sequence[Scene] | Float2D) -> BatchStart:
     """First scenes for `LearnedModelVectorEnv`, drawn uniformly from scenes with the same objects.
 

@@ -284,6 +284,8 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
     # ------------------------------------------------------------------ beginning
     def _first(self, rows: _Rows, seed: int | None, options: Mapping[str, Any]) -> Float2D:
         """State vectors of first scenes for some of the dreams."""
+        if seed is not None:
+            checked_count("seed", seed, 0, 2**62)
         place, count = self._setting, len(rows)
         if "scene" in options or "scenes" in options or self._start is not None or place.world is None:
             check_options(options, ("reset_mask", "scene", "scenes"))

@@ -104,8 +104,15 @@ class Acts:
 
     def values_batch(self, actions: Any) -> Float2D:
         """`values` of n actions, shape ``(n, len(properties))``; the same bits."""
-        numbers = np.asarray(actions, dtype=np.float64)
-        numbers = numbers.reshape(len(numbers), -1)
+        try:
+            numbers = np.asarray(actions, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise ActionError(f"expected the numbers of actions, got {actions!r}") from None
+        if numbers.ndim < 1 or numbers[:1].size != len(self._starts) * min(1, len(numbers)):
+            raise ActionError(
+                f"expected actions of {self.space} along a first axis, got shape {numbers.shape}"
+            )
+        numbers = numbers.reshape(len(numbers), len(self._starts))
         choices = [numbers[:, [k]] - self._starts[k] == np.arange(self._counts[k]) for k in self._indicated]
         return np.concatenate([numbers, *choices], axis=1)
 

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from gymnasium import spaces
 
-from relgym.arguments import refusing
+from relgym.arguments import refusing, refusing_calls
 from relgym.envs.actions import acting, check_action_space
 from relgym.envs.views.acts import Acts
 from relgym.errors import ConfigError, ObservationError
@@ -21,6 +21,7 @@ Seen: TypeAlias = Mapping[str, Any]
 """Objects by name: a property vector, ``{property: value}``, either with the type's name before it, or ``None``."""
 
 
+@refusing_calls(ConfigError)
 class FunctionView:
     """Objects as a function of observation and info says.
 

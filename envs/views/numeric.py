@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from relgym.arguments import refusing
+from relgym.arguments import array_of, refusing, refusing_calls
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
 from relgym.envs.views.angles import candidates, circular, decoded, disjoint, on_circle
@@ -23,6 +23,7 @@ from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
 __all__ = ["NumbersView"]
 
 
+@refusing_calls(ConfigError)
 class NumbersView:
     """Numbers as properties of objects without bodies, or with them where the user says so.
 
@@ -208,6 +209,7 @@ class NumbersView:
     def observations(self, layout: SceneLayout, vectors: Float2D) -> tuple[Any, NDArray[np.bool_]]:
         """`observation` of n scenes, batched, and which lie in the observation space: see `View`."""
         how, width = self._how, self._numbers.width
+        vectors = array_of("vectors", vectors, (None, layout.width), ObservationError)
         columns = np.concatenate(
             [np.arange(layout.width)[layout.slice(layout.index(name))] for name in how.layout.names]
         )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from relgym.arguments import refusing_fields
+from relgym.arguments import refusing, refusing_fields
 from relgym.errors import ConfigError
 from relgym.model.files.storage import shape_from_json, shape_to_json
 from relgym.scene.objects import ObjectType
@@ -166,6 +166,7 @@ class Angle:
     sin: str
     name: str | None = None
 
+    @refusing(ConfigError)
     def named(self, prop: str) -> str:
         """Name of the angle of an object that calls the cosine `prop`."""
         if self.name is not None:

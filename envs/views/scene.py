@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from relgym.arguments import refusing
+from relgym.arguments import refusing, refusing_calls
 from relgym.envs.actions import acting, check_action_space
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.base import as_shown, precision_of
@@ -21,6 +21,7 @@ from relgym.scene.schema import SceneSchema
 __all__ = ["SceneView"]
 
 
+@refusing_calls(ConfigError)
 class SceneView:
     """`Dict` observations, object name -> property vector, of a schema that the env has.
 

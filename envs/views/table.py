@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from relgym.arguments import refusing
+from relgym.arguments import refusing, refusing_calls
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
 from relgym.envs.views.base import as_shown, precision_of
@@ -22,6 +22,7 @@ from relgym.scene.schema import SceneSchema
 __all__ = ["TableView"]
 
 
+@refusing_calls(ConfigError)
 class TableView:
     """Rows of a table as objects, with bodies where the user says which columns are pose and size.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from relgym.arguments import refusing
+from relgym.arguments import refusing, refusing_calls
 from relgym.envs.views.base import View
 from relgym.envs.views.numeric import NumbersView
 from relgym.errors import ConfigError, ObservationError
@@ -21,6 +21,7 @@ REWARD = "reward"
 """Property of `task`: the reward of the step, in the env's units."""
 
 
+@refusing_calls(ConfigError)
 class TaskView:
     """Another view, whose scenes also say what a step brought.
 
@@ -115,7 +116,9 @@ class TaskView:
         ObservationError
             The reward is no finite number, and it is shown.
         """
-        brought = {TERMINATED: float(terminated)}
+        if not isinstance(terminated, (bool, np.bool_, int, float)):
+            raise ConfigError(f"terminated={terminated!r}: expected True or False")
+        brought = {TERMINATED: float(bool(terminated))}
         if REWARD in self._names:  # else it may be whatever the env likes
             brought[REWARD] = _number(reward)
         return self._with(self._bare(scene), [brought[name] for name in self._names])

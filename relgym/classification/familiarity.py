@@ -103,7 +103,8 @@ def _alike(view: View, used: Used) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     columns = sorted({column for _, relations, _ in used for column in relations})
     unary = sorted({column for _, _, columns in used for column in columns})
     shown = (view.approached, view.close, view.exists, view.table[:, columns], view.unary[:, unary])
-    bits = np.packbits(np.concatenate([part.reshape(len(view), -1) for part in shown], axis=1), axis=1)
+    flat = [part.reshape(len(view), int(np.prod(part.shape[1:]))) for part in shown]  # of none, too
+    bits = np.packbits(np.concatenate(flat, axis=1), axis=1)
     whole = np.concatenate([bits, view.target[:, None].view(np.uint8)], axis=1)
     # As strings, of equal length, rows are sorted fast.
     _, first, which = np.unique(whole.view(f"S{whole.shape[1]}"), return_index=True, return_inverse=True)

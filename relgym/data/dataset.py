@@ -15,7 +15,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from relgym.config.checks import checked_count
+from relgym.arguments import refusing_calls, whole
+from relgym.envs.arguments import checked_count, checked_function
 from relgym.errors import ConfigError, DataError
 from relgym.model.fitting import ends_of
 from relgym.scene.schema import SceneSchema
@@ -27,6 +28,7 @@ Policy: TypeAlias = Callable[[Any], Any]
 """Action by observation."""
 
 
+@refusing_calls(DataError)
 @dataclass(frozen=True, slots=True)
 class Episode:
     """One episode, or the part of it that was recorded.
@@ -74,17 +76,20 @@ class Episode:
 
     def info(self, k: int) -> Mapping[str, Any]:
         """What came with the k-th observation."""
-        return {} if self.infos is None else self.infos[k]
+        return {} if self.infos is None else self.infos[whole("k", k, 0, len(self.infos), DataError)]
 
     def reward(self, k: int) -> Any:
         """What the k-th step was paid; NaN where it isn't known."""
-        return math.nan if self.rewards is None else self.rewards[k]
+        return (
+            math.nan if self.rewards is None else self.rewards[whole("k", k, 0, len(self.rewards), DataError)]
+        )
 
     def terminates(self, k: int) -> bool:
         """Whether the k-th step ended the episode for good."""
         return self.terminated and k == len(self) - 1
 
 
+@refusing_calls(DataError)
 class Dataset:
     """Episodes of an env; what `relgym.fit`, `relgym.progressive` and `relgym.score` read.
 
@@ -310,6 +315,7 @@ class Dataset:
             Of the first episode, and of random actions.
         """
         checked_count("steps", steps, 1, 10**9)
+        checked_function("policy", policy, "observation")
         if seed is not None:
             env.action_space.seed(seed)
         episodes: list[Episode] = []
@@ -469,8 +475,15 @@ def _check_lengths(lengths: Mapping[Any, int], what: str) -> None:
 
 
 def _rewards(given: Any) -> list[Any]:
-    array = np.asarray(given)
-    if array.dtype.kind not in "biuf" or array.shape not in ((len(array),), (len(array), 1)):
+    try:
+        array = np.asarray(given)
+    except ValueError:  # ragged
+        raise DataError(f"rewards: expected a number for each step, got {given!r}") from None
+    if (
+        array.dtype.kind not in "biuf"
+        or not array.ndim
+        or array.shape not in ((len(array),), (len(array), 1))
+    ):
         raise DataError(
             f"rewards: expected a number for each step, got shape {array.shape}, dtype {array.dtype}"
         )

@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium as gym
 
+from relgym.arguments import refusing, refusing_calls
 from relgym.config import ModelConfig
 from relgym.config.checks import checked_count
 from relgym.data.dataset import Dataset, Episode
@@ -27,6 +28,7 @@ from relgym.wrappers.views import ViewLike, chosen_view, readable
 __all__ = ["DataLearner", "fit", "progressive", "score"]
 
 
+@refusing_calls(ConfigError)
 class DataLearner(Learning):
     """Goes through recorded episodes as `ModelLearner` goes through an env: predict, compare, learn.
 
@@ -132,6 +134,7 @@ class DataLearner(Learning):
         return self
 
 
+@refusing(ConfigError)
 def fit(
     data: Any,
     *,
@@ -194,6 +197,7 @@ def fit(
     return learner.run().model
 
 
+@refusing(ConfigError)
 def progressive(
     data: Any,
     *,
@@ -241,6 +245,7 @@ def progressive(
     return _progress(learner, every)
 
 
+@refusing(ConfigError)
 def score(
     model: WorldModel,
     data: Any,

@@ -21,11 +21,17 @@ WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "cart": ("CartPole-v1", {}),
     "lander": ("LunarLander-v3", {}),
 }
-"""Id and configuration of each world."""
+"""Id and arguments of each world."""
 
 
 def soak(
-    name: str, steps: int, *, every: int, hours: float = float("inf"), seed: int = 0
+    name: str,
+    steps: int,
+    *,
+    every: int,
+    hours: float = float("inf"),
+    seed: int = 0,
+    history: int | None = None,
 ) -> list[list[float]]:
     """Learn from random steps of a world, and print a line now and then.
 
@@ -39,13 +45,15 @@ def soak(
         Transitions from one line to the next.
     seed
         Of the env and its actions.
+    history
+        Examples kept per type (`ModelConfig.history`), from which number on memory is to be flat; None: the default.
 
     Returns
     -------
     A row per line: transitions, hours, memory in MB, mean and worst step in ms of processor time since the last line.
     """
-    env_id, config = WORLDS[name]
-    env = ModelLearner(gym.make(env_id), config=config)
+    env_id, arguments = WORLDS[name]
+    env = ModelLearner(gym.make(env_id, **arguments), config={} if history is None else {"history": history})
     env.action_space.seed(seed)
     env.reset(seed=seed)
     begin, rows, spent, worst = time.monotonic(), list[list[float]](), 0.0, 0.0
@@ -89,9 +97,10 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=1_000_000)
     parser.add_argument("--every", type=int, default=10_000)
     parser.add_argument("--hours", type=float, default=float("inf"))
+    parser.add_argument("--history", type=int, help="examples kept per type; default: the learner's")
     given = parser.parse_args()
     for name in given.worlds:
-        soak(name, given.steps, every=given.every, hours=given.hours)
+        soak(name, given.steps, every=given.every, hours=given.hours, history=given.history)
 
 
 if __name__ == "__main__":

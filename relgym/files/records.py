@@ -113,7 +113,7 @@ def checked(data: Any, kind: Any, what: str, *, error: type[RelgymError] = Model
     """
     try:
         return msgspec.convert(data, kind)
-    except (msgspec.ValidationError, RecursionError) as problem:
+    except (msgspec.ValidationError, RecursionError, UnicodeEncodeError) as problem:
         said = "it is nested too deep" if isinstance(problem, RecursionError) else str(problem)
         raise error(
             f"{what} isn't as the format says ({said}): it was damaged or made by another program; save it again"

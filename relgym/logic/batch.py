@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from relgym.arguments import refusing
 from relgym.errors import ConfigError
 from relgym.logic.clause import ANY, Clause, Definition, Literal
 from relgym.logic.facts import Bool, Facts, Float, Int
@@ -17,6 +18,7 @@ _CELLS: Final = 1 << 22
 """Upper bound of a tensor's size; larger batches are cut into pieces."""
 
 
+@refusing(ConfigError)
 def matches(clause: Clause, facts: Facts, tuples: Int) -> Bool:
     """Return for each tuple whether the clause holds.
 
@@ -54,6 +56,7 @@ def matches(clause: Clause, facts: Facts, tuples: Int) -> Bool:
     return result
 
 
+@refusing(ConfigError)
 def decide(definition: Definition, facts: Facts, tuples: Int) -> Bool:
     """Return for each tuple whether the definition is true of it, its polarity taken into account."""
     result = np.zeros(len(tuples), dtype=np.bool_)
@@ -99,6 +102,8 @@ def extremes(clause: Clause, index: int, facts: Facts, tuples: Int) -> Float:
 
 
 def _check(clause: Clause, tuples: Int) -> None:
+    if not isinstance(tuples, np.ndarray):
+        raise ConfigError(f"tuples: expected an array, got {type(tuples).__name__}.")
     if tuples.ndim != 2 or tuples.shape[1] != clause.arity + 1:
         raise ConfigError(f"Expected tuples of shape (n, {clause.arity + 1}), got {tuples.shape}.")
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
 
+from relgym.arguments import refusing_calls, whole
 from relgym.config.constants import TALLY_DIGITS
 from relgym.errors import ConfigError
 
@@ -21,6 +22,9 @@ __all__ = ["ANY", "Clause", "Coverage", "Definition", "Literal"]
 
 ANY: Final = -1
 """The universally quantified argument of a negated literal, printed ``*``."""
+
+MOST_ARGUMENTS: Final = 1_000
+"""Of a target relation; far more than anybody could read."""
 
 _OPERATORS = (None, "<=", ">")
 
@@ -31,6 +35,13 @@ def _variable_name(variable: int) -> str:
     return chr(ord("A") + variable) if variable < 26 else f"V{variable}"
 
 
+def _require(plain: Mapping[str, Any], *names: str) -> None:
+    missing = [name for name in names if name not in plain]
+    if missing:
+        raise ConfigError(f"expected what to_dict gives, with {list(names)}; {missing} are missing")
+
+
+@refusing_calls(ConfigError)
 @dataclass(frozen=True, slots=True)
 class Literal:
     """One test: a relation or its negation, or a numeric function compared with a threshold.
@@ -78,6 +89,10 @@ class Literal:
 
     def rename(self, names: Mapping[int, int]) -> Literal:
         """Return the literal with every variable replaced by its entry in `names`."""
+        if missing := set(self.variables) - set(names):
+            raise ConfigError(
+                f"names: expected an entry for each variable of {self}, {sorted(missing)} have none"
+            )
         args = tuple(ANY if arg == ANY else names[arg] for arg in self.args)
         return Literal(self.relation, args, self.negated, self.op, self.threshold)
 
@@ -101,10 +116,12 @@ class Literal:
     @staticmethod
     def from_dict(plain: Mapping[str, Any]) -> Literal:
         """Inverse of `to_dict`."""
+        _require(plain, "relation", "args")
         negated, threshold = plain.get("negated", False), float(plain.get("threshold", 0.0))
         return Literal(plain["relation"], tuple(plain["args"]), negated, plain.get("op"), threshold)
 
 
+@refusing_calls(ConfigError)
 @dataclass(frozen=True)
 class Clause:
     """A conjunction of literals with shared variables: the body of a Horn clause (§3.4.1).
@@ -142,6 +159,7 @@ class Clause:
         in the order of their first appearance, and repeated literals are dropped.
         """
         literals = tuple(literals)
+        whole("arity", arity, 0, MOST_ARGUMENTS, ConfigError)
         names: dict[int, int] = {variable: variable for variable in range(arity)}
         names |= dict.fromkeys(_loose_variables(literals, arity), ANY)
         fresh = arity
@@ -192,6 +210,7 @@ class Clause:
     @staticmethod
     def from_dict(plain: Mapping[str, Any]) -> Clause:
         """Inverse of `to_dict`."""
+        _require(plain, "literals", "arity")
         return Clause(tuple(Literal.from_dict(literal) for literal in plain["literals"]), plain["arity"])
 
 
@@ -223,6 +242,7 @@ class Coverage:
         return self.positives / self.total if self.total > 0 else 0.0
 
 
+@refusing_calls(ConfigError)
 @dataclass(frozen=True)
 class Definition:
     """A disjunction of clauses that describes one class of tuples (§3.4.1), and how well it did in training.
@@ -310,6 +330,7 @@ class Definition:
     @staticmethod
     def from_dict(plain: Mapping[str, Any]) -> Definition:
         """Inverse of `to_dict`."""
+        _require(plain, "arity", "clauses", "coverage", "uncovered", "negated", "bits")
         arity = plain["arity"]
         clauses = tuple(Clause.from_dict({"arity": arity, "literals": body}) for body in plain["clauses"])
         coverage = tuple(Coverage(float(good), float(bad)) for good, bad in plain["coverage"])

@@ -14,6 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing, whole
 from relgym.errors import ConfigError
 from relgym.logic.batch import decide, matches
 from relgym.logic.clause import ANY, Clause, Definition, Literal
@@ -41,7 +42,7 @@ class World:
     relations.
     """
 
-    __slots__ = ("_exists", "_masks", "_numeric", "_powers", "_relations", "_relative", "objects")
+    __slots__ = ("_exists", "_masks", "_numeric", "_powers", "_relations", "_relative", "objects", "slots")
 
     def __init__(
         self,
@@ -58,6 +59,8 @@ class World:
         self._masks: dict[tuple[object, ...], _Masks] = {}
         self.objects = int(exists @ self._powers)
         """Bit mask of the objects that exist."""
+        self.slots = len(exists)
+        """Number of object slots, K."""
 
     def masks(self, literal: Literal, position: int) -> _Masks:
         """Return for which objects at a position a literal's test is true.
@@ -102,13 +105,16 @@ def _powers(size: int) -> NDArray[Any]:
     return np.array([1 << slot for slot in range(size)], dtype=np.int64 if size < 63 else object)
 
 
+@refusing(ConfigError)
 def world_of(facts: Facts, index: int) -> World:
     """Return one of the worlds of `facts`."""
+    whole("index", index, 0, facts.worlds, ConfigError)
     relations = {name: array[index] for name, array in facts.relations.items()}
     numeric = {name: np.asarray(array[index]) for name, array in facts.numeric.items()}
     return World(relations, facts.exists[index], numeric, facts.relative)
 
 
+@refusing(ConfigError)
 def solutions(clause: Clause, world: World, bound: Sequence[int]) -> Iterator[tuple[int, ...]]:
     """Yield every assignment of objects to the clause's variables that makes it true (§3.4.3).
 
@@ -130,15 +136,19 @@ def solutions(clause: Clause, world: World, bound: Sequence[int]) -> Iterator[tu
     Backtracking with forward checking; the variable with the fewest remaining objects is bound first
     (*minimum remaining values*, ties to the lower number). Distinct variables may stand for the same object.
     """
+    if len(bound) != clause.arity or not all(0 <= each < world.slots for each in bound):
+        raise ConfigError(f"bound={bound!r}: expected {clause.arity} numbers of objects, below {world.slots}")
     fresh = clause.variables - clause.arity
     yield from _extend(clause.literals, world, [*bound, *[-1] * fresh], [world.objects] * clause.variables)
 
 
+@refusing(ConfigError)
 def satisfiable(clause: Clause, world: World, bound: Sequence[int]) -> bool:
     """Return whether some assignment makes the clause true, see `solutions`; a few µs for short clauses."""
     return next(solutions(clause, world, bound), None) is not None
 
 
+@refusing(ConfigError)
 def holds(definition: Definition, world: World, bound: Sequence[int]) -> bool:
     """Return whether a definition is true of the objects `bound`, its polarity taken into account."""
     return any(satisfiable(clause, world, bound) for clause in definition.clauses) != definition.negated

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing, refusing_calls
 from relgym.errors import ConfigError
 from relgym.logic.clause import ANY, Literal
 
@@ -26,6 +27,7 @@ Int: TypeAlias = NDArray[np.int64]
 Tuples: TypeAlias = Iterable[tuple[Hashable, ...]]
 
 
+@refusing_calls(ConfigError)
 @dataclass(frozen=True, eq=False)
 class Facts:
     """Relations and numeric functions over W worlds of at most K objects each.
@@ -62,6 +64,9 @@ class Facts:
     _masked: dict[str, Bool] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
+        for name, array in {"exists": self.exists, **self.relations, **self.numeric}.items():
+            if not isinstance(array, np.ndarray):
+                raise ConfigError(f"{name}: expected an array, got {type(array).__name__}.")
         if self.exists.ndim != 2 or self.exists.dtype != np.bool_:
             raise ConfigError(f"exists: expected booleans of shape (W, K), got {_kind(self.exists)}.")
         for name, relation in self.relations.items():
@@ -100,6 +105,8 @@ class Facts:
 
     def arity(self, name: str) -> int:
         """Number of arguments of a relation or function as printed, an unstored target included."""
+        if name not in self.relations and name not in self.numeric:
+            raise ConfigError(f"name={name!r}: expected one of {sorted({*self.relations, *self.numeric})}")
         array = self.relations[name] if name in self.relations else self.numeric[name]
         return array.ndim - 1 + (name in self.relative)
 
@@ -115,6 +122,8 @@ class Facts:
         """Return a relation, shape (W, K, …), that is false wherever an argument doesn't exist."""
         found = self._masked.get(name)
         if found is None:
+            if name not in self.relations:
+                raise ConfigError(f"name={name!r}: expected one of the relations {sorted(self.relations)}")
             found = self._masked[name] = self._mask(self.relations[name])
         return found
 
@@ -173,6 +182,7 @@ def compare(values: Float, literal: Literal) -> Bool:
     return values <= literal.threshold if literal.op == "<=" else values > literal.threshold
 
 
+@refusing(ConfigError)
 def facts_from_tuples(
     worlds: Sequence[Mapping[str, Tuples]],
     objects: Sequence[Sequence[Hashable]],

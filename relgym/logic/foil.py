@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from relgym.arguments import array_of
 from relgym.errors import ConfigError
 from relgym.logic.clause import Definition
 from relgym.logic.cover import Cover
@@ -111,6 +112,9 @@ def _cover(
     config: FoilConfig | None,
 ) -> Cover:
     """Check the arguments and lay them out."""
+    for what, given, kind in (("facts", facts, Facts), ("config", config, FoilConfig | None)):
+        if not isinstance(given, kind):
+            raise ConfigError(f"{what}={given!r}: expected {kind}")
     config = config or FoilConfig()
     positives, negatives = _checked(facts, positives, "positives"), _checked(facts, negatives, "negatives")
     if positives.shape[1] != negatives.shape[1]:
@@ -137,7 +141,7 @@ def _checked(facts: Facts, tuples: Int, what: str) -> Int:
 
 
 def _weights(weights: ArrayLike | None, tuples: Int) -> Float:
-    found = np.ones(len(tuples)) if weights is None else np.asarray(weights, dtype=np.float64)
+    found = np.ones(len(tuples)) if weights is None else array_of("weights", weights, (None,), ConfigError)
     if found.shape != (len(tuples),) or not (np.isfinite(found) & (found > 0)).all():
         raise ConfigError(f"Expected {len(tuples)} positive, finite weights, one per tuple; got {found!r}.")
     return found

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from relgym.arguments import refusing_fields
 from relgym.errors import ConfigError
 
 __all__ = ["FoilConfig"]
 
 
+@refusing_fields(ConfigError)
 @dataclass(frozen=True, slots=True)
 class FoilConfig:
     """How FOIL searches for clauses and when it believes one (§3.4.1, Algorithm 2).

@@ -220,7 +220,10 @@ def ends_of(count: int, terminations: Any, truncations: Any) -> NDArray[np.bool_
     for what, given in (("terminations", terminations), ("truncations", truncations)):
         if given is None:
             continue
-        flags = np.asarray(given)
+        try:
+            flags = np.asarray(given)
+        except ValueError:  # ragged
+            raise DataError(f"{what}: expected {count} flags, one for each step, got {given!r}") from None
         if flags.shape == (count, 1):
             flags = flags[:, 0]
         if flags.shape != (count,):

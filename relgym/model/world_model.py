@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -12,9 +13,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.arguments import refusing, whole
+from relgym.arguments import array_of, refusing, whole
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
+from relgym.config.checks import checked_count
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, RelgymError
 from relgym.files.reading import FileLimits
 from relgym.html import html_text
@@ -264,6 +266,7 @@ class WorldModel:
         """
         self._check_step(transition)
         numbers = 3 * len(transition.before.vector)
+        precision = self._told(prediction, residuals, precision)
         with self._step("_take_up", transition, prediction, dict(residuals), precision, numbers=numbers):
             return self._take_up(transition, prediction, residuals, precision)
 
@@ -276,6 +279,16 @@ class WorldModel:
     ) -> LearnReport:
         self._look_back(prediction, residuals, precision)
         return self._learn(transition, prediction)
+
+    def _told(self, prediction: Any, residuals: Any, precision: Any) -> float:
+        """The precision, once it is known that all three are what they should be: else nothing is begun."""
+        if not isinstance(prediction, ScenePrediction):
+            raise ObservationError(f"prediction={prediction!r}: expected what predict_one gives")
+        if not isinstance(residuals, Mapping) or not all(
+            isinstance(off, (int, float)) and math.isfinite(off) for off in residuals.values()
+        ):
+            raise ObservationError(f"residuals={residuals!r}: expected finite numbers by (object, property)")
+        return self._precision(precision)
 
     def _check_step(self, transition: Transition) -> None:
         self._parts.check(transition.before)
@@ -409,7 +422,12 @@ class WorldModel:
         return scored(self, found, self._precision(precision))
 
     def _precision(self, given: float | None) -> float:
-        return self.schema.precision if given is None else given
+        value = (
+            self.schema.precision if given is None else float(array_of("precision", given, (), ConfigError))
+        )
+        if value < 0.0:
+            raise ConfigError(f"precision={given!r}: expected a finite number of at least 0")
+        return value
 
     def _transitions(
         self, observations: Any, actions: Any, next_observations: Any, terminations: Any, truncations: Any
@@ -451,6 +469,7 @@ class WorldModel:
         precision
             Relative precision of what was observed (`View.precision`); of numbers below 1 it is absolute.
         """
+        precision = self._told(prediction, residuals, precision)
         with self._step("_look_back", prediction, dict(residuals), precision):
             self._look_back(prediction, residuals, precision)
 
@@ -620,8 +639,7 @@ class WorldModel:
         -------
         One prediction per step; the last one is not `ok` when the roll-out ended early.
         """
-        if steps < 1:
-            raise ConfigError(f"steps must be at least 1, got {steps}")
+        checked_count("steps", steps, 1, 10**9)
         if actions is not None:
             given = np.asarray(actions, dtype=np.float64)
             width = len(scene.layout.types[scene.layout.index(ACTION)].properties)
@@ -874,6 +892,7 @@ class WorldModel:
                 )
             self._stored = rules, advice
 
+    @refusing(ConfigError)
     def to_json(self, *, history: bool = False) -> dict[str, Any]:
         """Plain data: schema, config and everything learned."""
         return parts_to_json(self._parts, history=history) | {"seen": self.seen}

@@ -8,11 +8,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing_calls
 from relgym.errors import ConfigError
 
 __all__ = ["ActionCoder"]
 
 
+@refusing_calls(ConfigError)
 class ActionCoder:
     """Translates latent vectors, standard normal a priori, into legal actions.
 
@@ -64,6 +66,9 @@ class ActionCoder:
         -------
         Shape ``(…, *action shape)``, in the space's dtype, all legal.
         """
+        latents = np.asarray(latents, dtype=np.float64)
+        if not latents.ndim or latents.shape[-1] != self.size:
+            raise ConfigError(f"latents: expected shape (..., {self.size}), got {latents.shape}")
         lead = latents.shape[:-1]
         space = self.space
         if isinstance(space, spaces.Box):

@@ -12,6 +12,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing_calls
 from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_count, checked_least
 from relgym.envs.dreams.rewards import TaskFunctions
@@ -33,7 +34,7 @@ from relgym.wrappers.dyna.lens import Lens
 from relgym.wrappers.dyna.recorder import Experience, TransitionRecorder
 from relgym.wrappers.dyna.reward_models import LearnedRewardModel, RewardModel
 from relgym.wrappers.dyna.stock import DreamModel, changing
-from relgym.wrappers.dyna.trainer import ModelTrainer
+from relgym.wrappers.dyna.trainer import ModelTrainer, check_model
 from relgym.wrappers.views import ViewLike
 
 __all__ = ["PlanningAgent"]
@@ -81,6 +82,7 @@ _LATEST: Final = 50
 """Latest real steps by which the agent doubts its model."""
 
 
+@refusing_calls(ConfigError)
 class PlanningAgent:
     """Learns a world's dynamics, reward and termination while it acts, and acts by planning in what it has learned.
 
@@ -169,6 +171,7 @@ class PlanningAgent:
         self.discount, self.safe = Objective(discount=discount).discount, safe
         if model is None:
             model = WorldModel(self._recorder.view.schema, config)
+        check_model(model, Lens(self._recorder))
         self.trainer = ModelTrainer(
             model, _task(task, env), DynaConfig(shuffle=0, seed=checked_count("seed", seed, 0, 2**31))
         )
@@ -280,6 +283,7 @@ class PlanningAgent:
         callback
             Called with the agent after each decision; false ends learning.
         """
+        checked_count("total_steps", total_steps, 0, 10**9)
         while self.steps < total_steps:
             if self._observation is None:
                 self._observation, _ = self.env.reset(seed=int(self._rng.integers(2**31)))

@@ -7,7 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from relgym.arguments import refusing_calls
 from relgym.envs.tasks import RewardFunctions, TaskOutcome
+from relgym.errors import ConfigError
 from relgym.numeric.version_space import VersionSpace
 from relgym.scene.objects import TASK, Float2D, SceneLayout
 from relgym.wrappers.dyna.reward_models import LearnedRewardModel
@@ -24,6 +26,7 @@ _REVIEW: Final = 10
 """Real steps after which the rules are drawn again at the latest, if no other mode was found and no episode ended."""
 
 
+@refusing_calls(ConfigError)
 class DoubtedTask(RewardFunctions):
     """A learned reward model that says how much a step is worth in expectation over all short rules that fit.
 

@@ -12,7 +12,8 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from relgym.envs.arguments import checked_least
+from relgym.arguments import array_of, refusing_calls
+from relgym.envs.arguments import checked_count, checked_least
 from relgym.errors import ConfigError
 from relgym.planning.rollouts import Bonus
 from relgym.planning.simulators import Correctable, Simulator, Steps
@@ -33,6 +34,7 @@ _PLACES: Final = POSE[:3]
 """What has a meaning only in relation to other objects: laws are the same everywhere."""
 
 
+@refusing_calls(ConfigError)
 class Coverage:
     """Counts which values of two properties were seen together, and what a step would add.
 
@@ -67,11 +69,13 @@ class Coverage:
         capacity: int = 20_000,
     ) -> None:
         pairs = sorted({(c, -1) if isinstance(c, (int, np.integer)) else (c[0], c[1]) for c in columns})
+        if any(first < 0 or second < -1 for first, second in pairs):
+            raise ConfigError(
+                f"columns={columns!r}: expected numbers of columns, 0 and above, or pairs of them"
+            )
         self._plus = np.array([first for first, _ in pairs], dtype=np.intp)
         self._minus = np.array([second for _, second in pairs], dtype=np.intp)
-        if capacity < 1:
-            raise ConfigError(f"capacity={capacity!r}: expected at least 1 step")
-        self._capacity = capacity
+        self._capacity = checked_count("capacity", capacity, 1, 10**9)
         self._seen: list[tuple[Float1D, bool, float, float]] = []
         self._paid: dict[bytes, tuple[float, int]] = {}
         self._largest = np.zeros(len(pairs))
@@ -108,12 +112,19 @@ class Coverage:
         paid
             What was paid in all: where the model is right about as much as the surplus was, it accounts for it.
         """
-        row = self._values(state[None])[0]
+        if not isinstance(surprised, (bool, np.bool_)):
+            raise ConfigError(f"surprised={surprised!r}: expected True or False")
+        row = self._values(self._checked([state]))[0]
+        last = None if before is None else self._values(self._checked([before]))[0]
+        surplus, paid = (
+            float(array_of(what, given, (), ConfigError))
+            for what, given in (("surplus", surplus), ("paid", paid))
+        )
         self._seen.append((row, surprised, surplus, paid))
         sizes = np.exp2(np.ceil(np.log2(np.maximum(np.abs(row), 1e-300))))
         moved = np.zeros(len(row), dtype=np.bool_)
-        if self._varying and before is not None:
-            moved = np.abs(row - self._values(before[None])[0]) > 1e-9 * np.maximum(1.0, np.abs(row))
+        if self._varying and last is not None:
+            moved = np.abs(row - last) > 1e-9 * np.maximum(1.0, np.abs(row))
         fresh = moved & ~self._active
         if (sizes > self._largest).any() or fresh.any() or len(self._seen) > self._capacity:
             self._largest = np.maximum(self._largest, np.where(row == 0.0, 0.0, sizes))
@@ -127,6 +138,7 @@ class Coverage:
 
     def novelty(self, states: Float2D) -> Float1D:
         """Share of the pairs of values that were never seen together or surprised, of n states; shape ``(n,)``."""
+        states = self._checked(states)
         if not len(self._first):
             return np.zeros(len(states))
         cells = self._cells(self._values(states))[:, self._active]
@@ -136,6 +148,7 @@ class Coverage:
 
     def familiar(self, states: Float2D) -> NDArray[np.bool_]:
         """Whether every value of n states, each by itself, was seen before; shape ``(n,)``."""
+        states = self._checked(states)
         alone = np.flatnonzero(self._first == self._second)
         if not len(alone):
             return np.ones(len(states), dtype=np.bool_)
@@ -148,6 +161,7 @@ class Coverage:
 
         The mean over the visits to the same values of all properties, until the model accounts for it.
         """
+        states = self._checked(states)
         found = np.zeros(len(states))
         if self._paid:
             cells = self._cells(self._values(states))[:, self._active].astype(np.int8)
@@ -179,6 +193,14 @@ class Coverage:
         if visits or surplus > 1e-6:
             self._paid[key] = total + surplus, visits + 1
 
+    def _checked(self, states: Any) -> Float2D:
+        """`states` as an array; `ConfigError` unless they have all columns that count."""
+        found = array_of("states", states, (None, None), ConfigError)
+        width = 1 + max(self._plus.max(initial=-1), self._minus.max(initial=-1))
+        if found.shape[1] < width:
+            raise ConfigError(f"states: expected shape (n, {width}) or wider, got {found.shape}")
+        return found
+
     def _values(self, states: Float2D) -> Float2D:
         values = states[:, self._plus]
         if (related := self._minus >= 0).any():
@@ -207,6 +229,7 @@ class _Paid:
         return paid
 
 
+@refusing_calls(ConfigError)
 class Familiar:
     """A simulator that knows the outcomes only of steps into what is familiar: for agents that must not err.
 
@@ -260,6 +283,7 @@ class Familiar:
         return Steps(after, np.where(known, stepped.rewards, 0.0), stepped.terminated & known, known)
 
 
+@refusing_calls(ConfigError)
 class Explore(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """Says of every step how new the scene is that it led to: for agents of any kind, and for collecting data.
 

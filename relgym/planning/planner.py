@@ -10,6 +10,7 @@ from typing import Any, Final, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing_calls
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
 from relgym.planning.actions import ActionCoder
@@ -63,6 +64,7 @@ States: TypeAlias = tuple[Any, ...]
 """What Stable-Baselines3 hands from one call of ``predict`` to the next: one `PlannerState` for each env."""
 
 
+@refusing_calls(ConfigError)
 @dataclass
 class Planner:
     """Acts by searching in what a simulator predicts.
@@ -174,8 +176,14 @@ class Planner:
             The simulator can't read the observation.
         """
         count = self._batch(observation)
+        if count == 0:
+            raise ConfigError("observation: a batch of none; expected at least one observation")
         seen = [observation] if count is None else [_picked(observation, k) for k in range(count)]
         begun = np.zeros(len(seen), dtype=np.bool_) if episode_start is None else np.asarray(episode_start)
+        if begun.size != len(seen) or (state is not None and len(state) != len(seen)):
+            raise ConfigError(
+                f"state and episode_start: expected one for each of {len(seen)} observations, as the last call returned"
+            )
         threads = [
             PlannerState() if state is None or begun.reshape(-1)[k] else state[k] for k in range(len(seen))
         ]
@@ -313,7 +321,7 @@ class Planner:
         own = next(iter(space.spaces.values())) if hasattr(space, "spaces") else space
         one: Any = observation
         if isinstance(observation, dict):
-            one = next(iter(observation.values()))
+            one = next(iter(observation.values()), None)
         if not isinstance(one, np.ndarray) or one.ndim != len(own.shape or ()) + 1:
             return None
         return len(one)

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import array_of, refusing_calls
 from relgym.errors import ConfigError
 from relgym.planning.simulators import Simulator
 from relgym.scene.objects import Float1D, Float2D
@@ -22,6 +23,7 @@ Bonus: TypeAlias = Callable[[Float2D, NDArray[Any], Float2D], Float1D]
 """What n steps (states, actions, next states) are worth beside their reward, shape ``(n,)``."""
 
 
+@refusing_calls(ConfigError)
 @dataclass(frozen=True, slots=True)
 class Objective:
     """What a plan is to be good for.
@@ -148,6 +150,7 @@ def roll_out(simulator: Simulator, start: Float1D, actions: NDArray[Any], object
     -----
     Cost: h calls of `Simulator.step`, each with the roll-outs that are still under way.
     """
+    start = array_of("start", start, (None,), ConfigError)
     n, h = actions.shape[:2]
     states = np.empty((h + 1, n, len(start)))
     states[0] = start

@@ -10,6 +10,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import array_of, refusing_calls
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
 from relgym.planning.actions import ActionCoder
@@ -81,6 +82,7 @@ def held_noise(count: int, horizon: int, size: int, *, rng: np.random.Generator)
     return held
 
 
+@refusing_calls(ConfigError)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrossEntropy:
     """The cross-entropy method: draw, keep the best, draw nearer to them (Rubinstein 1999; iCEM, Pinneri et al. 2020).
@@ -157,6 +159,7 @@ class CrossEntropy:
         )
 
 
+@refusing_calls(ConfigError)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathIntegral:
     """Model-predictive path integral control: the mean moves to the candidates' average, weighted by worth (MPPI).
@@ -225,6 +228,7 @@ class PathIntegral:
         )
 
 
+@refusing_calls(ConfigError)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RandomShooting:
     """The best of many random sequences.
@@ -286,7 +290,7 @@ def _iterated(
     """Rounds of drawing about a mean and moving it; the best sequence of all."""
     mean, spread = np.zeros((horizon, coder.size)), np.ones((horizon, coder.size))
     kept = np.empty((0, horizon, coder.size))
-    if warm is not None and len(warm):
+    if warm is not None and len(warm := array_of("warm", warm, (None, coder.size), ConfigError)):
         rest = min(len(warm), horizon)
         mean[:rest] = warm[:rest]
         kept = mean[None].copy()

@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from relgym.arguments import array_of, refusing_calls
 from relgym.envs.arguments import checked_count
 from relgym.envs.base import SceneEnv
 from relgym.envs.dreams.rewards import BatchStepEvaluator, TaskFunctions, check_reward_functions
@@ -91,6 +92,7 @@ class Correctable(Protocol):
         ...
 
 
+@refusing_calls(ConfigError)
 class ModelSimulator:
     """A learned model as a simulator; live, so that what it learns in the meantime counts.
 
@@ -230,13 +232,12 @@ class ModelSimulator:
 
     def step(self, states: Float2D, actions: NDArray[Any]) -> Steps:
         """Follow n actions from n states."""
+        states = array_of("states", states, (None, self._setting.layout.width), ConfigError)
         count = len(states)
         found, rewards = states.copy(), np.zeros(count)
         ended, known = np.zeros(count, dtype=np.bool_), np.ones(count, dtype=np.bool_)
         once = np.zeros(count, dtype=np.int64)
-        acts = np.asarray(actions)
-        if isinstance(self.action_space, spaces.Box):
-            acts = acts.astype(np.float64)
+        acts = _actions(actions, count, self.action_space)
         for k in range(self.repeat):
             going = np.flatnonzero(known & ~ended)
             if not len(going):
@@ -249,6 +250,7 @@ class ModelSimulator:
         return Steps(found, rewards, ended, known)
 
 
+@refusing_calls(ConfigError)
 class EnvSimulator:
     """An exact env as a simulator, one state after another: the ceiling for what a model can do.
 
@@ -303,6 +305,8 @@ class EnvSimulator:
 
     def step(self, states: Float2D, actions: NDArray[Any]) -> Steps:
         """Follow n actions from n states, one after the other."""
+        states = array_of("states", states, (None, self._layout.width), ConfigError)
+        actions = _actions(actions, len(states), self.action_space)
         found, rewards = np.empty_like(states), np.zeros(len(states))
         ended = np.zeros(len(states), dtype=np.bool_)
         for k, (state, action) in enumerate(zip(states, actions, strict=True)):
@@ -315,3 +319,13 @@ class EnvSimulator:
                     break
             found[k] = self._env.vector
         return Steps(found, rewards, ended, np.ones(len(states), dtype=np.bool_))
+
+
+def _actions(actions: Any, count: int, space: spaces.Space[Any]) -> NDArray[Any]:
+    """`count` actions as an array; `ConfigError` unless their shape is that of the space's."""
+    acts = np.asarray(actions)
+    if acts.shape != (count, *(space.shape or ())) or acts.dtype.kind not in "biuf":
+        raise ConfigError(
+            f"actions: expected {count} actions of {space}, got shape {acts.shape}, dtype {acts.dtype}"
+        )
+    return acts.astype(np.float64) if isinstance(space, spaces.Box) else acts

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import array_of, refusing_calls
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError
 from relgym.planning.actions import ActionCoder
@@ -23,6 +24,7 @@ _COARSER: Final = 8
 """How many of the fine cells' widths a coarse cell is wide: with 32 cells a property has four coarse ones."""
 
 
+@refusing_calls(ConfigError)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TreeSearch:
     """Grows a tree of states where it has hardly been, and takes the best branch.
@@ -94,6 +96,7 @@ class TreeSearch:
         deadline: float | None,
     ) -> Plan:
         """See `Search.plan`; the last plan is not needed."""
+        start = array_of("start", start, (None,), ConfigError)
         tree = _Tree(start, self.cells, self.horizon, objective)
         fresh, tried = 0, 0
         while tried < self.expansions and fresh < self.patience:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
+from relgym.errors import QueryError
 from relgym.scene.axes import Axes
 from relgym.scene.geometry.vectors import FloatArray, dot, norm
 from relgym.scene.objects import SceneLayout
@@ -38,6 +40,7 @@ next velocity.
 """
 
 
+@refusing(QueryError)
 def contact_features(schema: SceneSchema) -> tuple[str, ...]:
     """Names of a schema's contact features, in the order of `Relations.contacts`."""
     axes = Axes.of(schema).names

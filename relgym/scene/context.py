@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing, whole
+from relgym.errors import QueryError
 from relgym.mixing import GOLDEN, mixed
 from relgym.scene.objects import SceneLayout
 
@@ -69,6 +71,7 @@ def slots(layout: SceneLayout, body: int) -> Slots:
     return known[body]
 
 
+@refusing(QueryError)
 def canonical_order(relations: Relations, body: int, pose: _Poses | None = None) -> _Order:
     """Return the other bodies in canonical order.
 
@@ -90,7 +93,14 @@ def canonical_order(relations: Relations, body: int, pose: _Poses | None = None)
     -------
     Numbers of the other bodies, shape ``(n, K - 1)``. Column j belongs to the same type in all scenes.
     """
+    _check(relations, body)
     return order_and_ties(relations, body, pose)[0]
+
+
+def _check(relations: Relations, body: int) -> None:
+    if not hasattr(relations, "layout"):
+        raise QueryError(f"relations={relations!r}: expected what Extractor.extract gives")
+    whole("body", body, 0, len(relations.layout.bodies), QueryError)
 
 
 def order_and_ties(
@@ -131,6 +141,7 @@ def _sort_groups(
     return tied
 
 
+@refusing(QueryError)
 def signature(relations: Relations, body: int, order: _Order | None = None) -> list[bytes]:
     """Return, for each scene, a key of its relational table in canonical order.
 
@@ -144,7 +155,12 @@ def signature(relations: Relations, body: int, order: _Order | None = None) -> l
     order
         `canonical_order`'s result, where the caller has it already.
     """
-    order = canonical_order(relations, body) if order is None else order
+    _check(relations, body)
+    others = len(relations.layout.bodies) - 1
+    if order is None:
+        order = canonical_order(relations, body)
+    elif getattr(order, "shape", None) != (len(relations), others):
+        raise QueryError(f"order: expected what canonical_order gives, of shape {(len(relations), others)}")
     layout = relations.layout
     kinds = [layout.types[layout.bodies[body]].name]
     kinds += [name for name, members in slots(layout, body) for _ in members]

@@ -24,8 +24,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.arguments import refusing
-from relgym.errors import ConfigError, ObservationError, SchemaError
+from relgym.arguments import refusing, refusing_calls
+from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
 from relgym.scene import contacts
 from relgym.scene.axes import Axes
 from relgym.scene.boxes import axis_relations
@@ -244,6 +244,7 @@ def _found(axes: Axes, chunk: Measurements, name: str) -> _Table:
     return chunk.boxes.along(*axis_relations(axes)[name])
 
 
+@refusing_calls(QueryError)
 class Extractor:
     """Extracts the relations of scenes; one per schema.
 
@@ -310,9 +311,9 @@ class Extractor:
         -----
         Cost: about 0.1 ms for one scene of seven objects, 5 us each in a batch.
         """
-        if vectors.ndim != 2 or vectors.shape[1] != layout.width:
+        if getattr(vectors, "ndim", 0) != 2 or vectors.shape[1] != layout.width:
             raise ObservationError(
-                f"expected state vectors of shape (n, {layout.width}) for {layout.names}, got {vectors.shape}"
+                f"expected state vectors of shape (n, {layout.width}) for {layout.names}, got {np.shape(vectors)}"
             )
         plan = self._plan(layout)
         chunk = max(1, _CHUNK // max(1, plan.pairs.number.size))

@@ -135,6 +135,7 @@ class SceneSchema:
         except KeyError:
             raise QueryError(f"unknown type {name!r}; the schema has {sorted(self._types)}") from None
 
+    @refusing(QueryError)
     def type_of(self, object_name: str) -> ObjectType:
         """Return the type of the object of that name; `QueryError` when there is none."""
         for name, type_name in self.objects:
@@ -142,6 +143,7 @@ class SceneSchema:
                 return self._types[type_name]
         raise QueryError(f"unknown object {object_name!r}; the schema has {list(self.order)}")
 
+    @refusing(QueryError)
     def ancestry(self, type_name: str) -> tuple[str, ...]:
         """The type's name followed by its parents', nearest first."""
         chain = [type_name]

@@ -25,6 +25,7 @@ class RelationalState:
 
     relations: Mapping[str, frozenset[tuple[str, ...]]]
 
+    @refusing(QueryError)
     def tuples(self, name: str) -> frozenset[tuple[str, ...]]:
         """Tuples of object names for which a relation holds; `QueryError` where there is no such relation."""
         try:

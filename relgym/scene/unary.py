@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import refusing
+from relgym.errors import QueryError
 from relgym.scene.objects import SceneLayout
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["unary", "unary_names"]
 
 
+@refusing(QueryError)
 def unary(schema: SceneSchema, layout: SceneLayout) -> dict[str, NDArray[np.bool_]]:
     """Return the unary relations of a layout's bodies: every type name with a body, and all its ancestors.
 

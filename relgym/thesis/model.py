@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import array_of, refusing_calls
 from relgym.clustering.mode import Mode
-from relgym.errors import QueryError, SchemaError
+from relgym.errors import ConfigError, QueryError, SchemaError
 from relgym.model.learning import LearnReport
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.reports.tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
@@ -67,6 +68,7 @@ class TargetModel:
         )
 
 
+@refusing_calls(ConfigError)
 class ThesisModel:
     """Learns a schema's targets by chapter III and predicts with what it has learned.
 
@@ -282,6 +284,7 @@ class ThesisModel:
     def predict_batch(self, layout: SceneLayout, vectors: Floats) -> BatchPrediction:
         """Predict the next step of scenes with the same objects, shape ``(n, layout.width)``."""
         self.finish()
+        vectors = array_of("vectors", vectors, (None, layout.width), ConfigError)
         after = vectors.copy()
         parts, modes, outcomes = [], [], []
         for part in self._models.values():
