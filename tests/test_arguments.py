@@ -150,7 +150,7 @@ def test_every_public_call_of_a_class_refuses() -> None:
     bad: list[tuple[str, Callable[[], object]]] = [
         ("whole='x'", lambda: Share("x")),  # type: ignore[arg-type]
         ("part='x'", lambda: Share(4).of("x")),  # type: ignore[arg-type]
-        ("size='x'", lambda: Share.full("x")),  # type: ignore[arg-type]
+        ("whole='x'", lambda: Share.full("x")),  # type: ignore[arg-type]
         ("size='x'", lambda: Share.half("x")),  # type: ignore[arg-type]
     ]
     for said, call in bad:
