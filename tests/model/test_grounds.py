@@ -37,7 +37,6 @@ from relgym.model.target.scope import Scope
 from relgym.model.target.spread import Spreads
 from relgym.model.target.stops import Stop, Stops
 from relgym.model.world_model import WorldModel
-from relgym.program import kernel
 from relgym.scene.objects import Scene
 from relgym.wrappers import ModelLearner
 
@@ -124,9 +123,10 @@ def fresh_and_kept(model: WorldModel, scene: Scene) -> tuple[Runner, Runner] | N
     """What runs the program that was kept, and one that was lowered just now; None where there is none."""
     model.predict_one(scene)
     kept = model._programs.of(model._parts, scene.layout, 1)
-    if kept is None:
+    machine = running.KERNEL.load()
+    if kept is None or machine is None:
         return None
-    return Runner(model._parts, scene.layout, lowered(model._parts, scene.layout), kernel), kept
+    return Runner(model._parts, scene.layout, lowered(model._parts, scene.layout), machine), kept
 
 
 def assert_nothing_stale(model: WorldModel, scene: Scene) -> bool:

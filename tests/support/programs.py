@@ -30,7 +30,7 @@ from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
 from relgym.model.prediction import BatchPrediction
 from relgym.model.querying import predict_many
-from relgym.model.running import Runner
+from relgym.model.running import KERNEL, Runner
 from relgym.model.target.hindsight import Hindsight
 from relgym.model.target.limits import Limits
 from relgym.model.target.property_model import PropertyModel
@@ -38,7 +38,6 @@ from relgym.model.target.scope import Scope
 from relgym.model.target.stops import Landing, Stop, Stops
 from relgym.model.world_model import WorldModel
 from relgym.numeric.tree import DecisionTree
-from relgym.program import kernel
 from relgym.scene.objects import POSE, Kinematics, ObjectType, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Prism, Sphere, Wedge
@@ -48,7 +47,8 @@ Array = NDArray[np.float64]
 
 def runner(parts: Parts, layout: SceneLayout) -> Runner:
     """What runs the program of a model."""
-    return Runner(parts, layout, lowered(parts, layout), kernel)
+    assert (machine := KERNEL.load()) is not None
+    return Runner(parts, layout, lowered(parts, layout), machine)
 
 
 def arrays(parts: Parts, layout: SceneLayout, vectors: Array) -> BatchPrediction:
