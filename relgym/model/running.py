@@ -170,8 +170,8 @@ class _Known:
 class Kernel:
     """The compiled kernel, as this process has it: none before it pays.
 
-    Once arrays have taken about as long as loading it takes, it is loaded in a thread of its own; where no file holds it,
-    another process compiles it meanwhile (`relgym.program.machine`). Arrays answer until it is there, with the same
+    Once arrays have taken about as long as loading it takes, it is loaded in a thread of its own; where no file holds
+    it, another process compiles it first (`relgym.program.machine`). Arrays answer until it is there, with the same
     bits: no step ever waits. What arrays took is estimated from what was asked.
 
     Attributes
@@ -266,10 +266,12 @@ class Runner:
         self._space, count = tape.space(), len(program.answers)
         self._now, self._after = np.empty(program.width), np.empty(program.width)
         told = ("outcomes", "modes", "margins", "touched", "players", "sure", "believed")
-        self._tells = tuple(self._space[name][0, :count] for name in told)  # where the kernel leaves what it says
+        self._tells = tuple(
+            self._space[name][0, :count] for name in told
+        )  # where the kernel leaves what it says
         self._many = machine.run
-        places = (each.ctypes.data for each in (self._space, self._now, self._after))
-        self._one = partial(_run_one, machine.call, *places)
+        space, now, after = (each.ctypes.data for each in (self._space, self._now, self._after))
+        self._one = partial(_run_one, machine.call, space, now, after)
         pair = None if parts.laws is None else parts.laws.learner.book.pair
         frame = "world" if pair is None else pair.frame
         self._keys = tuple((a.object, a.property) for a in program.answers)
@@ -314,7 +316,9 @@ class Runner:
         modes, margins = np.empty(shape, dtype=np.int64), np.empty(shape)
         sure = np.full((2, n, count), np.nan)
         with self._turn:
-            if self._many(self._space, vectors, following, (outcomes, modes, margins, sure), settling=settling):
+            if self._many(
+                self._space, vectors, following, (outcomes, modes, margins, sure), settling=settling
+            ):
                 return None
         return BatchPrediction(
             self._layout, following, self._keys, modes, outcomes, margins, self._frames, *sure
@@ -445,7 +449,7 @@ class Runner:
             )
 
 
-def _run_one(call: Callable[..., int], space: int, now: int, after: int, settling: bool) -> int:  # noqa: FBT001
+def _run_one(call: Callable[..., int], space: int, now: int, after: int, settling: bool) -> int:
     """Run the kernel for one scene, which says in the work space what it tells of it."""
     return call(space, 1, settling, True, False, now, after, None, None, None, None)
 

@@ -1,8 +1,8 @@
-"""What a program's operations do: one step of one scene, of many scenes; compiled by numba, for any tape.
+"""What a program's operations do: one step of one scene, of many scenes; for any tape.
 
 Written out number by number, in the order in which `relgym.scene`, `relgym.laws` and `relgym.classification` work on
-arrays: the same operations, hence the same bits. All of it lies in one file, since numba's cache of compiled functions
-looks at the file that a function is defined in, not at what it calls. Importing this module imports numba.
+arrays: the same operations, hence the same bits. It is the plain Python of numbers that `relgym.program.compiling`
+reads, and runs as Python, too, some thousand times slower.
 
 `s` is a scene's work space (`relgym.program.tape.SPACE`); ``s.x`` holds the registers (`relgym.program.records`).
 """

@@ -1,9 +1,9 @@
 """The kernel as machine code: compiled once on a machine, in a process of its own, and kept in a file.
 
 The file lies where Python keeps what it compiles (`__pycache__`), else in the user's folder for such things; its name
-says of which text, compiler and processor it is. Compiling takes a process of one or two seconds and 150 MB, which ends by
+says of which text, compiler and processor it is. Compiling takes a process of two seconds and 130 MB, which ends by
 itself and is asked to run last; it proves what it made on an empty program before anybody else loads it. Loading takes
-0.06 s, nearly all of it the import of llvmlite.
+0.03 to 0.06 s, nearly all of it the import of llvmlite.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -86,9 +85,8 @@ class Machine:
         return int(self.call(next(places), len(vectors), settling, False, True, *places))
 
 
-@cache
 def _target() -> Any:
-    """This machine, as LLVM sees it."""
+    """What LLVM knows of this machine; a new record each time, since who runs code makes it their own."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
@@ -196,18 +194,19 @@ def build() -> bytes:
     import llvmlite.binding as llvm
 
     from relgym.program import kernel
-    from relgym.program.compiling import Array, assembly
+    from relgym.program.compiling import Array, Type, assembly
     from relgym.program.tape import SPACE
 
     given = {"vectors": "double", "following": "double", "outcomes": "i8", "modes": "i64"}
     given |= {"margins": "double", "sure": "double"}
     arrays = (Array(element, (0,), f"given {name}") for name, element in given.items())
-    types = ("space", "i64", "i1", "i1", "i1", *arrays)
+    types: tuple[Type, ...] = ("space", "i64", "i1", "i1", "i1", *arrays)
     module = llvm.parse_assembly(assembly(kernel.run, types, SPACE, _ENTRY))
     module.verify()
     tuning = llvm.create_pipeline_tuning_options(speed_level=2)
     # One scene at a time, few of anything: vectors of LLVM's and loops written out cost a second and win nothing.
     tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_unrolling = False
-    builder = llvm.create_pass_builder(_target(), tuning)
+    target = _target()
+    builder = llvm.create_pass_builder(target, tuning)
     builder.getModulePassManager().run(module, builder)
-    return bytes(_target().emit_object(module))
+    return bytes(target.emit_object(module))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pickle
-import sys
 from collections.abc import Callable
+from threading import Event
 
 import numpy as np
 import pytest
@@ -103,25 +103,28 @@ def test_a_program_is_lowered_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(calls) == 1
 
 
-@pytest.mark.parametrize("on_disk", [True, False])
-def test_the_kernel_is_there_once_it_pays(monkeypatch: pytest.MonkeyPatch, on_disk: bool) -> None:
-    monkeypatch.setattr("relgym.program.kernel.is_compiled", lambda: on_disk)
+def test_the_kernel_is_loaded_off_the_step_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    going, made = Event(), running.KERNEL.machine
+
+    def slowly() -> object:
+        assert going.wait(60.0)
+        return made
+
+    monkeypatch.setattr(running, "make", slowly)
     kernel = running.Kernel()
-    assert kernel.after(1) is None and kernel.spent > 0.0
+    assert kernel.after(1) is None and kernel.spent > 0.0 and kernel._loader is None
     many = int(1.01 * running.LOADING / running.SCENE)
-    assert (kernel.after(many) is not None) is on_disk
-    assert kernel.after(int(running.COMPILING / running.SCENE)) is not None
-    assert kernel.after(1) is kernel.module
+    assert kernel.after(many) is None  # a thread has begun
+    assert kernel._loader is not None and kernel.after(1) is None
+    going.set()
+    kernel._loader.join()
+    assert kernel.after(1) is kernel.machine is made is not None
 
 
-def test_the_disk_is_looked_at_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
-    looked: list[float] = []
+def test_who_wants_it_now_waits_for_it() -> None:
     kernel = running.Kernel()
-    monkeypatch.setattr("relgym.program.kernel.is_compiled", lambda: bool(looked.append(kernel.spent)))
-    while kernel.after(1) is None:
-        pass
-    assert kernel.spent == pytest.approx(running.COMPILING, abs=1e-3)
-    assert looked == pytest.approx([0.5, 1.0, 2.0, 4.0, 8.0, 16.0], abs=1e-3)
+    assert kernel.load() is not None
+    assert kernel.after(1) is kernel.load() is kernel.machine
 
 
 def test_programs_that_cannot_tell_rest() -> None:
@@ -149,16 +152,26 @@ def test_programs_that_cannot_tell_rest() -> None:
     assert asked == [0, 2, 6, 14, 30, 62, 126, 191, 192, 193, 194, 196, 200]
 
 
-def test_without_numba_arrays_answer_and_a_warning_says_so_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def refused() -> None:
+    raise ImportError("No module named 'llvmlite'")
+
+
+@pytest.mark.parametrize(("make", "why"), [(refused, "pip install llvmlite"), (lambda: None, "be compiled")])
+def test_without_a_kernel_arrays_answer_and_a_warning_says_so_once(
+    monkeypatch: pytest.MonkeyPatch, make: Callable[[], None], why: str
+) -> None:
     monkeypatch.setattr(running, "KERNEL", kernel := running.Kernel())
+    monkeypatch.setattr(running, "make", make)
     kernel.spent = running.LOADING
-    monkeypatch.setitem(sys.modules, "relgym.program.kernel", None)
-    monkeypatch.delattr("relgym.program.kernel", raising=False)
     model = learned(schema := schema_of(LINE_STEPS, LINE_TARGETS), LINE_STEPS[:60])
     scene = transitions(schema, LINE_STEPS[60:61])[0].before
-    with pytest.warns(SlowWarning, match="pip install numba"):
+    model.predict_one(scene)
+    assert kernel._loader is not None
+    kernel._loader.join()
+    with pytest.warns(SlowWarning, match=why):
         model.predict_one(scene)
     assert_fresh(model, scene)  # a second warning would be an error
+    assert kernel.load() is None
 
 
 @pytest.mark.parametrize("make", [cart_model, line_model, room_model, lambda: room_model("auto")])

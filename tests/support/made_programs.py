@@ -80,7 +80,8 @@ class Told(NamedTuple):
 
 def by_kernel(program: ir.Program, vectors: NDArray[np.float64], *, tape: Tape | None = None) -> Told:
     """What the kernel says; it knows how right predictions were if the program does."""
-    assert (machine := MACHINE()) is not None
+    machine = MACHINE()
+    assert machine is not None
     tape = tape or encoded(program)
     n, count = len(vectors), len(program.answers)
     settling = any(a.trust is not None for a in program.answers)

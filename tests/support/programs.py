@@ -47,7 +47,8 @@ Array = NDArray[np.float64]
 
 def runner(parts: Parts, layout: SceneLayout) -> Runner:
     """What runs the program of a model."""
-    assert (machine := KERNEL.load()) is not None
+    machine = KERNEL.load()
+    assert machine is not None
     return Runner(parts, layout, lowered(parts, layout), machine)
 
 
