@@ -2,8 +2,8 @@
 
 The file lies where Python keeps what it compiles (`__pycache__`), else in the user's folder for such things; its name
 says of which text, compiler and processor it is. Compiling takes a process of two seconds and 130 MB, which ends by
-itself and is asked to run last; it proves what it made on an empty program before anybody else loads it. Loading takes
-0.03 to 0.06 s, nearly all of it the import of llvmlite.
+itself; it proves what it made on an empty program before anybody else loads it. Loading takes 0.03 to 0.06 s, nearly all
+of it the import of llvmlite.
 """
 
 from __future__ import annotations
@@ -172,8 +172,6 @@ def _built() -> bytes | None:
 
 def main() -> None:
     """Compile the kernel, prove that it runs, and write it to the standard output."""
-    if hasattr(os, "nice"):
-        os.nice(10)
     code = build()
     machine, space = Machine(code), _empty()
     nothing = np.empty((1, 0))
