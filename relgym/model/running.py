@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from threading import Lock, Thread
@@ -269,6 +269,7 @@ class Runner:
         self._tells = tuple(
             self._space[name][0, :count] for name in told
         )  # where the kernel leaves what it says
+        self._given, self._given_values = (self._space[name][0] for name in ("given", "given_values"))
         self._many = machine.run
         space, now, after = (each.ctypes.data for each in (self._space, self._now, self._after))
         self._one = partial(_run_one, machine.call, space, now, after)
@@ -354,31 +355,34 @@ class Runner:
         """Predict what follows one scene; None where the program can't tell it.
 
         What the program says is what arrays would have said of modes and laws; whose value counts is settled here as
-        there (`relgym.model.querying.settled`). The percept is for what isn't asked of the program.
+        there (`relgym.model.querying.settled`). Where that is another one than the program's own, and other answers
+        need it, the program says what follows from it. The percept is for what isn't asked of the program.
         """
-        now = scene.vector
+        now, given = scene.vector, dict[int, tuple[int, float]]()
         told = self._told(now, settling=False)
         if told is None:
             return None
-        after, outcomes, modes, margins, noted, players, _, _ = told
         following, own = now.copy(), True
         found: list[Prediction] = []
         for k, teller in enumerate(self._tellers):
             a = teller.answer
+            after, outcomes, modes, margins, noted, players, _, _ = told
             raw = teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
             if raw is None:
                 return None
             one = settled(self._parts, teller.target, percept, teller.index, following, raw)
             following[a.column] = one.value
-            if one.value != after[a.column]:
-                own = False
-                if a.key in self._needed:
-                    return None
-            if one.ok != (outcomes[k] == _PREDICTED) and a.key in self._needed:
-                return None
             found.append(one)
+            same = one.value == after[a.column]
+            if a.key not in self._needed:
+                own = own and same
+            elif not (same and one.ok == (outcomes[k] == _PREDICTED)):
+                given[k] = 1 if one.ok else 2, one.value
+                told = self._told(now, settling=False, given=given)
+                if told is None:
+                    return None
         if own:
-            following = after
+            following = told.following
         else:
             derive(scene.schema, self._layout, now[None], following[None])
             wrap(self._layout, following)
@@ -427,14 +431,28 @@ class Runner:
             )
         return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
 
-    def _told(self, now: NDArray[np.float64], *, settling: bool) -> _Told | None:
+    def _told(
+        self, now: NDArray[np.float64], *, settling: bool, given: Mapping[int, tuple[int, float]] | None = None
+    ) -> _Told | None:
         """Run the program of one scene; None: arrays must, or can say why not.
 
         All that is told is new: another thread may ask before this one has read it.
+
+        Parameters
+        ----------
+        now, settling
+            The scene's state vector, and whether the program settles who gives values.
+        given
+            What is settled already: of answers by number whether they are known (1) or not (2), and their values.
         """
         with self._turn:
             self._now[:] = now
-            if self._one(settling):
+            for k, (known, value) in (given or {}).items():
+                self._given[k], self._given_values[k] = known, value
+            bad = self._one(settling)
+            if given:
+                self._given[list(given)] = 0
+            if bad:
                 return None
             outcomes, modes, margins, noted, players, sure, believed = self._tells
             return _Told(

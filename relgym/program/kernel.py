@@ -1684,10 +1684,13 @@ def step(s, settling, telling):
             s.touched[k] = 0
             if math.isfinite(value):
                 s.touched[k] = -2 if beyond(s, a) else -1
-        if math.isfinite(value):
-            x[width + column] = value
         s.outcomes[k], s.modes[k], s.margins[k] = outcome, mode, margin
-        if outcome != PREDICTED:
+        lost = outcome != PREDICTED
+        if s.given[k]:
+            x[width + column], lost = s.given_values[k], s.given[k] == 2
+        elif math.isfinite(value):
+            x[width + column] = value
+        if lost:
             s.lost[s.code[a + 1]] = 1
     for k in range(s.code[KINEMATICS]):
         at = s.code[AT_KINEMATICS] + 3 * k
