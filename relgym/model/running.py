@@ -1,28 +1,27 @@
 """Asking the compiled program of a model: one scene or many, as long as the model says the same.
 
-The kernel is loaded, and compiled where no file holds it, once so much was asked that it pays (`Kernel`). A program
-is lowered (`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model said
-something else that it pays, too: lowering costs as much as arrays take for a few scenes. What most transitions change,
-votes, is written into the program that there is. Until then, and where there is no program for what was learned, arrays
-answer (`relgym.model.querying`); all give the same bits.
+The kernel is loaded once so much was asked that it pays (`relgym.model.compiled`). A program is lowered
+(`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model said something else
+that it pays, too: lowering costs as much as arrays take for a few scenes. What most transitions change, votes, is
+written into the program that there is. Until then, and where there is no program for what was learned, arrays answer
+(`relgym.model.querying`); all give the same bits.
 """
 
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from threading import Lock, Thread
-from typing import Final, NamedTuple
+from threading import Lock
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
-from relgym.errors import SlowWarning
 from relgym.model.calibration import GUESS, LATEST, OWN, PERSISTENCE, Audit, Key
+from relgym.model.compiled import KERNEL
 from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
 from relgym.model.motion import TOUCHING
@@ -41,12 +40,12 @@ from relgym.model.scenes import wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
 from relgym.model.trusting import trusting
-from relgym.program.machine import Machine, make
+from relgym.program.machine import Machine
 from relgym.program.records import Answer, BeyondError, Program, Trust
 from relgym.program.tape import Tape, encoded, kind_of, ordered
 from relgym.scene.objects import Scene, SceneLayout
 
-__all__ = ["KERNEL", "Kernel", "Programs"]
+__all__ = ["Programs", "Runner"]
 
 PATIENCE = 8
 """Scenes that arrays answer after each change of what a model says before a program is lowered: that takes about as
@@ -56,12 +55,6 @@ SETTLING = 64
 """Scenes asked one by one, since the model last changed, before the program is told how right its predictions were:
 to write that down takes about as long as to settle so many predictions without it. Nor does a program that couldn't
 tell scenes rest for more."""
-
-ASKING, SCENE = 5e-4, 6e-6
-"""What arrays take to answer, in seconds: each time, and for each scene."""
-
-LOADING = 0.06
-"""What it takes to load the kernel from the disk, in seconds."""
 
 _PREDICTED, _DEPENDS = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.DEPENDS)
 _Bits = NDArray[np.int64]
@@ -165,69 +158,6 @@ class _Known:
     parts: Parts
     runner: Runner | None
     changes: int
-
-
-class Kernel:
-    """The compiled kernel, as this process has it: none before it pays.
-
-    Once arrays have taken about as long as loading it takes, it is loaded in a thread of its own; where no file holds
-    it, another process compiles it first (`relgym.program.machine`). Arrays answer until it is there, with the same
-    bits: no step ever waits. What arrays took is estimated from what was asked.
-
-    Attributes
-    ----------
-    machine
-        The kernel; None: not yet, or it can't be had.
-    spent
-        What arrays took so far, in seconds.
-    """
-
-    def __init__(self) -> None:
-        self.machine: Machine | None = None
-        self.spent = 0.0
-        self._missing = ""  # why it can't be had
-        self._warned = False
-        self._loader: Thread | None = None
-        self._turn = Lock()
-
-    def after(self, scenes: int) -> Machine | None:
-        """The kernel, if it is there, now that so many scenes more are asked."""
-        if self.machine is None and not self._warned:
-            self.spent += ASKING + SCENE * scenes
-            if self._missing:
-                self._warn()
-            elif self._loader is None and self.spent >= LOADING:
-                self._loader = Thread(target=self._make, name="relgym's kernel", daemon=True)
-                self._loader.start()
-        return self.machine
-
-    def load(self) -> Machine | None:
-        """Have it now, whether it pays or not, compiled if need be."""
-        self._make()
-        if self._missing and not self._warned:
-            self._warn()
-        return self.machine
-
-    def _make(self) -> None:
-        with self._turn:
-            if self.machine is None and not self._missing:
-                try:
-                    self.machine = make()
-                    self._missing = "" if self.machine else "it couldn't be compiled"
-                except (ImportError, OSError, RuntimeError) as error:
-                    self._missing = f"{type(error).__name__}: {error}; pip install llvmlite"
-
-    def _warn(self) -> None:
-        self._warned = True
-        warnings.warn(
-            f"models are run by arrays, some 30 times slower, since there is no kernel: {self._missing}",
-            SlowWarning,
-            stacklevel=4,
-        )
-
-
-KERNEL: Final = Kernel()
-"""That of this process."""
 
 
 class _Told(NamedTuple):
@@ -432,7 +362,11 @@ class Runner:
         return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
 
     def _told(
-        self, now: NDArray[np.float64], *, settling: bool, given: Mapping[int, tuple[int, float]] | None = None
+        self,
+        now: NDArray[np.float64],
+        *,
+        settling: bool,
+        given: Mapping[int, tuple[int, float]] | None = None,
     ) -> _Told | None:
         """Run the program of one scene; None: arrays must, or can say why not.
 

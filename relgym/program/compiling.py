@@ -16,7 +16,7 @@ import inspect
 import math
 import struct
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, NamedTuple, TypeAlias
@@ -81,19 +81,16 @@ _REAL: Final = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fd
 _COMPARED: Final = {ast.Eq: "eq", ast.NotEq: "ne", ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
 
 
-def assembly(entry: Callable[..., Any], types: Sequence[Type], space: np.dtype[Any], name: str) -> str:
-    """LLVM's assembly of a function and of all that it calls.
+def assembly(entries: Mapping[str, tuple[Callable[..., Any], tuple[Type, ...]]], space: np.dtype[Any]) -> str:
+    """LLVM's assembly of some functions and of all that they call.
 
     Parameters
     ----------
-    entry
-        The function that others call; what it and its callees name is looked up where each was defined.
-    types
-        Types of its arguments.
+    entries
+        By the name under which others call it: each function, and the types of its arguments. What it and its callees
+        name is looked up where each was defined.
     space
         What arguments of type ``"space"`` point at: fields that are arrays.
-    name
-        What the compiled function is called.
 
     Raises
     ------
@@ -101,7 +98,8 @@ def assembly(entry: Callable[..., Any], types: Sequence[Type], space: np.dtype[A
         Something is said that there is no word for here.
     """
     module = _Module(space)
-    module.function(entry, tuple(types), name)
+    for name, (function, types) in entries.items():
+        module.function(function, types, name)
     return module.text()
 
 

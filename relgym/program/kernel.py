@@ -52,7 +52,7 @@ from relgym.program.tape import (
     WIDTH,
 )
 
-__all__ = ["run"]
+__all__ = ["run", "see"]
 
 PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
 """Outcomes, in the order of `relgym.model.prediction.OUTCOMES`."""
@@ -1763,4 +1763,53 @@ def run(s, n, settling, telling, writing, vectors, following, outcomes, modes, m
                 outcomes[at], modes[at], margins[at] = s.outcomes[k], s.modes[k], s.margins[k]
                 if settling:
                     sure[at], sure[n * answers + at] = s.sure[k, 0], s.sure[k, 1]
+    return 0
+
+
+def see(s, t, vector, table, close, struck, told):
+    """What one body sees of a scene (`relgym.model.sight`).
+
+    Parameters
+    ----------
+    s
+        Work space with the tape in it, of a program that asks for all relations, and for everything.
+    t
+        Number of the body.
+    vector
+        The scene's state vector.
+    table
+        Where it goes which relation holds for which pair of bodies: 0 or 1 for each relation, first and second body.
+    close, struck
+        Where the contexts of the body go: 0 or 1 for each body.
+    told
+        Where the features of its pairs go, body by body.
+
+    Returns
+    -------
+    0, or why the scene can't be.
+    """
+    width, bodies, one = s.code[WIDTH], s.code[BODIES], np.int64(1)
+    for k in range(width):
+        s.x[k] = vector[k]
+        if not abs(vector[k]) < math.inf:
+            return NOT_FINITE
+    s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
+    bad = look(s)
+    if bad:
+        return bad
+    s.masks[3], s.masks[4], s.masks[6] = -1, 0, 0
+    surroundings(s, t)
+    relate(s, s.masks[2])
+    unfold(s)
+    at = 0
+    for r in range(s.code[RELATIONS]):
+        for a in range(bodies):
+            for b in range(bodies):
+                table[at] = s.rows[r, a] >> b & one
+                at += 1
+    width = s.code[FACTS] + s.code[OTHERS]
+    for k in range(bodies):
+        close[k], struck[k] = s.masks[1] >> k & one, s.masks[0] >> k & one
+        for f in range(width):
+            told[k * width + f] = s.told[k, f]
     return 0

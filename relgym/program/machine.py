@@ -2,8 +2,8 @@
 
 The file lies where Python keeps what it compiles (`__pycache__`), else in the user's folder for such things; its name
 says of which text, compiler and processor it is. Compiling takes a process of two seconds and 130 MB, which ends by
-itself; it proves what it made on an empty program before anybody else loads it. Loading takes 0.03 to 0.06 s, nearly all
-of it the import of llvmlite.
+itself; it proves what it made on an empty program before anybody else loads it. Loading takes 0.03 to 0.06 s, nearly
+all of it the import of llvmlite.
 """
 
 from __future__ import annotations
@@ -16,18 +16,21 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.program.compiling import Array, Type, assembly
+
 __all__ = ["Machine", "build", "folders", "main", "make"]
 
-_ENTRY: Final = "relgym_run"
+_RUN, _SEE = "relgym_run", "relgym_see"
 _ADDRESS, _NUMBER = ctypes.c_void_p, ctypes.c_int64
-_CALL: Final = ctypes.CFUNCTYPE(_NUMBER, _ADDRESS, _NUMBER, *(ctypes.c_bool,) * 3, *(_ADDRESS,) * 6)
+_RUNNING: Final = ctypes.CFUNCTYPE(_NUMBER, _ADDRESS, _NUMBER, *(ctypes.c_bool,) * 3, *(_ADDRESS,) * 6)
+_SEEING: Final = ctypes.CFUNCTYPE(_NUMBER, _ADDRESS, _NUMBER, *(_ADDRESS,) * 5)
 _DIGEST: Final = 32
 """Length of the digest that a file begins with."""
 
@@ -50,8 +53,10 @@ class Machine:
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         self._engine.finalize_object()
-        self.call = _CALL(self._engine.get_function_address(_ENTRY))
-        """Run the kernel (`relgym.program.kernel.run`) on addresses, of arrays that lie in one piece."""
+        self.call = _RUNNING(self._engine.get_function_address(_RUN))
+        """`relgym.program.kernel.run` on addresses, of arrays that lie in one piece."""
+        self.see = _SEEING(self._engine.get_function_address(_SEE))
+        """`relgym.program.kernel.see`, likewise."""
 
     def run(
         self,
@@ -192,14 +197,13 @@ def build() -> bytes:
     import llvmlite.binding as llvm
 
     from relgym.program import kernel
-    from relgym.program.compiling import Array, Type, assembly
     from relgym.program.tape import SPACE
 
-    given = {"vectors": "double", "following": "double", "outcomes": "i8", "modes": "i64"}
-    given |= {"margins": "double", "sure": "double"}
-    arrays = (Array(element, (0,), f"given {name}") for name, element in given.items())
-    types: tuple[Type, ...] = ("space", "i64", "i1", "i1", "i1", *arrays)
-    module = llvm.parse_assembly(assembly(kernel.run, types, SPACE, _ENTRY))
+    entries: dict[str, tuple[Callable[..., Any], tuple[Type, ...]]] = {
+        _RUN: (kernel.run, ("space", "i64", "i1", "i1", "i1", *_flat("double double i8 i64 double double"))),
+        _SEE: (kernel.see, ("space", "i64", *_flat("double i8 i8 i8 double"))),
+    }
+    module = llvm.parse_assembly(assembly(entries, SPACE))
     module.verify()
     tuning = llvm.create_pipeline_tuning_options(speed_level=2)
     # One scene at a time, few of anything: vectors of LLVM's and loops written out cost a second and win nothing.
@@ -208,3 +212,8 @@ def build() -> bytes:
     builder = llvm.create_pass_builder(target, tuning)
     builder.getModulePassManager().run(module, builder)
     return bytes(target.emit_object(module))
+
+
+def _flat(elements: str) -> tuple[Type, ...]:
+    """Types of arrays, none of which overlaps another one, by those of their entries."""
+    return tuple(Array(element, (0,), f"given {k}") for k, element in enumerate(elements.split()))

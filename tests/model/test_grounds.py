@@ -24,6 +24,7 @@ from relgym.laws.inertia import Inertia
 from relgym.laws.records import Share
 from relgym.logic.clause import Definition
 from relgym.model import running
+from relgym.model.compiled import KERNEL
 from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
@@ -45,7 +46,7 @@ from relgym.wrappers import ModelLearner
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The kernel is there, and programs are lowered for the first scene that is asked."""
     monkeypatch.setattr(running, "PATIENCE", 0)
-    running.KERNEL.load()
+    KERNEL.load()
 
 
 def told(prediction: ScenePrediction) -> list[object]:
@@ -123,7 +124,7 @@ def fresh_and_kept(model: WorldModel, scene: Scene) -> tuple[Runner, Runner] | N
     """What runs the program that was kept, and one that was lowered just now; None where there is none."""
     model.predict_one(scene)
     kept = model._programs.of(model._parts, scene.layout, 1)
-    machine = running.KERNEL.load()
+    machine = KERNEL.load()
     if kept is None or machine is None:
         return None
     return Runner(model._parts, scene.layout, lowered(model._parts, scene.layout), machine), kept

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
-from threading import Event
 
 import numpy as np
 import pytest
@@ -15,9 +14,9 @@ from programs import MODELS, arrays, looked_back, scenes_of
 from worlds import LINE_TARGETS, learned, schema_of, transitions
 
 from relgym.config import ModelConfig
-from relgym.errors import SlowWarning
 from relgym.model import running
 from relgym.model.calibration import Audit, Key
+from relgym.model.compiled import KERNEL
 from relgym.model.lowering import lowered
 from relgym.model.prediction import LateAudit, Prediction
 from relgym.model.querying import predict
@@ -30,7 +29,7 @@ from relgym.scene.objects import Scene
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The kernel is there, and programs are lowered for the first scene that is asked."""
     monkeypatch.setattr(running, "PATIENCE", 0)
-    running.KERNEL.load()
+    KERNEL.load()
 
 
 def assert_fresh(model: WorldModel, scene: Scene) -> None:
@@ -103,30 +102,6 @@ def test_a_program_is_lowered_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(calls) == 1
 
 
-def test_the_kernel_is_loaded_off_the_step_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
-    going, made = Event(), running.KERNEL.machine
-
-    def slowly() -> object:
-        assert going.wait(60.0)
-        return made
-
-    monkeypatch.setattr(running, "make", slowly)
-    kernel = running.Kernel()
-    assert kernel.after(1) is None and kernel.spent > 0.0 and kernel._loader is None
-    many = int(1.01 * running.LOADING / running.SCENE)
-    assert kernel.after(many) is None  # a thread has begun
-    assert kernel._loader is not None and kernel.after(1) is None
-    going.set()
-    kernel._loader.join()
-    assert kernel.after(1) is kernel.machine is made is not None
-
-
-def test_who_wants_it_now_waits_for_it() -> None:
-    kernel = running.Kernel()
-    assert kernel.load() is not None
-    assert kernel.after(1) is kernel.load() is kernel.machine
-
-
 def test_programs_that_cannot_tell_rest() -> None:
     schema = schema_of(LINE_STEPS, LINE_TARGETS)
     scene = transitions(schema, LINE_STEPS[:1])[0].before
@@ -150,28 +125,6 @@ def test_programs_that_cannot_tell_rest() -> None:
         programs.one(None, scene, lambda _: None)  # type: ignore[arg-type, return-value]
     # Rests of 1, 3, 7, 15, 31, 63, then of 64; whoever can tell is asked each time, and rests shortly when he can't.
     assert asked == [0, 2, 6, 14, 30, 62, 126, 191, 192, 193, 194, 196, 200]
-
-
-def refused() -> None:
-    raise ImportError("No module named 'llvmlite'")
-
-
-@pytest.mark.parametrize(("make", "why"), [(refused, "pip install llvmlite"), (lambda: None, "be compiled")])
-def test_without_a_kernel_arrays_answer_and_a_warning_says_so_once(
-    monkeypatch: pytest.MonkeyPatch, make: Callable[[], None], why: str
-) -> None:
-    monkeypatch.setattr(running, "KERNEL", kernel := running.Kernel())
-    monkeypatch.setattr(running, "make", make)
-    kernel.spent = running.LOADING
-    model = learned(schema := schema_of(LINE_STEPS, LINE_TARGETS), LINE_STEPS[:60])
-    scene = transitions(schema, LINE_STEPS[60:61])[0].before
-    model.predict_one(scene)
-    assert kernel._loader is not None
-    kernel._loader.join()
-    with pytest.warns(SlowWarning, match=why):
-        model.predict_one(scene)
-    assert_fresh(model, scene)  # a second warning would be an error
-    assert kernel.load() is None
 
 
 @pytest.mark.parametrize("make", [cart_model, line_model, room_model, lambda: room_model("auto")])

@@ -29,7 +29,7 @@ def compiled(function: Callable[..., Any], *types: str, result: Any = ctypes.c_i
     llvm = pytest.importorskip("llvmlite.binding")
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    module = llvm.parse_assembly(assembly(function, ("space", *types), SPACE, "entry"))
+    module = llvm.parse_assembly(assembly({"entry": (function, ("space", *types))}, SPACE))
     module.verify()
     engine = llvm.create_mcjit_compiler(module, llvm.Target.from_default_triple().create_target_machine())
     engine.finalize_object()
@@ -164,11 +164,11 @@ def unnamed(s, n):  # type: ignore[no-untyped-def]
 )
 def test_what_cannot_be_compiled_says_where(function: Callable[..., Any], why: str) -> None:
     with pytest.raises(CompileError, match=rf"{function.__name__}, line \d+: .*{why}"):
-        assembly(function, ("space", "i64"), SPACE, "entry")
+        assembly({"entry": (function, ("space", "i64"))}, SPACE)
 
 
 def test_arrays_of_different_places_are_told_apart() -> None:
-    text = assembly(numbers, ("space", "double", "double"), SPACE, "entry")
+    text = assembly({"entry": (numbers, ("space", "double", "double"))}, SPACE)
     assert '!{!"b", !0, i64 0}' in text and "!tbaa" in text
     assert Array("i64", (3,), "a") != Array("i64", (3,), "b")
 

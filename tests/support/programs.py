@@ -26,11 +26,12 @@ from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE, AxisLaw, FreeLaw, PairLaw, Piece, Share
 from relgym.logic.clause import Clause, Coverage, Definition, Literal
 from relgym.model.calibration import EXPERTS, OWN, Audit, Key
+from relgym.model.compiled import KERNEL
 from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
 from relgym.model.prediction import BatchPrediction
 from relgym.model.querying import predict_many
-from relgym.model.running import KERNEL, Runner
+from relgym.model.running import Runner
 from relgym.model.target.hindsight import Hindsight
 from relgym.model.target.limits import Limits
 from relgym.model.target.property_model import PropertyModel
