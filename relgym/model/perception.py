@@ -17,7 +17,7 @@ from relgym.model.compiled import KERNEL
 from relgym.model.grouping import distinct
 from relgym.model.sight import Seen, Sight
 from relgym.program.records import BeyondError
-from relgym.scene.context import order_and_ties, signature, slots
+from relgym.scene.context import order_and_ties, slots, state_keys
 from relgym.scene.objects import ACTION, ObjectType, SceneLayout, poses
 from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
@@ -53,8 +53,8 @@ class Standing(NamedTuple):
 LinedUp: TypeAlias = tuple[NDArray[np.intp], list[bytes]]
 """The other bodies of each scene in canonical order, shape ``(n, K - 1)``, and each scene's relational state."""
 
-MOST_ORDERS = 4096
-"""Of so many single scenes it is remembered how bodies are lined up."""
+MOST_STATES = 4096
+"""Of so many single scenes the relational state is remembered."""
 
 MOST_SIGHTS = 32
 """For so many layouts the kernel has a work space to look at scenes in, of at most 2 MB."""
@@ -137,7 +137,7 @@ class Situation:
 
     @cached_property
     def _lined_up(self) -> LinedUp:
-        return self._percept.perception.lined_up(self._percept, self._body, self._table)
+        return self._percept.perception.lined_up(self._percept, self._body, self._seen)
 
 
 class Perception:
@@ -191,7 +191,7 @@ class Perception:
         self._unary: dict[int, NDArray[np.bool_]] = {}
         self._features: dict[int, NDArray[np.intp]] = {}
         self._pair_counts: dict[str, int] = {}
-        self._orders: dict[tuple[int, int, bytes], LinedUp] = {}
+        self._states: dict[tuple[int, int, bytes, bytes], list[bytes]] = {}
         self._sights: dict[int, Sight | None] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -205,7 +205,7 @@ class Perception:
             "_unary",
             "_features",
             "_pair_counts",
-            "_orders",
+            "_states",
             "_sights",
         )
         return {name: value for name, value in self.__dict__.items() if name not in caches}
@@ -277,26 +277,23 @@ class Perception:
         sight = self._sights[key]
         return None if sight is None else sight.see(percept.vectors[0], body)
 
-    def lined_up(self, percept: Percept, body: int, table: NDArray[np.bool_]) -> LinedUp:
+    def lined_up(self, percept: Percept, body: int, seen: Seen | None) -> LinedUp:
         """How the other bodies of scenes are lined up for one of them, and what state that makes.
 
-        What relations alone decide is remembered for single scenes: they mostly hold for many steps.
+        The state is remembered for single scenes, of which the kernel tells the order: it mostly holds for many steps.
         """
-        alone = len(percept) == 1
-        key = (id(percept.layout), body, table.tobytes() if alone else b"")
-        if alone and (known := self._orders.get(key)) is not None:
-            return known
-        relations = percept.relations
-        order, tied = order_and_ties(
-            relations, body, lambda rows: poses(percept.layout, percept.vectors[rows])
-        )
-        found = order, signature(relations, body, order)
-        if alone and not tied[0]:
-            if len(self._orders) >= MOST_ORDERS:
-                self._orders.clear()
-            order.flags.writeable = False
-            self._orders[key] = found
-        return found
+        layout = percept.layout
+        if seen is None:
+            order, _ = order_and_ties(
+                percept.relations, body, lambda rows: poses(layout, percept.vectors[rows])
+            )
+            return order, state_keys(percept.relations.table, layout, body, order)
+        key = (id(layout), body, seen.table.tobytes(), seen.order.tobytes())
+        if (known := self._states.get(key)) is None:
+            if len(self._states) >= MOST_STATES:
+                self._states.clear()
+            known = self._states[key] = state_keys(seen.table, layout, body, seen.order)
+        return seen.order, known
 
     def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
         """Columns of a regression row in the concatenation of a state vector and its next one; cached."""

@@ -33,12 +33,15 @@ class Seen(NamedTuple):
         `relgym.scene.surroundings.Surroundings`, shape ``(1, K)``; the second None without `parting`.
     pair
         Contact features, and the bodies' own numbers, shape ``(1, K, F)``; NaN for the body itself.
+    order
+        Numbers of the other bodies in canonical order, shape ``(1, K - 1)``.
     """
 
     table: NDArray[np.bool_]
     close: NDArray[np.bool_]
     struck: NDArray[np.bool_] | None
     pair: NDArray[np.float64]
+    order: NDArray[np.intp]
 
 
 class Sight:
@@ -81,13 +84,13 @@ class Sight:
         """What a body sees of a scene; None: arrays must look, or can say why not."""
         square, row, block = self._shapes
         told = np.empty(square, dtype=np.bool_), np.empty(row, dtype=np.bool_), np.empty(row, dtype=np.bool_)
-        pair = np.empty(block)
+        pair, order = np.empty(block), np.empty(row, dtype=np.int64)
         vector = np.ascontiguousarray(vector, dtype=np.float64)
-        places = (each.ctypes.data for each in (vector, *told, pair))
+        places = (each.ctypes.data for each in (vector, *told, pair, order))
         if self._machine.see(self._space.ctypes.data, body, *places):
             return None
         table, close, struck = told
-        return Seen(table, close, struck if self._parting else None, pair)
+        return Seen(table, close, struck if self._parting else None, pair, order[:, 1:])
 
 
 def _program(

@@ -1766,7 +1766,7 @@ def run(s, n, settling, telling, writing, vectors, following, outcomes, modes, m
     return 0
 
 
-def see(s, t, vector, table, close, struck, told):
+def see(s, t, vector, table, close, struck, told, order):
     """What one body sees of a scene (`relgym.model.sight`).
 
     Parameters
@@ -1783,6 +1783,8 @@ def see(s, t, vector, table, close, struck, told):
         Where the contexts of the body go: 0 or 1 for each body.
     told
         Where the features of its pairs go, body by body.
+    order
+        Where the others go as they are lined up for it, behind 1 if more than their relations to it decides that.
 
     Returns
     -------
@@ -1812,4 +1814,7 @@ def see(s, t, vector, table, close, struck, told):
         close[k], struck[k] = s.masks[1] >> k & one, s.masks[0] >> k & one
         for f in range(width):
             told[k * width + f] = s.told[k, f]
+    order[0] = 1 if line_up(s, t) else 0
+    for k in range(1, bodies):
+        order[k] = s.lineup[0, k]
     return 0

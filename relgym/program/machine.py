@@ -30,7 +30,7 @@ __all__ = ["Machine", "build", "folders", "main", "make"]
 _RUN, _SEE = "relgym_run", "relgym_see"
 _ADDRESS, _NUMBER = ctypes.c_void_p, ctypes.c_int64
 _RUNNING: Final = ctypes.CFUNCTYPE(_NUMBER, _ADDRESS, _NUMBER, *(ctypes.c_bool,) * 3, *(_ADDRESS,) * 6)
-_SEEING: Final = ctypes.CFUNCTYPE(_NUMBER, _ADDRESS, _NUMBER, *(_ADDRESS,) * 5)
+_SEEING: Final = ctypes.CFUNCTYPE(_NUMBER, _ADDRESS, _NUMBER, *(_ADDRESS,) * 6)
 _DIGEST: Final = 32
 """Length of the digest that a file begins with."""
 
@@ -201,7 +201,7 @@ def build() -> bytes:
 
     entries: dict[str, tuple[Callable[..., Any], tuple[Type, ...]]] = {
         _RUN: (kernel.run, ("space", "i64", "i1", "i1", "i1", *_flat("double double i8 i64 double double"))),
-        _SEE: (kernel.see, ("space", "i64", *_flat("double i8 i8 i8 double"))),
+        _SEE: (kernel.see, ("space", "i64", *_flat("double i8 i8 i8 double i64"))),
     }
     module = llvm.parse_assembly(assembly(entries, SPACE))
     module.verify()
