@@ -1192,14 +1192,14 @@ def line_up(s, t):
             )
             if k != t and j != t and same and toward[k] == toward[j]:
                 tied = True
+    if tied:
+        rank_groups(s, t, relations)
     for k in range(bodies):
         around[k] = ZERO64
         if tied and k != t:
             for j in range(bodies):
                 if j != k and j != t:
-                    group = np.uint64(s.code[s.code[AT_BODIES] + BODY * j + GROUP])
-                    kind = (group_rank(s, t, group) + ONE64) << np.uint64(2 * relations)
-                    bits = both_ways(s, relations, k, j) + kind
+                    bits = both_ways(s, relations, k, j) + s.hashes[2, j]
                     around[k] += mixed(mixed(bits + GOLDEN) + toward[j] + GOLDEN)
     order[0], count = t, 1
     for k in range(bodies):
@@ -1214,17 +1214,18 @@ def line_up(s, t):
     return tied
 
 
-def group_rank(s, t, group):
-    """Number of a type among those of all bodies but t."""
-    found = ZERO64
-    for g in range(s.code[BODIES]):
-        there = False
-        for k in range(s.code[BODIES]):
-            if k != t and s.code[s.code[AT_BODIES] + BODY * k + GROUP] == g:
-                there = True
-        if there and np.uint64(g) < group:
-            found += ONE64
-    return found
+def rank_groups(s, t, relations):
+    """Numbers of the bodies' types among those of all bodies but t, from 1 on, above the bits of relations."""
+    one, there = np.int64(1), np.int64(0)
+    for k in range(s.code[BODIES]):
+        if k != t:
+            there |= one << s.code[s.code[AT_BODIES] + BODY * k + GROUP]
+    for k in range(s.code[BODIES]):
+        rank_ = ONE64
+        for g in range(s.code[s.code[AT_BODIES] + BODY * k + GROUP]):
+            if there >> g & 1:
+                rank_ += ONE64
+        s.hashes[2, k] = rank_ << np.uint64(2 * relations)
 
 
 def both_ways(s, relations, a, b):
