@@ -61,14 +61,14 @@ FACADE_USERS = frozenset({"experiments", "console", "cli"})
 CORE_LIBRARIES = frozenset({"msgspec", "numpy", "scipy"})
 FCL = "relgym.scene.geometry.fcl"
 """The only module that may import python-fcl."""
-KERNEL = "relgym.program.kernel"
-"""The only module that may import numba."""
+MACHINE = "relgym.program.machine"
+"""The only module that may import llvmlite."""
 
 HEAVY = (
     "fcl",
+    "llvmlite",
     "matplotlib",
     "msgspec",
-    "numba",
     "pygame",
     "pymunk",
     "scipy.spatial",
@@ -127,12 +127,12 @@ def test_the_core_needs_five_libraries_alone() -> None:
         for m in modules()
         if m.package in CORE
         for i in m.imports
-        if _third_party(i) and (m.name, _distribution(i)) not in {(FCL, "fcl"), (KERNEL, "numba")}
+        if _third_party(i) and (m.name, _distribution(i)) not in {(FCL, "fcl"), (MACHINE, "llvmlite")}
     ]
-    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, fcl in {FCL}, numba in {KERNEL}\n" + "\n".join(wrong)
+    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, fcl in {FCL}, llvmlite in {MACHINE}\n" + "\n".join(wrong)
 
 
-@pytest.mark.parametrize(("library", "user"), [("fcl", FCL), ("numba", KERNEL)])
+@pytest.mark.parametrize(("library", "user"), [("fcl", FCL), ("llvmlite", MACHINE)])
 def test_only_one_module_imports(library: str, user: str) -> None:
     users = {module.name for module in modules() if any(_distribution(i) == library for i in module.imports)}
     assert users == {user}

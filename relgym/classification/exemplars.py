@@ -332,7 +332,8 @@ class Exemplars:
             if len(self) < most:
                 cell.keep(slot := self.columns.append(most), hard)
                 return slot
-            crowded = max(self._cells, key=len)
+            sizes = [len(each.soft) + len(each.hard) for each in self._cells]
+            crowded = self._cells[sizes.index(max(sizes))]
             if len(cell) < len(crowded):
                 cell.keep(slot := crowded.give_up(), hard)
                 return slot

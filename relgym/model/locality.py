@@ -8,9 +8,10 @@ small scenes have the same layout, whoever the neighbours are.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,9 @@ __all__ = [
     "predict_locally",
     "predict_many_locally",
 ]
+
+Ask: TypeAlias = Callable[[Scene, Callable[[Scene], Percept]], ScenePrediction | None]
+"""From a scene, and what is seen of it if somebody looks, to what follows; None: arrays must say that."""
 
 MOST = 96
 """Scenes of no more bodies than this are looked at as a whole."""
@@ -254,8 +258,8 @@ def _learned(
     return [moved[k] for k in np.unique(np.linspace(0, len(moved) - 1, LEARNED).astype(int)).tolist()]
 
 
-def predict_locally(parts: Parts, near: Neighbourhoods, scene: Scene) -> ScenePrediction:
-    """Predict the scene that follows a large one."""
+def predict_locally(parts: Parts, near: Neighbourhoods, scene: Scene, ask: Ask) -> ScenePrediction:
+    """Predict the scene that follows a large one; `ask` is asked of small ones first."""
     layout, following = scene.layout, scene.vector.copy()
     foci = _predicted(parts, layout)
     if len(foci) > SINGLY:
@@ -265,7 +269,8 @@ def predict_locally(parts: Parts, near: Neighbourhoods, scene: Scene) -> ScenePr
     for focus in foci:
         window = near.window(focus)
         names = dict(zip(window.scene.layout.names, (layout.names[k] for k in window.objects), strict=True))
-        for one in predict(parts, near.percept(focus), window.scene).parts:
+        said = ask(window.scene, partial(_seen, near, focus))
+        for one in (said or predict(parts, near.percept(focus), window.scene)).parts:
             if names[one.object] == layout.names[focus]:
                 roles = tuple(names[role] for role in one.roles)
                 found.append(replace(one, object=layout.names[focus], roles=roles))
@@ -273,6 +278,10 @@ def predict_locally(parts: Parts, near: Neighbourhoods, scene: Scene) -> ScenePr
     derive(parts.schema, layout, scene.vector[None], following[None])
     wrap(layout, following)
     return ScenePrediction(Scene(scene.schema, layout, following), tuple(found))
+
+
+def _seen(near: Neighbourhoods, focus: int, _: Scene) -> Percept:
+    return near.percept(focus)
 
 
 def predict_many_locally(

@@ -26,6 +26,7 @@ from relgym.laws.records import ONE, AxisLaw, PairLaw, Piece
 from relgym.laws.shares import EXTENT
 from relgym.laws.touching import Cast
 from relgym.logic.clause import Clause, Literal
+from relgym.model.bodies import body_of, check_bodies
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Perception, Situation
 from relgym.model.scenes import angle_columns
@@ -35,8 +36,7 @@ from relgym.numeric.tree import DecisionTree
 from relgym.program import records as ir
 from relgym.scene.axes import Axes
 from relgym.scene.contacts import APPROACH_EPS
-from relgym.scene.objects import TASK, SceneLayout, Target, pose_columns
-from relgym.scene.shapes import Box, Compound, Sphere, outline
+from relgym.scene.objects import TASK, SceneLayout, Target
 
 __all__ = ["lowered"]
 
@@ -68,8 +68,7 @@ class _Lowering:
         self.keys: dict[tuple[str, str], int] = {}
         self.everything = False
         self.wanted: set[int] = set()
-        if layout.bodies:
-            self._check()
+        check_bodies(self.axes, self.perception.extractor.geometry, layout)
         self.unary = {
             name: self._mask(row)
             for name, row in zip(
@@ -81,17 +80,6 @@ class _Lowering:
         # Situations read only the layout of a percept, as far as they are asked here.
         nothing = np.empty((0, layout.width))
         self._percept = Percept(self.perception, layout, nothing, None)
-
-    def _check(self) -> None:
-        shapes = {type(self.layout.types[i].shape) for i in self.layout.bodies}
-        if not self.axes.planar and shapes not in ({Box}, {Sphere}):
-            raise ir.BeyondError("a world in space of other bodies than boxes, or spheres")
-        if Compound in shapes:
-            raise ir.BeyondError("bodies of several convex parts")
-        if self.perception.extractor.geometry != "arrays":
-            raise ir.BeyondError(f"the geometry {self.perception.extractor.geometry!r}")
-        if len(self.layout.bodies) > ir.MOST_BODIES:
-            raise ir.BeyondError(f"more than {ir.MOST_BODIES} bodies")
 
     def _mask(self, flags: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> int:
         return sum(1 << int(k) for k in np.flatnonzero(flags))
@@ -159,41 +147,9 @@ class _Lowering:
         )
 
     def _body(self, number: int) -> ir.Body:
-        layout = self.layout
-        index = layout.bodies[number]
-        t = layout.types[index]
-        shape = t.shape
-        assert shape is not None, "a body has a shape"
-        used, depth = self.axes.used, self.axes.depth
-        # `pose_columns` numbers the constants 0 and 1 behind the state vector.
-        place = [
-            int(c) if c < layout.width else (self.zero, self.one)[int(c) - layout.width]
-            for c in pose_columns(layout)[0][number]
-        ]
-        own = t.velocity_columns()
-        along = (*used, depth)[:3]
-        velocity = [layout.offsets[index] + own[axis] if own[axis] >= 0 else self.zero for axis in used]
+        t = self.layout.types[self.layout.bodies[number]]
         sources = None if self.parts.laws is None else self.parts.laws.learner.sources.get(t.name)
-        spin = None if sources is None else sources.spin
-        corners = (
-            ()
-            if isinstance(shape, Sphere) or not self.axes.planar
-            else tuple((float(a), float(b)) for a, b in outline(shape, (used[0], used[1])))
-        )
-        kind = "round" if isinstance(shape, Sphere) else "box" if isinstance(shape, Box) else "polygon"
-        return ir.Body(
-            layout.names[index],
-            kind,
-            corners,
-            (place[along[0]], place[along[1]], place[along[2]]),
-            (place[6 + along[0]], place[6 + along[1]], place[6 + along[2]]),
-            place[3 + depth],
-            (velocity[0], velocity[1], velocity[2] if len(used) > 2 else self.zero),
-            any(own[axis] >= 0 for axis in used),
-            self.zero if spin is None else layout.column(index, spin),
-            spin is not None,
-            tuple(place),
-        )
+        return body_of(self.axes, self.layout, number, None if sources is None else sources.spin)
 
     # ------------------------------------------------------------------ laws of motion
     def _motion(self) -> ir.Motion:

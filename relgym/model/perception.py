@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import check_entries, library_of
+from relgym.model.compiled import KERNEL
 from relgym.model.grouping import distinct
-from relgym.scene.context import order_and_ties, signature, slots
+from relgym.model.sight import Seen, Sight
+from relgym.program.records import BeyondError
+from relgym.scene.context import order_and_ties, slots, state_keys
 from relgym.scene.objects import ACTION, ObjectType, SceneLayout, poses
 from relgym.scene.relations import Extractor, Relations
 from relgym.scene.schema import SceneSchema
@@ -50,8 +53,11 @@ class Standing(NamedTuple):
 LinedUp: TypeAlias = tuple[NDArray[np.intp], list[bytes]]
 """The other bodies of each scene in canonical order, shape ``(n, K - 1)``, and each scene's relational state."""
 
-MOST_ORDERS = 4096
-"""Of so many single scenes it is remembered how bodies are lined up."""
+MOST_STATES = 4096
+"""Of so many single scenes the relational state is remembered."""
+
+MOST_SIGHTS = 32
+"""For so many layouts the kernel has a work space to look at scenes in, of at most 2 MB."""
 
 
 class Situation:
@@ -98,20 +104,32 @@ class Situation:
         return self._lined_up[1]
 
     @cached_property
+    def _seen(self) -> Seen | None:
+        """What the object sees of a single scene, by the kernel; None: arrays look."""
+        return None if self._body < 0 else self._percept.perception.see(self._percept, self._body)
+
+    @property
+    def _table(self) -> NDArray[np.bool_]:
+        """Which relation holds for which pair of bodies, shape ``(n, R, K, K)``."""
+        return self._percept.relations.table if self._seen is None else self._seen.table
+
+    @cached_property
     def examples(self) -> ExampleBatch:
         """Relations and numbers for classifiers."""
-        return replace(self._bare, table=self._percept.relations.table) if self._body >= 0 else self._bare
+        return replace(self._bare, table=self._table) if self._body >= 0 else self._bare
 
     def preview(self, relations: Collection[str]) -> ExampleBatch:
         """`examples` in which only these binary relations can be told; the others hold nowhere."""
         if self._body < 0:
             return self._bare
+        if self._seen is not None:
+            return replace(self._bare, table=self._seen.table)
         return replace(self._bare, table=self._percept.relations.table_of(relations))
 
     @cached_property
     def _bare(self) -> ExampleBatch:
         """`examples` without binary relations."""
-        return self._percept.bare_examples(self._target, self._body)
+        return self._percept.bare_examples(self._target, self._body, self._seen)
 
     @property
     def _numbers(self) -> NDArray[np.intp]:
@@ -119,7 +137,7 @@ class Situation:
 
     @cached_property
     def _lined_up(self) -> LinedUp:
-        return self._percept.perception.lined_up(self._percept, self._body)
+        return self._percept.perception.lined_up(self._percept, self._body, self._seen)
 
 
 class Perception:
@@ -173,7 +191,8 @@ class Perception:
         self._unary: dict[int, NDArray[np.bool_]] = {}
         self._features: dict[int, NDArray[np.intp]] = {}
         self._pair_counts: dict[str, int] = {}
-        self._orders: dict[tuple[int, int, bytes], LinedUp] = {}
+        self._states: dict[tuple[int, int, bytes, bytes], list[bytes]] = {}
+        self._sights: dict[int, Sight | None] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         # Caches are keyed by identity, which a copy doesn't share.
@@ -186,7 +205,8 @@ class Perception:
             "_unary",
             "_features",
             "_pair_counts",
-            "_orders",
+            "_states",
+            "_sights",
         )
         return {name: value for name, value in self.__dict__.items() if name not in caches}
 
@@ -239,25 +259,41 @@ class Perception:
             self._layouts[id(layout)] = layout  # keeps it alive, so that its id stays its own
         return known
 
-    def lined_up(self, percept: Percept, body: int) -> LinedUp:
+    def see(self, percept: Percept, body: int) -> Seen | None:
+        """What a body sees of a single scene, by the kernel; None: there is none, or it can't look at that."""
+        if len(percept) != 1 or (machine := KERNEL.after(1)) is None:
+            return None
+        key = id(percept.layout)
+        if key not in self._sights:
+            if len(self._sights) >= MOST_SIGHTS:
+                self._sights.clear()
+            numbers = self.feature_columns(percept.layout)
+            try:
+                found = Sight(machine, self.extractor, percept.layout, numbers, parting=self.parting)
+            except BeyondError:
+                self._sights[key] = None
+            else:
+                self._sights[key] = found
+        sight = self._sights[key]
+        return None if sight is None else sight.see(percept.vectors[0], body)
+
+    def lined_up(self, percept: Percept, body: int, seen: Seen | None) -> LinedUp:
         """How the other bodies of scenes are lined up for one of them, and what state that makes.
 
-        What relations alone decide is remembered for single scenes: they mostly hold for many steps.
+        The state is remembered for single scenes, of which the kernel tells the order: it mostly holds for many steps.
         """
-        relations, alone = percept.relations, len(percept) == 1
-        key = (id(percept.layout), body, relations.table.tobytes() if alone else b"")
-        if alone and (known := self._orders.get(key)) is not None:
-            return known
-        order, tied = order_and_ties(
-            relations, body, lambda rows: poses(percept.layout, percept.vectors[rows])
-        )
-        found = order, signature(relations, body, order)
-        if alone and not tied[0]:
-            if len(self._orders) >= MOST_ORDERS:
-                self._orders.clear()
-            order.flags.writeable = False
-            self._orders[key] = found
-        return found
+        layout = percept.layout
+        if seen is None:
+            order, _ = order_and_ties(
+                percept.relations, body, lambda rows: poses(layout, percept.vectors[rows])
+            )
+            return order, state_keys(percept.relations.table, layout, body, order)
+        key = (id(layout), body, seen.table.tobytes(), seen.order.tobytes())
+        if (known := self._states.get(key)) is None:
+            if len(self._states) >= MOST_STATES:
+                self._states.clear()
+            known = self._states[key] = state_keys(seen.table, layout, body, seen.order)
+        return seen.order, known
 
     def gather(self, layout: SceneLayout, sig: SlotSignature, order: tuple[int, ...]) -> NDArray[np.intp]:
         """Columns of a regression row in the concatenation of a state vector and its next one; cached."""
@@ -354,21 +390,23 @@ class Percept:
         columns = [self.perception.gather(self.layout, place.signature, order) for order in orders]
         return np.take_along_axis(both, np.array(columns)[which], axis=1)
 
-    def bare_examples(self, target: int, body: int) -> ExampleBatch:
+    def bare_examples(self, target: int, body: int, seen: Seen | None) -> ExampleBatch:
         """What classifiers are shown of an object, its binary relations left aside; `Situation` says more."""
-        return self._bodiless(target) if body < 0 else self._embodied(body, target)
+        return self._bodiless(target) if body < 0 else self._embodied(body, target, seen)
 
     def _padded(self) -> NDArray[np.float64]:
         return np.concatenate([self.vectors, np.full((len(self), 1), np.nan)], axis=1)
 
-    def _embodied(self, body: int, target: int) -> ExampleBatch:
+    def _embodied(self, body: int, target: int, seen: Seen | None) -> ExampleBatch:
         perception, n = self.perception, len(self)
         padded = self._padded()
         own = padded[:, perception.own_columns(self.layout, target)]
-        numbers = padded[:, perception.feature_columns(self.layout)]
         table = perception.unary_table(self.layout)
         every = table[None] if n == 1 else np.broadcast_to(table, (n, *table.shape))
         nothing = np.zeros((n, 0, *table.shape[1:], *table.shape[1:]), dtype=bool)
+        if seen is not None:
+            return ExampleBatch(nothing, every, seen.close, seen.pair, own, body, seen.struck)
+        numbers = padded[:, perception.feature_columns(self.layout)]
         close, struck, contacts = surroundings(
             self.relations,
             body,

@@ -1,28 +1,27 @@
 """Asking the compiled program of a model: one scene or many, as long as the model says the same.
 
-The kernel is loaded, and compiled where no file holds it, once so much was asked that it pays (`Kernel`). A program
-is lowered (`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model said
-something else that it pays, too: lowering costs as much as arrays take for a few scenes. What most transitions change,
-votes, is written into the program that there is. Until then, and where there is no program for what was learned, arrays
-answer (`relgym.model.querying`); all give the same bits.
+The kernel is loaded once so much was asked that it pays (`relgym.model.compiled`). A program is lowered
+(`relgym.model.lowering`) for a layout once so many scenes have been asked of it since the model said something else
+that it pays, too: lowering costs as much as arrays take for a few scenes. What most transitions change, votes, is
+written into the program that there is. Until then, and where there is no program for what was learned, arrays answer
+(`relgym.model.querying`); all give the same bits.
 """
 
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from threading import Lock
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
-from relgym.errors import SlowWarning
 from relgym.model.calibration import GUESS, LATEST, OWN, PERSISTENCE, Audit, Key
+from relgym.model.compiled import KERNEL
 from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
 from relgym.model.motion import TOUCHING
@@ -41,14 +40,12 @@ from relgym.model.scenes import wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
 from relgym.model.trusting import trusting
+from relgym.program.machine import Machine
 from relgym.program.records import Answer, BeyondError, Program, Trust
 from relgym.program.tape import Tape, encoded, kind_of, ordered
 from relgym.scene.objects import Scene, SceneLayout
 
-if TYPE_CHECKING:
-    from types import ModuleType
-
-__all__ = ["KERNEL", "Kernel", "Programs"]
+__all__ = ["Programs", "Runner"]
 
 PATIENCE = 8
 """Scenes that arrays answer after each change of what a model says before a program is lowered: that takes about as
@@ -58,12 +55,6 @@ SETTLING = 64
 """Scenes asked one by one, since the model last changed, before the program is told how right its predictions were:
 to write that down takes about as long as to settle so many predictions without it. Nor does a program that couldn't
 tell scenes rest for more."""
-
-ASKING, SCENE = 5e-4, 6e-6
-"""What arrays take to answer, in seconds: each time, and for each scene."""
-
-LOADING, COMPILING = 0.5, 20.0
-"""What it takes to load the kernel from the disk, and to compile it, in seconds."""
 
 _PREDICTED, _DEPENDS = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.DEPENDS)
 _Bits = NDArray[np.int64]
@@ -130,7 +121,7 @@ class Programs:
         scenes
             How many are asked.
         """
-        if (kernel := KERNEL.after(scenes)) is None:
+        if (machine := KERNEL.after(scenes)) is None:
             return None
         if self._grounds is None or self._looked != self.changes:
             self._look(parts)
@@ -145,7 +136,7 @@ class Programs:
             return None
         runner: Runner | None
         try:
-            runner = Runner(parts, layout, lowered(parts, layout), kernel)
+            runner = Runner(parts, layout, lowered(parts, layout), machine)
         except BeyondError:
             runner = None
         self._known[id(layout)] = _Known(layout, parts, runner, self.changes)
@@ -169,72 +160,19 @@ class _Known:
     changes: int
 
 
-class Kernel:
-    """The compiled kernel, as this process has it: none before it pays.
-
-    Loading it takes half a second, compiling it, once on a machine, twenty. Until arrays have taken about as long as
-    that, in all, they answer: nobody waits twice as long as with the better of both ways, and who asks little never
-    waits. What they took is estimated from what was asked, so that nothing depends on a clock.
-
-    Attributes
-    ----------
-    module
-        The kernel; None: not yet, or it can't be had.
-    spent
-        What arrays took so far, in seconds.
-    """
-
-    def __init__(self) -> None:
-        self.module: ModuleType | None = None
-        self.spent = 0.0
-        self._missing = False
-        self._next = LOADING  # spent, when the disk is looked at again
-
-    def after(self, scenes: int) -> ModuleType | None:
-        """The kernel, if it pays to have it now that so many scenes more are asked."""
-        if self.module is None and not self._missing:
-            self.spent += ASKING + SCENE * scenes
-            if self.spent >= self._next and (found := self._imported()) is not None:
-                self._next = min(2.0 * self._next, COMPILING)
-                if self.spent >= COMPILING or found.is_compiled():
-                    self.module = found
-        return self.module
-
-    def load(self) -> None:
-        """Have it now, whether it pays or not; compiled with the first scene that is asked."""
-        self.module = self._imported()
-
-    def _imported(self) -> ModuleType | None:
-        try:
-            from relgym.program import kernel
-        except ImportError as error:
-            self._missing = True
-            warnings.warn(
-                f"numba can't be imported ({error}): models are run by arrays, some 30 times slower; "
-                "pip install numba",
-                SlowWarning,
-                stacklevel=2,
-            )
-            return None
-        return kernel
-
-
-KERNEL: Final = Kernel()
-"""That of this process."""
-
-
 class _Told(NamedTuple):
-    """What the kernel writes, in the order in which it takes it."""
+    """What the kernel says of one scene, answer by answer."""
 
     following: NDArray[np.float64]
-    outcomes: NDArray[np.int8]
-    modes: _Bits
-    margins: NDArray[np.float64]
-    sure: NDArray[np.float64]
+    outcomes: list[int]
+    modes: list[int]
+    margins: list[float]
+    noted: list[int]
     players: _Bits
-    noted: _Bits
-    believed: _Bits
-    """Of the last scene: number and place of each answer's belief, shape ``(answers, 2)``; only where one is told."""
+    sure: list[list[float]]
+    """Probability and interval of each answer; stale unless it is settled."""
+    believed: list[list[int]]
+    """Number and place of each answer's belief; stale unless it is settled."""
 
 
 class Runner:
@@ -242,11 +180,11 @@ class Runner:
 
     Parameters
     ----------
-    parts, layout, program, kernel
-        The model, the layout, the program for it, and the module that runs it.
+    parts, layout, program, machine
+        The model, the layout, the program for it, and what runs it.
     """
 
-    def __init__(self, parts: Parts, layout: SceneLayout, program: Program, kernel: ModuleType) -> None:
+    def __init__(self, parts: Parts, layout: SceneLayout, program: Program, machine: Machine) -> None:
         self._parts, self._layout = parts, layout
         self.program = program
         self._settling: bool | None = None
@@ -255,11 +193,16 @@ class Runner:
         self._believing = False  # whether of all answers it is known how right they were
         self._turn = Lock()
         tape = encoded(program)
-        self._run = kernel.run
-        self._roles, self._space = tape.roles, tape.space()
-        if not hasattr(kernel.run, "py_func"):  # interpreted (NUMBA_DISABLE_JIT)
-            self._space = self._space.view(np.recarray)
-        self._believed = self._space["believed"][0]
+        self._space, count = tape.space(), len(program.answers)
+        self._now, self._after = np.empty(program.width), np.empty(program.width)
+        told = ("outcomes", "modes", "margins", "touched", "players", "sure", "believed")
+        self._tells = tuple(
+            self._space[name][0, :count] for name in told
+        )  # where the kernel leaves what it says
+        self._given, self._given_values = (self._space[name][0] for name in ("given", "given_values"))
+        self._many = machine.run
+        space, now, after = (each.ctypes.data for each in (self._space, self._now, self._after))
+        self._one = partial(_run_one, machine.call, space, now, after)
         pair = None if parts.laws is None else parts.laws.learner.book.pair
         frame = "world" if pair is None else pair.frame
         self._keys = tuple((a.object, a.property) for a in program.answers)
@@ -299,20 +242,17 @@ class Runner:
         """Predict what follows n scenes; None: arrays must, or can say why not."""
         if (settling := self._settles()) is None:
             return None
-        told = self._told(vectors, settling=settling, told=0)
-        if told is None:
-            return None
-        if not settling:
-            told = told._replace(sure=np.full((2, *told.margins.shape), np.nan))
+        n, count = shape = len(vectors), len(self._keys)
+        following, outcomes = np.empty(vectors.shape), np.empty(shape, dtype=np.int8)
+        modes, margins = np.empty(shape, dtype=np.int64), np.empty(shape)
+        sure = np.full((2, n, count), np.nan)
+        with self._turn:
+            if self._many(
+                self._space, vectors, following, (outcomes, modes, margins, sure), settling=settling
+            ):
+                return None
         return BatchPrediction(
-            self._layout,
-            told.following,
-            self._keys,
-            told.modes,
-            told.outcomes,
-            told.margins,
-            self._frames,
-            *told.sure,
+            self._layout, following, self._keys, modes, outcomes, margins, self._frames, *sure
         )
 
     def _settles(self) -> bool | None:
@@ -345,33 +285,34 @@ class Runner:
         """Predict what follows one scene; None where the program can't tell it.
 
         What the program says is what arrays would have said of modes and laws; whose value counts is settled here as
-        there (`relgym.model.querying.settled`). The percept is for what isn't asked of the program.
+        there (`relgym.model.querying.settled`). Where that is another one than the program's own, and other answers
+        need it, the program says what follows from it. The percept is for what isn't asked of the program.
         """
-        now = scene.vector
-        told = self._told(now[None], settling=False, told=1)
+        now, given = scene.vector, dict[int, tuple[int, float]]()
+        told = self._told(now, settling=False)
         if told is None:
             return None
-        after, players = told.following[0], told.players[0]
-        outcomes, modes = told.outcomes[0].tolist(), told.modes[0].tolist()
-        margins, noted = told.margins[0].tolist(), told.noted[0].tolist()
         following, own = now.copy(), True
         found: list[Prediction] = []
         for k, teller in enumerate(self._tellers):
             a = teller.answer
+            after, outcomes, modes, margins, noted, players, _, _ = told
             raw = teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
             if raw is None:
                 return None
             one = settled(self._parts, teller.target, percept, teller.index, following, raw)
             following[a.column] = one.value
-            if one.value != after[a.column]:
-                own = False
-                if a.key in self._needed:
-                    return None
-            if one.ok != (outcomes[k] == _PREDICTED) and a.key in self._needed:
-                return None
             found.append(one)
+            same = one.value == after[a.column]
+            if a.key not in self._needed:
+                own = own and same
+            elif not (same and one.ok == (outcomes[k] == _PREDICTED)):
+                given[k] = 1 if one.ok else 2, one.value
+                told = self._told(now, settling=False, given=given)
+                if told is None:
+                    return None
         if own:
-            following = after
+            following = told.following
         else:
             derive(scene.schema, self._layout, now[None], following[None])
             wrap(self._layout, following)
@@ -385,27 +326,13 @@ class Runner:
         if not self._knows():
             return None
         now = scene.vector
-        told = self._told(now[None], settling=True, told=1)
+        told = self._told(now, settling=True)
         if told is None:
             return None
-        after = told.following[0]
-        probable, widths = told.sure[:, 0].tolist()
-        rows = zip(
-            self._tellers,
-            told.outcomes[0].tolist(),
-            told.modes[0].tolist(),
-            told.margins[0].tolist(),
-            told.noted[0].tolist(),
-            told.players[0],
-            probable,
-            widths,
-            told.believed.tolist(),
-            strict=True,
-        )
+        after, rows = told.following, zip(self._tellers, *told[1:], strict=True)
         found: list[Prediction] = []
-        for k, (teller, outcome, mode, margin, noted, players, probability, interval, believed) in enumerate(
-            rows
-        ):
+        for k, (teller, outcome, mode, margin, noted, players, sure, believed) in enumerate(rows):
+            probability, interval = sure
             speaker, spread = teller.spoken[believed[1]]
             value = float(after[teller.answer.column])
             if speaker == GUESS or teller.turned(value, now):
@@ -434,23 +361,49 @@ class Runner:
             )
         return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
 
-    def _told(self, vectors: NDArray[np.float64], *, settling: bool, told: int) -> _Told | None:
-        """Run the program. What it writes to is new each time: another thread may ask before this one has read it."""
-        n, count = len(vectors), len(self._keys)
-        found = _Told(
-            np.empty(vectors.shape),
-            np.empty((n, count), dtype=np.int8),
-            np.empty((n, count), dtype=np.int64),
-            np.empty((n, count)),
-            np.empty((2, n if settling else 0, count)),
-            np.empty((told, count, self._roles), dtype=np.int64),
-            np.zeros((told, count), dtype=np.int64),
-            np.empty((0, 2), dtype=np.int64),
-        )
-        with self._turn:  # what was believed last stands in the work space
-            if self._run(self._space, vectors, settling, *found[:-1]):
+    def _told(
+        self,
+        now: NDArray[np.float64],
+        *,
+        settling: bool,
+        given: Mapping[int, tuple[int, float]] | None = None,
+    ) -> _Told | None:
+        """Run the program of one scene; None: arrays must, or can say why not.
+
+        All that is told is new: another thread may ask before this one has read it.
+
+        Parameters
+        ----------
+        now, settling
+            The scene's state vector, and whether the program settles who gives values.
+        given
+            What is settled already: of answers by number whether they are known (1) or not (2), and their values.
+        """
+        with self._turn:
+            self._now[:] = now
+            for k, (known, value) in (given or {}).items():
+                self._given[k], self._given_values[k] = known, value
+            bad = self._one(settling)
+            if given:
+                self._given[list(given)] = 0
+            if bad:
                 return None
-            return found._replace(believed=self._believed[:count].copy()) if settling and told else found
+            outcomes, modes, margins, noted, players, sure, believed = self._tells
+            return _Told(
+                self._after.copy(),
+                outcomes.tolist(),
+                modes.tolist(),
+                margins.tolist(),
+                noted.tolist(),
+                players.copy(),
+                sure.tolist(),
+                believed.tolist(),
+            )
+
+
+def _run_one(call: Callable[..., int], space: int, now: int, after: int, settling: bool) -> int:
+    """Run the kernel for one scene, which says in the work space what it tells of it."""
+    return call(space, 1, settling, True, False, now, after, None, None, None, None)
 
 
 class _Teller:

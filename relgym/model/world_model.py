@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, replace
+from functools import partial
 from typing import Any, Self
 
 import numpy as np
@@ -566,7 +567,8 @@ class WorldModel:
         check_size(self._parts, scene.layout)
         with self._calm(scene.vector):
             if large(scene.layout):
-                return predict_locally(self._parts, self._near(scene), scene)
+                ask = partial(self._programs.one, self._parts)
+                return predict_locally(self._parts, self._near(scene), scene, ask)
             return predict(self._parts, self._perceive(scene), scene)
 
     def _run_one(self, scene: Scene) -> ScenePrediction | None:

@@ -1,8 +1,8 @@
-"""What a program's operations do: one step of one scene, of many scenes; compiled by numba, for any tape.
+"""What a program's operations do: one step of one scene, of many scenes; for any tape.
 
 Written out number by number, in the order in which `relgym.scene`, `relgym.laws` and `relgym.classification` work on
-arrays: the same operations, hence the same bits. All of it lies in one file, since numba's cache of compiled functions
-looks at the file that a function is defined in, not at what it calls. Importing this module imports numba.
+arrays: the same operations, hence the same bits. It is the plain Python of numbers that `relgym.program.compiling`
+reads, and runs as Python, too, some thousand times slower.
 
 `s` is a scene's work space (`relgym.program.tape.SPACE`); ``s.x`` holds the registers (`relgym.program.records`).
 """
@@ -10,11 +10,7 @@ looks at the file that a function is defined in, not at what it calls. Importing
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, TypeVar
 
-import numba
 import numpy as np
 
 from relgym.program.tape import (
@@ -56,34 +52,7 @@ from relgym.program.tape import (
     WIDTH,
 )
 
-__all__ = ["is_compiled", "run"]
-
-_F = TypeVar("_F", bound=Callable[..., Any])
-
-
-def compiled(function: _F) -> _F:
-    """Compile together with what calls it; nothing else can."""
-    found: _F = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
-    return found
-
-
-def entered(function: _F) -> _F:
-    """Compile when first called; keep what was compiled on disk, where some folder can be written to."""
-    try:
-        found: _F = numba.njit(error_model="numpy", no_cfunc_wrapper=True, cache=True)(function)
-    except RuntimeError:  # no folder for the cache
-        found = numba.njit(error_model="numpy", no_cfunc_wrapper=True)(function)
-    return found
-
-
-def is_compiled() -> bool:
-    """Whether a file holds the compiled kernel, of this very text."""
-    folder = getattr(getattr(run, "_cache", None), "cache_path", None)
-    if folder is None:
-        return False
-    written = Path(__file__).stat().st_mtime
-    return any(file.stat().st_mtime >= written for file in Path(folder).glob("kernel.run-*.nbi"))
-
+__all__ = ["run", "see"]
 
 PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
 """Outcomes, in the order of `relgym.model.prediction.OUTCOMES`."""
@@ -125,7 +94,6 @@ MOVES, COL_SPIN, SPINS, GROUP, POSE = range(13, 18)
 
 
 # ---------------------------------------------------------------------------------------------- numbers
-@compiled
 def largest(a: float, b: float) -> float:
     """The larger one; NaN if either is."""
     if a != a or b != b:
@@ -133,7 +101,6 @@ def largest(a: float, b: float) -> float:
     return a if a >= b else b
 
 
-@compiled
 def smallest(a: float, b: float) -> float:
     """The smaller one; NaN if either is."""
     if a != a or b != b:
@@ -141,7 +108,6 @@ def smallest(a: float, b: float) -> float:
     return a if a <= b else b
 
 
-@compiled
 def total(s, at):
     """A sum of weighted registers."""
     value, weight = 0.0, s.code[at + 1]
@@ -154,7 +120,6 @@ def total(s, at):
     return value
 
 
-@compiled
 def piece(s, at):
     """A sum over what laws read of a contact."""
     value, weight = 0.0, s.code[at + 1]
@@ -167,7 +132,6 @@ def piece(s, at):
     return value
 
 
-@compiled
 def mixed(h):
     """Scramble 64 bits (splitmix64)."""
     h = (h ^ (h >> S30)) * MIX_A
@@ -176,7 +140,6 @@ def mixed(h):
 
 
 # ---------------------------------------------------------------------------------------------- shapes
-@compiled
 def look(s):
     """Take up the bodies of a scene: places, bounding boxes; 0, or `BAD_SIZE`."""
     x, body = s.x, s.body
@@ -239,7 +202,6 @@ def look(s):
     return 0
 
 
-@compiled
 def place(s, k):
     """Work out a polygon's edges: where they start, relative to its place, their outward normals and lengths."""
     if s.placed[k]:
@@ -269,7 +231,6 @@ def place(s, k):
         s.edge[4, k, v] = length
 
 
-@compiled
 def disc_and_polygon(x, y, radius, edge, k, count):
     """Signed distance and normal from a disc at (x, y), relative to a polygon's place, to polygon k."""
     best, above = 0, -math.inf
@@ -287,7 +248,6 @@ def disc_and_polygon(x, y, radius, edge, k, count):
     return above - radius, nx, ny
 
 
-@compiled
 def separation(x, y, edge, a, na, b, nb):
     """Largest gap of polygon a at (x, y) from polygon b along b's edge normals, and that normal."""
     best, nx, ny = -math.inf, 0.0, 0.0
@@ -302,7 +262,6 @@ def separation(x, y, edge, a, na, b, nb):
     return best, nx, ny
 
 
-@compiled
 def nearest(x, y, edge, a, na, b, nb):
     """Distance and normal from the nearest of a's corners to b's edges, for polygons apart."""
     best, nx, ny = math.inf, 0.0, 0.0
@@ -325,7 +284,6 @@ def nearest(x, y, edge, a, na, b, nb):
     return best, nx, ny
 
 
-@compiled
 def polygons(x, y, edge, a, na, b, nb):
     """Signed distance and normal of two polygons, a at (x, y) from b."""
     depth, nx, ny = separation(x, y, edge, a, na, b, nb)
@@ -340,7 +298,6 @@ def polygons(x, y, edge, a, na, b, nb):
     return depth, nx, ny
 
 
-@compiled
 def discs(x, y, reach):
     """Signed distance and normal of two discs; upwards where centres coincide."""
     length = math.sqrt(x * x + y * y)
@@ -349,7 +306,6 @@ def discs(x, y, reach):
     return length - reach, x, 1.0
 
 
-@compiled
 def boxes(x, y, reach_x, reach_y):
     """Signed distance and normal of two boxes that aren't turned."""
     gap_x, gap_y = abs(x) - reach_x, abs(y) - reach_y
@@ -365,7 +321,6 @@ def boxes(x, y, reach_x, reach_y):
     return depth, -nx if x < 0.0 else nx, -ny if y < 0.0 else ny
 
 
-@compiled
 def solids(s, i, j, kind):
     """Signed distance and normal of two spheres, or of two boxes that aren't turned, in space."""
     x, y, z = s.body[i, 0] - s.body[j, 0], s.body[i, 1] - s.body[j, 1], s.body[i, 2] - s.body[j, 2]
@@ -396,7 +351,6 @@ def solids(s, i, j, kind):
     s.gap[3, i, j] = -nz if z < 0.0 else nz
 
 
-@compiled
 def measure(s, i, j):
     """Signed distance of bodies i < j; the normal points from j to i."""
     now = s.masks[5]
@@ -435,7 +389,6 @@ def measure(s, i, j):
     return d
 
 
-@compiled
 def apart(s, i, j):
     """Gap of the bounding boxes of two bodies: no more than their distance, but for rounding."""
     body, widest = s.body, -math.inf
@@ -446,7 +399,6 @@ def apart(s, i, j):
     return widest
 
 
-@compiled
 def limit(s, i, j, least, size):
     """Distance up to which two bodies touch, or speed up to which they don't part."""
     if s.numbers[PRECISION] == 0.0:
@@ -454,7 +406,6 @@ def limit(s, i, j, least, size):
     return s.numbers[least] + s.numbers[PRECISION] * max(s.body[i, size], s.body[j, size])
 
 
-@compiled
 def touch(s, i, j):
     """Whether two bodies touch. Those whose bounding boxes are clear of each other aren't measured."""
     if i > j:
@@ -470,7 +421,6 @@ def touch(s, i, j):
 
 
 # ---------------------------------------------------------------------------------------------- contacts
-@compiled
 def axes(frame, c, slip_x, slip_y):
     """Unit vectors of a frame's two axes at a contact."""
     if frame == 5:
@@ -484,7 +434,6 @@ def axes(frame, c, slip_x, slip_y):
     return nx, ny, tx, ty
 
 
-@compiled
 def relative(point, v, c, a, b):
     """Relative velocity at a contact: of the centres, or of the points that touch."""
     x, y = v[0, a] - v[0, b], v[1, a] - v[1, b]
@@ -494,7 +443,6 @@ def relative(point, v, c, a, b):
     return x, y
 
 
-@compiled
 def push(point, v, c, a, b, x, y):
     """Let a change of the relative velocity act on both bodies."""
     slide_x, slide_y, share = x, y, c[SHARE]
@@ -514,7 +462,6 @@ def push(point, v, c, a, b, x, y):
     v[1, b] -= (1.0 - share) * slide_y
 
 
-@compiled
 def rule(s, at):
     """The velocity after a contact along one axis: maximum or minimum of pieces."""
     value = piece(s, s.code[at + 4])
@@ -524,7 +471,6 @@ def rule(s, at):
     return value
 
 
-@compiled
 def respond(s, law, pair, c, now_x, now_y, free_x, free_y):
     """Change of the relative velocity at a contact (`relgym.laws.composition.respond`)."""
     ax, ay, bx, by = axes(s.code[law], c, free_x, free_y)
@@ -541,7 +487,6 @@ def respond(s, law, pair, c, now_x, now_y, free_x, free_y):
     return change_x, change_y
 
 
-@compiled
 def compose(s, law, count, bodies, spins, out):
     """Let all contacts act until nothing changes (`relgym.laws.composition.compose`); whether it settled."""
     now, free, v = s.velocity[0], s.velocity[1], s.velocity[out]
@@ -574,7 +519,6 @@ def compose(s, law, count, bodies, spins, out):
     return False
 
 
-@compiled
 def leap(point, s, count, v):
     """Continue a sequence of sweeps, each like the one before, to where it ends."""
     kept = along = 0.0
@@ -595,7 +539,6 @@ def leap(point, s, count, v):
         c[JY] += steps * c[DY]
 
 
-@compiled
 def within(s, law, count, v):
     """Whether no contact turns a body back in a sense in which none was seen to (`relgym.laws.composition.within`)."""
     slack, point = s.numbers[SLACK], s.code[law] == 1
@@ -618,7 +561,6 @@ def within(s, law, count, v):
     return True
 
 
-@compiled
 def meet(s):
     """Find the contacts of those who move; how many there are."""
     count = 0
@@ -655,7 +597,6 @@ def meet(s):
     return count
 
 
-@compiled
 def move(s):
     """Next velocities of all movers (`relgym.laws.book.LawBook.motion`); the number of contacts, -1: too many."""
     bodies, x = s.code[BODIES], s.x
@@ -696,7 +637,7 @@ def move(s):
                 flags[0, k] = flags[1, k] = 0
         return count
     law = s.code[s.code[AT_LAWS]]
-    settled = compose(s, law, count, bodies, spins, np.int64(2))
+    settled = compose(s, law, count, bodies, spins, 2)
     lawful, point = True, s.code[law] == 1
     for k in range(count):
         c, pair = s.contact[k], s.pair[k, 0]
@@ -721,7 +662,7 @@ def move(s):
         flags[3, k] = 1 if stated else 0
         flags[0, k] = 1 if stated and flags[0, k] else 0
     for other in range(1, s.code[LAWS]):
-        compose(s, s.code[s.code[AT_LAWS] + other], count, bodies, spins, np.int64(3))
+        compose(s, s.code[s.code[AT_LAWS] + other], count, bodies, spins, 3)
         for k in range(bodies):
             if flags[2, k]:
                 for d in range(governed):
@@ -734,7 +675,6 @@ def move(s):
 
 
 # ---------------------------------------------------------------------------------------------- what a body sees
-@compiled
 def nearest_to(s, t):
     """The body nearest to t, of several the first one; t itself where there is no other."""
     first, gap = t, math.inf
@@ -752,7 +692,6 @@ def nearest_to(s, t):
     return best
 
 
-@compiled
 def surroundings(s, t):
     """Contexts and pair features of body t (`relgym.scene.surroundings`)."""
     if s.masks[3] == t:
@@ -830,7 +769,6 @@ def surroundings(s, t):
                 s.told[k, facts + f] = math.nan if k == t else s.x[s.code[at_others + k * others + f]]
 
 
-@compiled
 def closing(s, a, b):
     """Normal speed of two bodies that touch and don't part; infinite of others."""
     first, second = s.code[AT_BODIES] + BODY * a, s.code[AT_BODIES] + BODY * b
@@ -846,7 +784,6 @@ def closing(s, a, b):
     return speed if speed <= limit(s, i, j, PART, SPEED) else math.inf
 
 
-@compiled
 def sides(s, a, b):
     """How body a lies to b, and b to a: bits of the kinds of relations between bounding boxes; touching aside."""
     one, there, back, beside = np.int64(1), np.int64(0), np.int64(0), np.int64(0)
@@ -884,7 +821,6 @@ def sides(s, a, b):
     return there | beside, back | beside
 
 
-@compiled
 def fastest(s, a, b):
     """Whether a approaches no other body faster than b, which it approaches."""
     own = closing(s, a, b)
@@ -895,7 +831,6 @@ def fastest(s, a, b):
     return True
 
 
-@compiled
 def relate(s, among):
     """Work out all relations that are asked for between some objects: bits of kinds, and a number for all of them."""
     if among & ~s.masks[4] == 0:
@@ -939,7 +874,6 @@ def relate(s, among):
     s.state[0] = state
 
 
-@compiled
 def unfold(s):
     """Write relations out: for each of them, and for each object, to whom it stands in it, and who does to it."""
     if s.masks[6]:
@@ -962,14 +896,12 @@ def unfold(s):
 
 
 # ---------------------------------------------------------------------------------------------- clauses
-@compiled
 def passes(value, at_most, threshold, negated):
     """Whether a number passes a test."""
     holds = value <= threshold if at_most else value > threshold
     return holds != (negated != 0)
 
 
-@compiled
 def allowed(s, literal, variable, context):
     """Objects of a context that a variable may stand for, as far as one literal says; -1: all, without a variable."""
     one = np.int64(1)
@@ -1022,7 +954,6 @@ def allowed(s, literal, variable, context):
     return np.int64(-1) if holds != (negated != 0) else np.int64(0)
 
 
-@compiled
 def open_to(s, level, context):
     """Objects that the variable of a level may stand for; without one: -1 if its tests hold, 0 if not."""
     variable = s.code[level]
@@ -1034,7 +965,6 @@ def open_to(s, level, context):
     return found
 
 
-@compiled
 def solve(s, clause, context, everything):
     """Whether objects make a clause true; what its first variables stand for is in `s.value`.
 
@@ -1042,7 +972,8 @@ def solve(s, clause, context, everything):
     """
     one, levels = np.int64(1), s.code[clause + 2]
     if everything:
-        s.found[:] = 0
+        for k in range(s.found.shape[0]):
+            s.found[k] = 0
     if open_to(s, s.code[clause + 3], context) == 0:
         return False
     if levels == 1:
@@ -1072,7 +1003,6 @@ def solve(s, clause, context, everything):
     return true
 
 
-@compiled
 def leaf(s, tree):
     """The leaf of a tree that a scene reaches; `s.found` says whom variables stand for."""
     node, at, one, bodies = np.int64(0), s.code[tree + 1], np.int64(1), max(s.code[BODIES], 1)
@@ -1095,7 +1025,6 @@ def leaf(s, tree):
         node = s.code[record + 1] if value <= s.numbers[at + node] else s.code[record + 2]
 
 
-@compiled
 def decide(s, contest, target):
     """Number of the outcome of one contest."""
     context = s.masks[s.code[contest + 2]]
@@ -1126,7 +1055,6 @@ def decide(s, contest, target):
 
 
 # ---------------------------------------------------------------------------------------------- votes
-@compiled
 def hash_set(members, count):
     """Sum of the distinct ones among some numbers, which are put in order."""
     for i in range(1, count):
@@ -1142,13 +1070,11 @@ def hash_set(members, count):
     return found
 
 
-@compiled
 def weight(k):
     """What bit number k counts in a hash."""
     return mixed((ONE64 + np.uint64(k)) * GOLDEN)
 
 
-@compiled
 def situation(s, used, target):
     """A number for what some relations say of a context (`relgym.logic.situations`)."""
     one = np.int64(1)
@@ -1189,7 +1115,6 @@ def situation(s, used, target):
     return hash_set(whole, count)
 
 
-@compiled
 def seen_before(s, experience, target):
     """Whether the situation was seen in training."""
     unfold(s)
@@ -1209,7 +1134,6 @@ def seen_before(s, experience, target):
     return False
 
 
-@compiled
 def rank(s, vote, count, target):
     """Put the modes in order, `s.order[0]`, the winner first; its lead in the last count."""
     unfold(s)
@@ -1250,7 +1174,6 @@ def rank(s, vote, count, target):
 
 
 # ---------------------------------------------------------------------------------------------- roles
-@compiled
 def line_up(s, t):
     """Bodies in canonical order as t sees them (`relgym.scene.context.canonical_order`), t itself first.
 
@@ -1269,14 +1192,14 @@ def line_up(s, t):
             )
             if k != t and j != t and same and toward[k] == toward[j]:
                 tied = True
+    if tied:
+        rank_groups(s, t, relations)
     for k in range(bodies):
         around[k] = ZERO64
         if tied and k != t:
             for j in range(bodies):
                 if j != k and j != t:
-                    group = np.uint64(s.code[s.code[AT_BODIES] + BODY * j + GROUP])
-                    kind = (group_rank(s, t, group) + ONE64) << np.uint64(2 * relations)
-                    bits = both_ways(s, relations, k, j) + kind
+                    bits = both_ways(s, relations, k, j) + s.hashes[2, j]
                     around[k] += mixed(mixed(bits + GOLDEN) + toward[j] + GOLDEN)
     order[0], count = t, 1
     for k in range(bodies):
@@ -1291,21 +1214,20 @@ def line_up(s, t):
     return tied
 
 
-@compiled
-def group_rank(s, t, group):
-    """Number of a type among those of all bodies but t."""
-    found = ZERO64
-    for g in range(s.code[BODIES]):
-        there = False
-        for k in range(s.code[BODIES]):
-            if k != t and s.code[s.code[AT_BODIES] + BODY * k + GROUP] == g:
-                there = True
-        if there and np.uint64(g) < group:
-            found += ONE64
-    return found
+def rank_groups(s, t, relations):
+    """Numbers of the bodies' types among those of all bodies but t, from 1 on, above the bits of relations."""
+    one, there = np.int64(1), np.int64(0)
+    for k in range(s.code[BODIES]):
+        if k != t:
+            there |= one << s.code[s.code[AT_BODIES] + BODY * k + GROUP]
+    for k in range(s.code[BODIES]):
+        rank_ = ONE64
+        for g in range(s.code[s.code[AT_BODIES] + BODY * k + GROUP]):
+            if there >> g & 1:
+                rank_ += ONE64
+        s.hashes[2, k] = rank_ << np.uint64(2 * relations)
 
 
-@compiled
 def both_ways(s, relations, a, b):
     """Which relations hold between two bodies either way round, as bits; the first one's are the highest."""
     bits, one = ZERO64, np.int64(1)
@@ -1315,7 +1237,6 @@ def both_ways(s, relations, a, b):
     return bits
 
 
-@compiled
 def earlier(s, t, a, b):
     """Whether body a comes before b."""
     first, second = s.code[AT_BODIES] + BODY * a, s.code[AT_BODIES] + BODY * b
@@ -1336,7 +1257,6 @@ def earlier(s, t, a, b):
     return False
 
 
-@compiled
 def assign(s, casting, t):
     """Bodies of the embodied roles, in `s.cast[0]`; whether they are found (`RoleClassifier.assign`)."""
     bodies, roles, one = s.code[BODIES], s.code[casting + 1], np.int64(1)
@@ -1356,7 +1276,7 @@ def assign(s, casting, t):
             score = s.numbers[s.code[record + 1] + s.code[record + 3]]
             for k in range(s.code[record + 3]):
                 s.value[0], s.value[1] = t, each
-                if solve(s, s.code[record + 5 + k], everyone, roles < 0):  # a variable: else compiled twice
+                if solve(s, s.code[record + 5 + k], everyone, False):
                     score = s.numbers[s.code[record + 1] + k]
                     break
             if score != score:
@@ -1375,7 +1295,6 @@ def assign(s, casting, t):
     return search(s, casting, descriptions, roles, chosen, counts, need, best)
 
 
-@compiled
 def better(options, row, score, typical):
     """Whether a candidate comes before an option; of equals the one that was there."""
     if options[row, 0] != score:
@@ -1383,7 +1302,6 @@ def better(options, row, score, typical):
     return typical > options[row, 1]
 
 
-@compiled
 def typically(s, common, each, t):
     """Whether a body has all that players so far had in common."""
     one = np.int64(1)
@@ -1399,7 +1317,6 @@ def typically(s, common, each, t):
     return True
 
 
-@compiled
 def search(s, casting, descriptions, roles, chosen, counts, need, best):
     """All ways to fill all roles, of which the best is kept; whether there is one, and no doubt about it."""
     depth, found, single = 0, False, True
@@ -1445,7 +1362,6 @@ def search(s, casting, descriptions, roles, chosen, counts, need, best):
     return (single and best_typical == roles) or s.code[casting + 2] != 0
 
 
-@compiled
 def keep(s, casting, roles, chosen, deep, of, best):
     """Give the chosen bodies their roles: of alike roles the first goes to who comes first in order."""
     for k in range(deep):
@@ -1460,7 +1376,6 @@ def keep(s, casting, roles, chosen, deep, of, best):
 
 
 # ---------------------------------------------------------------------------------------------- answers
-@compiled
 def product(s, feature):
     """A product of columns, their sines and cosines."""
     value = 1.0
@@ -1475,7 +1390,6 @@ def product(s, feature):
     return value
 
 
-@compiled
 def clip(s, answer_numbers, present, value):
     """A value, as far as changes may go."""
     if present < 0 or value != value:
@@ -1484,7 +1398,6 @@ def clip(s, answer_numbers, present, value):
     return min(max(value, low), high)
 
 
-@compiled
 def remembered(s, a):
     """The place in the memory of what relations alone decide of an answer; -1: there is no room for it.
 
@@ -1505,7 +1418,6 @@ def remembered(s, a):
     return slot
 
 
-@compiled
 def ranked(s, a, slot):
     """Rank the modes, or remember how they are ranked; the margin."""
     vote, count = s.code[a + 11], s.code[s.code[a + 10]]
@@ -1522,7 +1434,6 @@ def ranked(s, a, slot):
     return record[1]
 
 
-@compiled
 def familiar(s, a, slot):
     """Whether the situation was seen in training, or what is remembered of that."""
     experience, target = s.code[s.code[a + 11] + 2], max(s.code[a + 2], 0)
@@ -1534,7 +1445,6 @@ def familiar(s, a, slot):
     return record[0] & 1 == 1
 
 
-@compiled
 def players_of(s, a, mode, number, slot, tied):
     """Fill the roles of a mode: bodies in `s.cast[0]`; whether they can be, and whether numbers decide an order."""
     casting = s.code[mode + 3]
@@ -1558,7 +1468,6 @@ def players_of(s, a, mode, number, slot, tied):
     return done, tied
 
 
-@compiled
 def by_modes(s, a, answer):
     """Value, outcome, mode and margin of an answer by modes (`relgym.model.answers`)."""
     x, target = s.x, s.code[a + 2]
@@ -1596,9 +1505,10 @@ def by_modes(s, a, answer):
             # What has no body stands alone: object 0 of one, in no relation to anything.
             s.masks[0] = s.masks[1] = s.masks[2] = 1
             s.masks[3], s.masks[4], s.masks[6] = -1, 0, 1
-            s.told[0, :] = math.nan
-            s.rows[:, 0] = 0
-            s.columns[:, 0] = 0
+            for f in range(s.told.shape[1]):
+                s.told[0, f] = math.nan
+            for r in range(s.rows.shape[0]):
+                s.rows[r, 0] = s.columns[r, 0] = 0
             s.state[0] = ZERO64
         slot = remembered(s, a)
     if vote:
@@ -1648,13 +1558,11 @@ def by_modes(s, a, answer):
     return math.nan, NO_ROLES, np.int64(0), 0.0
 
 
-@compiled
 def beyond(s, a):
     """Whether a scene lies out of the scope of an answer's modes."""
     return s.code[a + 12] != 0 and s.code[s.code[a + 13] + leaf(s, s.code[a + 12])] == 0
 
 
-@compiled
 def guessed(s, a):
     """The fallback value of an answer; NaN if there is none."""
     value = math.nan
@@ -1666,17 +1574,18 @@ def guessed(s, a):
     return clip(s, s.code[a + 18], s.code[a + 15], value)
 
 
-@compiled
 def lead_of(margin):
     """The bin of a lead (`relgym.model.calibration.key_of`)."""
     if not margin > 0.0:
         return 0
     if margin == math.inf:
         return 7
-    return min(max(math.frexp(margin)[1] + 2, 1), 6)
+    found, most = 1, 0.5
+    while found < 6 and margin >= most:
+        found, most = found + 1, 2.0 * most
+    return found
 
 
-@compiled
 def find(s, at, count, wanted):
     """The place of a number among ascending ones; -1: it isn't there."""
     low, high = np.int64(0), count
@@ -1689,7 +1598,6 @@ def find(s, at, count, wanted):
     return low if low < count and s.code[at + low] == wanted else np.int64(-1)
 
 
-@compiled
 def settled(s, a, k, value, outcome, mode, margin):
     """Value, outcome and mode, once it is known how right such predictions were (`relgym.model.querying`)."""
     trust = s.code[a + 25]
@@ -1729,7 +1637,6 @@ def settled(s, a, k, value, outcome, mode, margin):
     return math.nan, outcome, mode
 
 
-@compiled
 def step(s, settling, telling):
     """One step of the scene whose present values stand in `s.x`; 0, or why not."""
     x, width = s.x, s.code[WIDTH]
@@ -1778,10 +1685,13 @@ def step(s, settling, telling):
             s.touched[k] = 0
             if math.isfinite(value):
                 s.touched[k] = -2 if beyond(s, a) else -1
-        if math.isfinite(value):
-            x[width + column] = value
         s.outcomes[k], s.modes[k], s.margins[k] = outcome, mode, margin
-        if outcome != PREDICTED:
+        lost = outcome != PREDICTED
+        if s.given[k]:
+            x[width + column], lost = s.given_values[k], s.given[k] == 2
+        elif math.isfinite(value):
+            x[width + column] = value
+        if lost:
             s.lost[s.code[a + 1]] = 1
     for k in range(s.code[KINEMATICS]):
         at = s.code[AT_KINEMATICS] + 3 * k
@@ -1792,7 +1702,6 @@ def step(s, settling, telling):
     return 0
 
 
-@compiled
 def hits(s, body):
     """Whom a mover touches, as bits."""
     found, one = np.int64(0), np.int64(1)
@@ -1802,60 +1711,111 @@ def hits(s, body):
     return found
 
 
-@entered
-def run(spaces, vectors, settling, following, outcomes, modes, margins, sure, players, touched):
+def run(s, n, settling, telling, writing, vectors, following, outcomes, modes, margins, sure):
     """A step of n scenes.
 
     Parameters
     ----------
-    spaces
-        Work space with the tape in it, shape ``(1,)`` of `SPACE`.
-    vectors
-        State vectors, shape ``(n, width)``.
+    s
+        Work space with the tape in it; what is told of the last scene stands there afterwards.
+    n
+        How many scenes.
     settling
         Whether how right predictions were decides who gives the value, and what is claimed.
+    telling
+        Whether it is noted down whom movers touch.
+    writing
+        Whether there are arrays for all but the next state vectors; else what stands behind those isn't looked at.
+    vectors
+        State vectors, one after the other, of `width` each.
     following
-        Where the next ones go, shape ``(n, width)``.
+        Where the next ones go.
     outcomes, modes, margins
-        Where these go, shape ``(n, answers)``.
+        Where these go, one for each answer of each scene.
     sure
-        How probably a value is right, and how far off it may be, shape ``(2, n, answers)``; of length 0: nobody asks.
-    players, touched
-        Bodies that play roles, shape ``(n, answers, roles)``, and, ``(n, answers)``, whom a mover touches, as bits, or
-        the mode that gave a value, -1: a guess, -2: one out of scope. Of length 1 where nobody asks.
+        How probably each value is right, then how far off each may be; looked at where it is settled.
 
     Returns
     -------
     0, or why some scene can't be.
     """
-    s = spaces[0]
-    width, nexts = s.code[WIDTH], s.code[AT_NEXTS]
+    width, nexts, answers = s.code[WIDTH], s.code[AT_NEXTS], s.code[ANSWERS]
     s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
-    for n in range(vectors.shape[0]):
-        wrong = 0
+    for i in range(n):
+        now, wrong = i * width, 0
         for k in range(width):
-            value = vectors[n, k]
-            s.x[k] = following[n, k] = value
+            value = vectors[now + k]
+            s.x[k] = following[now + k] = value
             wrong += not abs(value) < math.inf
         if wrong:
             return NOT_FINITE
         for k in range(s.code[NEXTS]):
             column = s.code[nexts + k]
             s.x[width + column] = s.x[column]
-        bad = step(s, settling, n < players.shape[0])
+        bad = step(s, settling, telling)
         if bad:
             return bad
         for k in range(s.code[NEXTS]):
             column = s.code[nexts + k]
-            following[n, column] = s.x[width + column]
-        for k in range(s.code[ANSWERS]):
-            outcomes[n, k], modes[n, k], margins[n, k] = s.outcomes[k], s.modes[k], s.margins[k]
-        if n < sure.shape[1]:
-            for k in range(s.code[ANSWERS]):
-                sure[0, n, k], sure[1, n, k] = s.sure[k, 0], s.sure[k, 1]
-        if n < players.shape[0]:
-            for k in range(s.code[ANSWERS]):
-                touched[n, k] = s.touched[k]
-                for r in range(players.shape[2]):
-                    players[n, k, r] = s.players[k, r]
+            following[now + column] = s.x[width + column]
+        if writing:
+            for k in range(answers):
+                at = i * answers + k
+                outcomes[at], modes[at], margins[at] = s.outcomes[k], s.modes[k], s.margins[k]
+                if settling:
+                    sure[at], sure[n * answers + at] = s.sure[k, 0], s.sure[k, 1]
+    return 0
+
+
+def see(s, t, vector, table, close, struck, told, order):
+    """What one body sees of a scene (`relgym.model.sight`).
+
+    Parameters
+    ----------
+    s
+        Work space with the tape in it, of a program that asks for all relations, and for everything.
+    t
+        Number of the body.
+    vector
+        The scene's state vector.
+    table
+        Where it goes which relation holds for which pair of bodies: 0 or 1 for each relation, first and second body.
+    close, struck
+        Where the contexts of the body go: 0 or 1 for each body.
+    told
+        Where the features of its pairs go, body by body.
+    order
+        Where the others go as they are lined up for it, behind 1 if more than their relations to it decides that.
+
+    Returns
+    -------
+    0, or why the scene can't be.
+    """
+    width, bodies, one = s.code[WIDTH], s.code[BODIES], np.int64(1)
+    for k in range(width):
+        s.x[k] = vector[k]
+        if not abs(vector[k]) < math.inf:
+            return NOT_FINITE
+    s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
+    bad = look(s)
+    if bad:
+        return bad
+    s.masks[3], s.masks[4], s.masks[6] = -1, 0, 0
+    surroundings(s, t)
+    relate(s, s.masks[2])
+    unfold(s)
+    at = 0
+    for r in range(s.code[RELATIONS]):
+        for a in range(bodies):
+            for b in range(bodies):
+                table[at] = s.rows[r, a] >> b & one
+                at += 1
+    width = s.code[FACTS] + s.code[OTHERS]
+    for k in range(bodies):
+        close[k], struck[k] = s.masks[1] >> k & one, s.masks[0] >> k & one
+        for f in range(width):
+            told[k * width + f] = s.told[k, f]
+    order[0] = 1 if line_up(s, t) else 0
+    for k in range(1, bodies):
+        order[k] = s.lineup[0, k]
     return 0

@@ -108,6 +108,9 @@ SPACE = np.dtype(
             (MOST_ANSWERS, 2),
         ),  # the last kind of an answer's predictions, and what is made of it
         ("sure", np.float64, (MOST_ANSWERS, 2)),  # probability and interval of each answer
+        # What others say of an answer: 0: nothing, 1: it is known, 2: it isn't; and its value.
+        ("given", np.int64, (MOST_ANSWERS,)),
+        ("given_values", np.float64, (MOST_ANSWERS,)),
         ("touched", np.int64, (MOST_ANSWERS,)),  # whom a mover touches; or the mode that gave a value
         ("state", np.uint64, (1,)),  # all relations that are known, as a number
         ("memory_keys", np.uint64, (REMEMBERED,)),

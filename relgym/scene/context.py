@@ -21,7 +21,7 @@ from relgym.scene.objects import SceneLayout
 if TYPE_CHECKING:
     from relgym.scene.relations import Relations
 
-__all__ = ["Slots", "canonical_order", "close_set", "order_and_ties", "signature", "slots"]
+__all__ = ["Slots", "canonical_order", "close_set", "order_and_ties", "signature", "slots", "state_keys"]
 
 _SAME_DISTANCE = 1e-9
 """Distances within this, in units of length, count as equal: rounding must not decide an order."""
@@ -161,17 +161,21 @@ def signature(relations: Relations, body: int, order: _Order | None = None) -> l
         order = canonical_order(relations, body)
     elif getattr(order, "shape", None) != (len(relations), others):
         raise QueryError(f"order: expected what canonical_order gives, of shape {(len(relations), others)}")
-    layout = relations.layout
+    return state_keys(relations.table, relations.layout, body, order)
+
+
+def state_keys(table: NDArray[np.bool_], layout: SceneLayout, body: int, order: _Order) -> list[bytes]:
+    """`signature` of which relation holds for which pair, shape ``(n, R, K, K)``."""
     kinds = [layout.types[layout.bodies[body]].name]
     kinds += [name for name, members in slots(layout, body) for _ in members]
     prefix = ",".join(kinds).encode() + b":"
     whole = np.concatenate([np.full((len(order), 1), body, dtype=np.intp), order], axis=1)
     if len(whole) and (whole == whole[0]).all():
-        table = relations.table[:, :, whole[0][:, None], whole[0]]
+        table = table[:, :, whole[0][:, None], whole[0]]
     else:
         scene = np.arange(len(whole))[:, None, None, None]
-        relation = np.arange(len(relations.names))[:, None, None]
-        table = relations.table[scene, relation, whole[:, None, :, None], whole[:, None, None, :]]
+        relation = np.arange(table.shape[1])[:, None, None]
+        table = table[scene, relation, whole[:, None, :, None], whole[:, None, None, :]]
     bits = np.packbits(table.reshape(len(whole), -1), axis=1)
     return [prefix + row.tobytes() for row in bits]
 

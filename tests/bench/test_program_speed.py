@@ -10,8 +10,8 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from relgym.experiments.dyna_speed import WORLDS, dreams
+from relgym.model.compiled import KERNEL
 from relgym.model.lowering import lowered
-from relgym.model.running import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.program.tape import encoded
 from relgym.scene.objects import Scene

@@ -24,6 +24,7 @@ from relgym.laws.inertia import Inertia
 from relgym.laws.records import Share
 from relgym.logic.clause import Definition
 from relgym.model import running
+from relgym.model.compiled import KERNEL
 from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
@@ -37,7 +38,6 @@ from relgym.model.target.scope import Scope
 from relgym.model.target.spread import Spreads
 from relgym.model.target.stops import Stop, Stops
 from relgym.model.world_model import WorldModel
-from relgym.program import kernel
 from relgym.scene.objects import Scene
 from relgym.wrappers import ModelLearner
 
@@ -46,7 +46,7 @@ from relgym.wrappers import ModelLearner
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The kernel is there, and programs are lowered for the first scene that is asked."""
     monkeypatch.setattr(running, "PATIENCE", 0)
-    running.KERNEL.load()
+    KERNEL.load()
 
 
 def told(prediction: ScenePrediction) -> list[object]:
@@ -124,9 +124,10 @@ def fresh_and_kept(model: WorldModel, scene: Scene) -> tuple[Runner, Runner] | N
     """What runs the program that was kept, and one that was lowered just now; None where there is none."""
     model.predict_one(scene)
     kept = model._programs.of(model._parts, scene.layout, 1)
-    if kept is None:
+    machine = KERNEL.load()
+    if kept is None or machine is None:
         return None
-    return Runner(model._parts, scene.layout, lowered(model._parts, scene.layout), kernel), kept
+    return Runner(model._parts, scene.layout, lowered(model._parts, scene.layout), machine), kept
 
 
 def assert_nothing_stale(model: WorldModel, scene: Scene) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -15,9 +14,9 @@ from programs import MODELS, arrays, looked_back, scenes_of
 from worlds import LINE_TARGETS, learned, schema_of, transitions
 
 from relgym.config import ModelConfig
-from relgym.errors import SlowWarning
 from relgym.model import running
 from relgym.model.calibration import Audit, Key
+from relgym.model.compiled import KERNEL
 from relgym.model.lowering import lowered
 from relgym.model.prediction import LateAudit, Prediction
 from relgym.model.querying import predict
@@ -30,7 +29,7 @@ from relgym.scene.objects import Scene
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The kernel is there, and programs are lowered for the first scene that is asked."""
     monkeypatch.setattr(running, "PATIENCE", 0)
-    running.KERNEL.load()
+    KERNEL.load()
 
 
 def assert_fresh(model: WorldModel, scene: Scene) -> None:
@@ -103,27 +102,6 @@ def test_a_program_is_lowered_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> N
     assert len(calls) == 1
 
 
-@pytest.mark.parametrize("on_disk", [True, False])
-def test_the_kernel_is_there_once_it_pays(monkeypatch: pytest.MonkeyPatch, on_disk: bool) -> None:
-    monkeypatch.setattr("relgym.program.kernel.is_compiled", lambda: on_disk)
-    kernel = running.Kernel()
-    assert kernel.after(1) is None and kernel.spent > 0.0
-    many = int(1.01 * running.LOADING / running.SCENE)
-    assert (kernel.after(many) is not None) is on_disk
-    assert kernel.after(int(running.COMPILING / running.SCENE)) is not None
-    assert kernel.after(1) is kernel.module
-
-
-def test_the_disk_is_looked_at_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
-    looked: list[float] = []
-    kernel = running.Kernel()
-    monkeypatch.setattr("relgym.program.kernel.is_compiled", lambda: bool(looked.append(kernel.spent)))
-    while kernel.after(1) is None:
-        pass
-    assert kernel.spent == pytest.approx(running.COMPILING, abs=1e-3)
-    assert looked == pytest.approx([0.5, 1.0, 2.0, 4.0, 8.0, 16.0], abs=1e-3)
-
-
 def test_programs_that_cannot_tell_rest() -> None:
     schema = schema_of(LINE_STEPS, LINE_TARGETS)
     scene = transitions(schema, LINE_STEPS[:1])[0].before
@@ -147,18 +125,6 @@ def test_programs_that_cannot_tell_rest() -> None:
         programs.one(None, scene, lambda _: None)  # type: ignore[arg-type, return-value]
     # Rests of 1, 3, 7, 15, 31, 63, then of 64; whoever can tell is asked each time, and rests shortly when he can't.
     assert asked == [0, 2, 6, 14, 30, 62, 126, 191, 192, 193, 194, 196, 200]
-
-
-def test_without_numba_arrays_answer_and_a_warning_says_so_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "KERNEL", kernel := running.Kernel())
-    kernel.spent = running.LOADING
-    monkeypatch.setitem(sys.modules, "relgym.program.kernel", None)
-    monkeypatch.delattr("relgym.program.kernel", raising=False)
-    model = learned(schema := schema_of(LINE_STEPS, LINE_TARGETS), LINE_STEPS[:60])
-    scene = transitions(schema, LINE_STEPS[60:61])[0].before
-    with pytest.warns(SlowWarning, match="pip install numba"):
-        model.predict_one(scene)
-    assert_fresh(model, scene)  # a second warning would be an error
 
 
 @pytest.mark.parametrize("make", [cart_model, line_model, room_model, lambda: room_model("auto")])

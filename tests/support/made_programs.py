@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import random
@@ -13,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.logic.situations import mixed, situation
-from relgym.program import kernel
 from relgym.program import records as ir
+from relgym.program.machine import make
 from relgym.program.tape import Tape, encoded
 
 PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
@@ -63,6 +64,9 @@ def empty(width: int, registers: int, **fields: Any) -> ir.Program:
     return ir.Program(**known | fields)
 
 
+MACHINE = functools.cache(make)
+
+
 class Told(NamedTuple):
     """What a program says of n scenes: next vectors ``(n, width)``, all else ``(n, answers)``."""
 
@@ -76,16 +80,16 @@ class Told(NamedTuple):
 
 def by_kernel(program: ir.Program, vectors: NDArray[np.float64], *, tape: Tape | None = None) -> Told:
     """What the kernel says; it knows how right predictions were if the program does."""
+    machine = MACHINE()
+    assert machine is not None
     tape = tape or encoded(program)
-    space, (n, count) = tape.space(), (len(vectors), len(program.answers))
+    n, count = len(vectors), len(program.answers)
     settling = any(a.trust is not None for a in program.answers)
     after, sure = np.empty(vectors.shape), np.full((2, n, count), np.nan)
     outcomes, modes = np.empty((n, count), dtype=np.int8), np.empty((n, count), dtype=np.int64)
-    margins = np.empty((n, count))
-    nobody = np.empty((0, count, tape.roles), dtype=np.int64), np.empty((0, count), dtype=np.int64)
-    vectors = np.ascontiguousarray(vectors, dtype=np.float64)
-    assert kernel.run(space, vectors, settling, after, outcomes, modes, margins, sure, *nobody) == 0
-    return Told(after, outcomes.astype(np.int64), modes, margins, sure[0], sure[1])
+    told = outcomes, modes, np.empty((n, count)), sure
+    assert machine.run(tape.space(), vectors, after, told, settling=settling) == 0
+    return Told(after, outcomes.astype(np.int64), *told[1:3], *sure)
 
 
 def by_source(text: str, vectors: NDArray[np.float64]) -> Told:

@@ -26,6 +26,7 @@ from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE, AxisLaw, FreeLaw, PairLaw, Piece, Share
 from relgym.logic.clause import Clause, Coverage, Definition, Literal
 from relgym.model.calibration import EXPERTS, OWN, Audit, Key
+from relgym.model.compiled import KERNEL
 from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
 from relgym.model.prediction import BatchPrediction
@@ -38,7 +39,6 @@ from relgym.model.target.scope import Scope
 from relgym.model.target.stops import Landing, Stop, Stops
 from relgym.model.world_model import WorldModel
 from relgym.numeric.tree import DecisionTree
-from relgym.program import kernel
 from relgym.scene.objects import POSE, Kinematics, ObjectType, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Prism, Sphere, Wedge
@@ -48,7 +48,9 @@ Array = NDArray[np.float64]
 
 def runner(parts: Parts, layout: SceneLayout) -> Runner:
     """What runs the program of a model."""
-    return Runner(parts, layout, lowered(parts, layout), kernel)
+    machine = KERNEL.load()
+    assert machine is not None
+    return Runner(parts, layout, lowered(parts, layout), machine)
 
 
 def arrays(parts: Parts, layout: SceneLayout, vectors: Array) -> BatchPrediction:

@@ -1,0 +1,81 @@
+"""The kernel that this process has, once it pays."""
+
+from __future__ import annotations
+
+import warnings
+from threading import Lock, Thread
+from typing import Final
+
+from relgym.errors import SlowWarning
+from relgym.program.machine import Machine, make
+
+__all__ = ["KERNEL", "Kernel"]
+
+ASKING, SCENE = 5e-4, 6e-6
+"""What arrays take to answer, in seconds: each time, and for each scene."""
+
+LOADING = 0.06
+"""What it takes to load the kernel from the disk, in seconds."""
+
+
+class Kernel:
+    """The compiled kernel, as this process has it: none before it pays.
+
+    Once arrays have taken about as long as loading it takes, it is loaded in a thread of its own; where no file holds
+    it, another process compiles it first (`relgym.program.machine`). Arrays answer until it is there, with the same
+    bits: no step ever waits. What arrays took is estimated from what was asked.
+
+    Attributes
+    ----------
+    machine
+        The kernel; None: not yet, or it can't be had.
+    spent
+        What arrays took so far, in seconds.
+    """
+
+    def __init__(self) -> None:
+        self.machine: Machine | None = None
+        self.spent = 0.0
+        self._missing = ""  # why it can't be had
+        self._warned = False
+        self._loader: Thread | None = None
+        self._turn = Lock()
+
+    def after(self, scenes: int) -> Machine | None:
+        """The kernel, if it is there, now that so many scenes more are asked."""
+        if self.machine is None and not self._warned:
+            self.spent += ASKING + SCENE * scenes
+            if self._missing:
+                self._warn()
+            elif self._loader is None and self.spent >= LOADING:
+                self._loader = Thread(target=self._make, name="relgym's kernel", daemon=True)
+                self._loader.start()
+        return self.machine
+
+    def load(self) -> Machine | None:
+        """Have it now, whether it pays or not, compiled if need be."""
+        self._make()
+        if self._missing and not self._warned:
+            self._warn()
+        return self.machine
+
+    def _make(self) -> None:
+        with self._turn:
+            if self.machine is None and not self._missing:
+                try:
+                    self.machine = make()
+                    self._missing = "" if self.machine else "it couldn't be compiled"
+                except (ImportError, OSError, RuntimeError) as error:
+                    self._missing = f"{type(error).__name__}: {error}; pip install llvmlite"
+
+    def _warn(self) -> None:
+        self._warned = True
+        warnings.warn(
+            f"models are run by arrays, some 30 times slower, since there is no kernel: {self._missing}",
+            SlowWarning,
+            stacklevel=4,
+        )
+
+
+KERNEL: Final = Kernel()
+"""That of this process."""

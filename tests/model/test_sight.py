@@ -1,0 +1,92 @@
+"""What the kernel sees of a single scene is what arrays see."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from programs import MODELS, crowded, room_schema, scenes_of
+
+from relgym.errors import ShapeError
+from relgym.model import perception
+from relgym.model.compiled import KERNEL, Kernel
+from relgym.model.perception import Percept, Perception
+from relgym.model.sight import Sight
+from relgym.program.records import BeyondError
+from relgym.scene.objects import SceneLayout
+from relgym.scene.schema import SceneSchema
+
+
+@pytest.fixture(autouse=True)
+def at_once() -> None:
+    KERNEL.load()
+
+
+class Nothing(Kernel):
+    """There is no kernel."""
+
+    def after(self, scenes: int) -> None:
+        return None
+
+
+def seen(percept: Percept, index: int, *, arrays: bool) -> dict[str, Any]:
+    """What classifiers are shown of an object, and how others are lined up for it."""
+    with pytest.MonkeyPatch.context() as patch:
+        if arrays:
+            patch.setattr(perception, "KERNEL", Nothing())
+        place = percept.situation(index)
+        assert arrays or place._body < 0 or place._seen is not None
+        example = place.examples
+        found = {each.name: getattr(example, each.name) for each in fields(example)}
+        return found | {"order": place.order, "keys": place.keys}
+
+
+def assert_seen_alike(schema: SceneSchema, layout: SceneLayout, vectors: Any, **options: bool) -> None:
+    for vector in vectors:
+        for index in range(len(layout.names)):
+            two = [Perception(schema, **options).percept(layout, vector[None]) for _ in range(2)]  # type: ignore[arg-type]
+            known, found = (seen(p, index, arrays=a) for p, a in zip(two, (True, False), strict=True))
+            for name, value in known.items():
+                np.testing.assert_array_equal(found[name], value, name)
+                if isinstance(value, np.ndarray):
+                    assert found[name].dtype == value.dtype and found[name].shape == value.shape
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_learned_worlds(name: str) -> None:
+    model = MODELS[name]()
+    layout, vectors = scenes_of(model, 15, 3)
+    assert_seen_alike(model.schema, layout, vectors)
+
+
+@settings(max_examples=10, deadline=None)
+@given(shapes=st.integers(1, 3), balls=st.integers(1, 3), seed=st.integers(0, 10**6), parting=st.booleans())
+def test_crowded_rooms(shapes: int, balls: int, seed: int, parting: bool) -> None:
+    schema = room_schema(shapes, balls)
+    assert_seen_alike(schema, schema.layout(), crowded(schema, 6, seed), parting=parting)
+
+
+def test_a_body_that_cannot_be_is_refused_by_arrays() -> None:
+    schema = room_schema(1, 1)
+    layout, vector = schema.layout(), crowded(schema, 1, 0)[0]
+    index = layout.bodies[0]
+    vector[layout.offsets[index] + layout.types[index].pose_columns()[6]] = -1.0
+    place = Perception(schema).percept(layout, vector[None]).situation(index)
+    assert place._seen is None
+    with pytest.raises(ShapeError):
+        place.examples  # noqa: B018
+
+
+def test_what_the_kernel_cannot_look_at_is_left_to_arrays() -> None:
+    schema = room_schema(1, 1)
+    layout, vector = schema.layout(), crowded(schema, 1, 0)[0]
+    fcl = Perception(schema, geometry="fcl")
+    machine = KERNEL.load()
+    assert machine is not None
+    with pytest.raises(BeyondError, match="geometry 'fcl'"):
+        Sight(machine, fcl.extractor, layout, fcl.feature_columns(layout), parting=True)
+    assert fcl.percept(layout, vector[None]).situation(layout.bodies[0])._seen is None
