@@ -78,8 +78,8 @@ _EXACT: Final = -(1 << 14)
 NO_RUNNER_UP: Final = 7
 """Bin of leads where there is nobody to lead."""
 
-OF_WINNER, OF_FAMILY = -1, -2
-"""Bins of leads that stand for all of a winner's, and for those of all modes or all laws."""
+OF_WINNER, OF_FAMILY, OF_ALL = -1, -2, -3
+"""Bins of leads that stand for all of a winner's, for those of all modes or all laws, and for all there are."""
 
 
 class Key(NamedTuple):
@@ -271,6 +271,14 @@ class _Cell:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
 
+    def silence(self, expert: int) -> None:
+        """Forget how an expert did: another one takes its place."""
+        self.records.pop(expert, None)
+        self.squares[expert] = [0.0, 0.0, 0.0]
+        self._sure = None
+        if self.speaker == expert:
+            self.speaker = min(range(len(self.squares)), key=self.left)
+
     def sure(self, claims: tuple[float, float], bits: float) -> float:
         """How probably what would be claimed is right, after this record alone; 0 if no mode and no law speaks."""
         if self._sure is None or self._sure[0] != bits:
@@ -406,18 +414,22 @@ class Calibration:
                 yield shown, bits, told, self.claims(key, told)
 
     def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
-        cells = [self._cells.get(each) for each in (_family(key), _winner(key), key)]
-        # Who speaks is told by this winner's record alone: what others won says nothing of a new law.
-        known = [c for c in cells[1:] if c is not None and c.squares[PERSISTENCE][0]]
-        if not known:
-            speaker = next(k for k in _BY_DEFAULT if k in able)
-        else:
+        whole, family, winner, cell = (self._cells.get(each) for each in _levels(key))
+        bits = self._bits(_who(key))
+        known = [c for c in (winner, cell) if c is not None and c.squares[PERSISTENCE][0]]
+        if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-        bits = self._bits(_who(key)) if speaker == OWN else 0.0
-        own = [_Record() if c is None else c.records.get(speaker, _Record()) for c in cells]
-        latest = own[2] if own[2].trials else own[1]
-        share = latest.share(own[0].mean(0.5), bits) if self.trials else math.nan
+        elif whole is None or (OWN in able and _Record().share(_mean(family, OWN), bits) > self.probability):
+            speaker = next(k for k in _BY_DEFAULT if k in able)
+        else:  # of a new winner nothing is known, and of those like it nothing good
+            trusted = whole
+            others = [k for k in able if k not in (OWN, LATEST)]
+            speaker = whole.speaker if whole.speaker in others else min(others, key=whole.left)
+            known = [whole]
+        latest = next((c.records[speaker] for c in (cell, winner) if c is not None and speaker in c.records), _Record())
+        prior = _mean(family, speaker, _mean(None if _makes_claims(speaker) else whole, speaker))
+        share = latest.share(prior, bits if speaker == OWN else 0.0) if self.trials else math.nan
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
@@ -443,7 +455,7 @@ class Calibration:
         share = (
             told.probability if cell is None else cell.sure((self.probability, self.allowed), self._bits(who))
         )
-        return min(told.probability, share) >= self.probability and share >= self._least[who]
+        return min(told.probability, share) > self.probability and share >= self._least[who]
 
     def _needed(self, who: int) -> float:
         """The least probability that is claimed."""
@@ -451,7 +463,7 @@ class Calibration:
         left = 1.0 + 0.5 * PRIOR + self.allowed * sum(c.heard for c in kinds)
         claims, bits = (self.probability, self.allowed), self._bits(who)
         for share, heard in sorted(((c.sure(claims, bits), c.heard) for c in kinds), reverse=True):
-            if share < self.probability:
+            if share <= self.probability:
                 break
             left -= (1.0 - share) * heard
             if left < 0.0:
@@ -506,7 +518,7 @@ class Calibration:
             self._slips = [0.5 * each for each in self._slips]
             for cell in self._cells.values():
                 cell.heard *= 0.5
-        for key in (_family(audit.key), _winner(audit.key), audit.key):
+        for key in _levels(audit.key):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker, self.experts)
             if key.lead == OF_FAMILY:
@@ -520,7 +532,7 @@ class Calibration:
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
         self._cells = {
-            k: c for k, c in self._cells.items() if k.winner <= 0 or k.lead == OF_FAMILY or k.winner in modes
+            k: c for k, c in self._cells.items() if k.winner <= 0 or k.lead <= OF_FAMILY or k.winner in modes
         }
         self._assessed.clear()
         self._least.clear()
@@ -555,8 +567,13 @@ class Calibration:
         return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 
     def forget(self) -> None:
-        """What follows is another model's word: only what mostly changes stays."""
-        self._cells, self._assessed, self._least, self.trials, self._vouched = {}, {}, {}, 0, 0.0
+        """What follows is another model's word: only what mostly changes stays, and what the others know."""
+        whole = self._cells.get(_WHOLE)
+        self._cells, self._assessed, self._least, self._vouched = {}, {}, {}, 0.0
+        if whole is not None:
+            for expert in (OWN, LATEST, *range(len(EXPERTS), self.experts)):
+                whole.silence(expert)
+            self._cells[_WHOLE] = whole
 
     def share(self, outcome: int) -> float:
         """Share of what modes predicted with an outcome that were hits lately; NaN where there were none."""
@@ -656,6 +673,21 @@ def _family(key: Key) -> Key:
 def _winner(key: Key) -> Key:
     """The cell of all predictions of one outcome and winner."""
     return Key(key.outcome, key.winner, OF_WINNER)
+
+
+_WHOLE: Final = Key(0, 0, OF_ALL)
+"""The cell of all predictions."""
+
+
+def _levels(key: Key) -> tuple[Key, Key, Key, Key]:
+    """The cells that a prediction is counted in, the widest first."""
+    return _WHOLE, _family(key), _winner(key), key
+
+
+def _mean(cell: _Cell | None, expert: int, prior: float = 0.5) -> float:
+    """Posterior mean of an expert's hits in a cell; the prior where there is none."""
+    record = None if cell is None else cell.records.get(expert)
+    return prior if record is None else record.mean(prior)
 
 
 def _place(error: float) -> int:

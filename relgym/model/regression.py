@@ -3,10 +3,16 @@
 Regression of the change on (x, u, 1), and on squares and products of these where they are few, is what anybody would
 try first. So it is tried beside everything else, and where it codes what comes in fewer bits it gives the value
 (`relgym.model.calibration`). It claims nothing: it has no conditions.
+
+Of many products few rows tell all weights: in the midst of those rows a regression on products is better, far from them
+it errs by far more than the linear one. So its word counts as far as its leverage h allows. What it leaves, s in the
+mean square, is mostly misfit, and becomes s (1 + h)^2; the linear regression's is more by b everywhere. What adds up to
+the least error is b / (b + s (1 + h)^2 - s) of the one, and the rest of the other (shrinkage: James & Stein 1961).
 """
 
 from __future__ import annotations
 
+from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -15,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
-from relgym.config.constants import BEYOND
+from relgym.config.constants import BEYOND, SUMMABLE
 from relgym.numeric.online_ridge import OnlineRidge
 from relgym.scene.objects import TASK
 
@@ -56,6 +62,7 @@ class Regression:
         self._centre = np.zeros(0)
         self._scale = np.ones(0)
         self._range = np.zeros((2, 0))  # smallest and largest change of each target
+        self._left = np.zeros((KINDS, 0))  # mean squares of what each kind left of each target, where h is 0
         self._places: dict[int, tuple[SlotSignature, NDArray[np.intp] | None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -75,9 +82,10 @@ class Regression:
         x, y = row[places], np.array([changes.get(name, 0.0) for name in self.targets])
         missing = len(y) - self._range.shape[1]
         if missing:
-            self._range = np.pad(self._range, ((0, 0), (0, missing)))
+            self._range, self._left = (np.pad(a, ((0, 0), (0, missing))) for a in (self._range, self._left))
         self._range = np.stack([np.minimum(self._range[0], y), np.maximum(self._range[1], y)])
         if self._ridges:
+            self._compare(x, y)
             self._add(x, y)
             return
         self._waiting.append((x, y))
@@ -96,6 +104,19 @@ class Regression:
         for row, y in self._waiting:
             self._add(row, y)
         self._waiting = []
+
+    def _compare(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+        """Take in what each kind would have left of an example that isn't learned yet; late ones count for more."""
+        if len(self._ridges) < KINDS:
+            return
+        found, leverage = self._said(x[None])
+        if not np.isfinite(leverage[0]):  # a gross error, which isn't learned either
+            return
+        size = np.stack([np.abs(found[0, 0] - y), np.abs(found[0, 1] - y) / (1.0 + leverage[0])])
+        known = np.isfinite(size)
+        rate = min(1.0, 2.0 / (self._ridges[1].rows - FIRST + 1))  # each counts in proportion to its number
+        squares = np.square(np.minimum(np.where(known, size, 0.0), np.sqrt(SUMMABLE)))
+        self._left = np.where(known, self._left + rate * (squares - self._left), self._left)
 
     def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
         with np.errstate(over="ignore"):  # what isn't finite is left out
@@ -121,22 +142,43 @@ class Regression:
         """
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
+        found, leverage = self._said(x[:, places])
+        if len(self._ridges) == KINDS:
+            share = self._share(leverage)
+            found[:, 1] = found[:, 0] + share * (found[:, 1] - found[:, 0])
+        return found
+
+    def _said(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What each regression says of rows of its columns, ``(n, KINDS, targets)``, and the leverage on products."""
         found = np.full((len(x), KINDS, len(self.targets)), np.nan)
+        leverage = np.zeros(len(x))
         with np.errstate(over="ignore", invalid="ignore"):  # of a gross error nothing is told
-            shown = self._shown(self._scaled(x[:, places]))
+            shown = self._shown(self._scaled(x))
             for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
                 found[:, k, : len(ridge.weights)] = ridge.predict(columns)
+            if len(self._ridges) == KINDS:
+                leverage = self._ridges[1].leverage(shown[1])
         least, most = self._range
         slack = BEYOND * (most - least)
-        clipped: NDArray[np.float64] = np.clip(found, least - slack, most + slack)
-        return clipped
+        return np.clip(found, least - slack, most + slack), leverage
+
+    def _share(self, leverage: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far the word of products counts, at leverages ``(n,)``, for each target, shape ``(n, targets)``."""
+        linear, products = self._left
+        bias = np.maximum(linear - products, 0.0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            more = products * ((2.0 + leverage) * leverage)[:, None]
+            return np.where(bias > 0.0, bias / (bias + more), 0.0)
 
     def sums(
         self, signature: SlotSignature, target: str
     ) -> (
         tuple[list[int], list[float], list[float], tuple[tuple[float, ...], ...], tuple[float, float]] | None
     ):
-        """What `values` works out for a target: columns of a row, their centres and scales, weights, bounds."""
+        """What a target's regressions are: columns of a row, their centres and scales, weights, bounds.
+
+        Of the products this is what they say by themselves; `values` counts that as far as their leverage allows.
+        """
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
         k = self.targets.index(target)
@@ -167,9 +209,14 @@ class Regression:
             "centre": self._centre.tolist(),
             "scale": self._scale.tolist(),
             "range": self._range.tolist(),
+            "left": self._left.tolist(),
             "waiting": [[x.tolist(), y.tolist()] for x, y in self._waiting] if history else [],
             "ridges": [[r.rows, r.due, r.weights.tolist()] for r in self._ridges],
-        }
+        } | (
+            {"spread": {"mean": self._ridges[1].mean.tolist(), "inverse": _packed(self._ridges[1].spread)}}
+            if len(self._ridges) == KINDS
+            else {}
+        )
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Sums that further learning adds to."""
@@ -192,6 +239,12 @@ class Regression:
             if f"gram{k}" in arrays:
                 parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
+        if "left" in data:
+            self._left = np.array(data["left"], dtype=np.float64).reshape(KINDS, len(self.targets))
+        if data.get("spread"):
+            products = self._ridges[1]
+            products.mean = np.array(data["spread"]["mean"], dtype=np.float64)
+            products.spread = _unpacked(data["spread"]["inverse"], products.columns)
 
 
 @cache
@@ -199,6 +252,18 @@ def _products(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Pairs of columns, each with itself and with those behind it."""
     first, second = np.triu_indices(columns)
     return first, second
+
+
+def _packed(matrix: NDArray[np.float32]) -> str:
+    """A symmetric matrix as text: its upper triangle, row by row, little-endian, in base64."""
+    return b64encode(matrix[np.triu_indices(len(matrix))].astype("<f4").tobytes()).decode("ascii")
+
+
+def _unpacked(text: str, columns: int) -> NDArray[np.float32]:
+    """What `_packed` wrote."""
+    found = np.zeros((columns, columns), dtype=np.float32)
+    found[np.triu_indices(columns)] = np.frombuffer(b64decode(text), dtype="<f4")
+    return found + np.triu(found, 1).T
 
 
 def _core(signature: SlotSignature) -> list[int]:

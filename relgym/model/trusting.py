@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from relgym.model.calibration import PRODUCTS
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome
@@ -53,6 +54,8 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
         key = layout.types[index].name, a.property
         if key not in beliefs:
             beliefs[key] = tuple(_beliefs(model, able))
+        if any(belief.speaker == PRODUCTS for belief in beliefs[key]):
+            raise ir.BeyondError("values that regressions on products give")
         answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest, regression)))
     return replace(program, answers=tuple(answers))
 

@@ -21,6 +21,7 @@ from relgym.model.calibration import (
     LEAVE,
     LINEAR,
     MEMORY,
+    OF_ALL,
     OF_FAMILY,
     OF_WINNER,
     OWN,
@@ -100,12 +101,25 @@ def test_a_new_kind_of_prediction_begins_with_what_the_others_tell() -> None:
     assert known.assess(Key(3, 0, 0), values(own=1.0)).probability == 0.5  # nor is another outcome's known
 
 
-def test_a_new_mode_speaks_whoever_was_better_than_those_before_it() -> None:
+def test_a_new_mode_speaks_once_it_was_right_whoever_was_better_than_those_before_it() -> None:
     known = Calibration()
     for k in range(40):
         seen(known, values(own=5.0 * (-1) ** k, now=0.0), 0.1)
     assert known.assess(KEY, values(own=5.0)).speaker == PERSISTENCE
-    assert known.assess(Key(0, 2, 3), values(own=5.0)).speaker == OWN
+    new = Key(0, 2, 3)
+    told = known.assess(new, values(own=5.0))
+    assert told.speaker == PERSISTENCE
+    assert told.spread == pytest.approx(0.1)
+    assert not known.claims(new, told)
+    seen(known, values(own=0.1), 0.1, key=new)
+    assert known.assess(new, values(own=5.0)).speaker == OWN
+
+
+def test_a_new_mode_speaks_at_once_where_those_before_it_were_right() -> None:
+    known = right(40)
+    told = known.assess(Key(0, 2, 3), values(own=5.0, linear=3.0))
+    assert told.speaker == OWN
+    assert known.claims(Key(0, 2, 3), told)
 
 
 @pytest.mark.parametrize(("hits", "misses"), [(100, 3), (500, 2)])
@@ -743,8 +757,8 @@ def test_what_is_no_kind_of_its_own_is_claimed_when_it_is_as_sure() -> None:
 def test_the_least_probability_holds_of_both() -> None:
     known = Calibration()
     known._cells[KEY], known.trials = cell(98.5, 99.0, heard=1.0), 99
-    assert known.claims(KEY, Assessment(OWN, 0.9, math.nan, math.nan))
-    assert not known.claims(KEY, Assessment(OWN, 0.899, math.nan, math.nan))
+    assert known.claims(KEY, Assessment(OWN, 0.901, math.nan, math.nan))
+    assert not known.claims(KEY, Assessment(OWN, 0.9, math.nan, math.nan))  # no likelier than asked
     known = Calibration()
     known._cells[KEY], known.trials = cell(89.0, 99.0, heard=1.0), 99
     assert not known.claims(KEY, Assessment(OWN, 0.99, math.nan, math.nan))
@@ -810,6 +824,7 @@ def test_cells_that_a_prediction_is_counted_in() -> None:
     seen(known, values(own=1.0), 1.0, key=Key(2, -3, 7))
     seen(known, values(), 1.0, key=Key(3, 0, 0))
     assert sorted(known._cells) == [
+        Key(0, 0, OF_ALL),
         Key(0, 1, OF_FAMILY),
         Key(0, 1, OF_WINNER),
         Key(0, 1, 3),
@@ -856,10 +871,15 @@ def test_what_another_model_says_is_no_known_kind() -> None:
     known.vouch(5.0)
     change = known.change
     known.forget()
-    assert (known.trials, known.change) == (0, change)
+    assert (known.trials, known.change) == (40, change)
     told = known.assess(KEY, values(own=1.0))
-    assert math.isnan(told.probability) and math.isnan(told.interval) and math.isnan(told.spread)
-    assert known.claims(KEY, told)
+    assert (told.speaker, told.probability) == (PERSISTENCE, 0.5)  # what is known of that is still true
+    assert told.spread == 1.0
+    assert not known.claims(KEY, told)
+    seen(known, values(own=1.0), 1.0)
+    told = known.assess(KEY, values(own=1.0))
+    assert told.speaker == OWN
+    assert known.claims(KEY, told._replace(probability=0.95))
 
 
 def test_shares_of_an_outcome_and_doubts() -> None:

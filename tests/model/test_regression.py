@@ -51,6 +51,23 @@ def test_nothing_is_said_before_there_are_enough_examples_and_of_too_many_column
     assert np.isnan(linear[0, 1]).all()
 
 
+def test_products_count_as_far_as_their_leverage_allows() -> None:
+    found = taught(400)
+    here = np.random.default_rng(9).normal(size=(4, len(SIGNATURE.columns)))
+    rows = np.concatenate([here, 30.0 * here])
+    own, leverage = found._said(rows[:, found._columns(SIGNATURE)])
+    said = found.values(SIGNATURE, rows)
+    assert said is not None
+    assert (leverage[:4] < 0.3).all() and (leverage[4:] > 10.0).all()
+    linear, products = found._left[:, 0]
+    for k in range(8):
+        bias, more = linear - products, products * ((1.0 + leverage[k]) ** 2 - 1.0)
+        share = bias / (bias + more)
+        assert said[k, 1, 0] == pytest.approx(share * own[k, 1, 0] + (1.0 - share) * own[k, 0, 0])
+    assert found._left[0, 1] <= found._left[1, 1]  # of a sum products know no more
+    np.testing.assert_array_equal(said[:, 1, 1], said[:, 0, 1])
+
+
 def test_changes_never_go_far_beyond_those_that_were_seen() -> None:
     found = taught(200)
     said = found.values(SIGNATURE, np.full((1, len(SIGNATURE.columns)), 1e6))
@@ -136,8 +153,7 @@ def test_sums_say_what_values_say(n: int, seed: int) -> None:
     """Columns, centres, scales, weights and bounds are all that kernels read."""
     found = taught(n, seed=seed % 7)
     rows = 3.0 * np.random.default_rng(seed).normal(size=(4, len(SIGNATURE.columns)))
-    said = found.values(SIGNATURE, rows)
-    assert said is not None
+    said, _ = found._said(rows[:, found._columns(SIGNATURE)])
     for k, target in enumerate(found.targets):
         told = found.sums(SIGNATURE, target)
         assert told is not None

@@ -184,6 +184,20 @@ def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) ->
             _require(
                 all(len(row) == width + 1 for row in weights), where, "expected a weight for each column"
             )
+        _require(all(len(each) == count for each in regression.left), where, "expected what is left of each target")
+        if regression.spread is not None:
+            _require(len(regression.ridges) == 2, where, "a spread of what there isn't")
+            width = d + d * (d + 1) // 2
+            _require(len(regression.spread.mean) == width, where, "expected a mean for each column")
+            _require(_decoded(regression.spread.inverse) == 2 * width * (width + 1), where, "expected a triangle")
+
+
+def _decoded(text: str) -> int:
+    """Number of bytes that a text in base64 stands for; -1 where it is none."""
+    try:
+        return len(base64.b64decode(text, validate=True))
+    except ValueError:
+        return -1
 
 
 def _target(record: TargetRecord) -> Target:
