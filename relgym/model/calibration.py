@@ -518,7 +518,7 @@ class Calibration:
             self._slips = [0.5 * each for each in self._slips]
             for cell in self._cells.values():
                 cell.heard *= 0.5
-        for key in _levels(audit.key):
+        for key in dict.fromkeys(_levels(audit.key)):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker, self.experts)
             if key.lead == OF_FAMILY:
@@ -680,8 +680,8 @@ _WHOLE: Final = Key(0, 0, OF_ALL)
 
 
 def _levels(key: Key) -> tuple[Key, Key, Key, Key]:
-    """The cells that a prediction is counted in, the widest first."""
-    return _WHOLE, _family(key), _winner(key), key
+    """The cells that a prediction is counted in, the widest first; where nobody won, all but the first are one."""
+    return _WHOLE, *((_family(key), _winner(key), key) if key.winner else (key, key, key))
 
 
 def _mean(cell: _Cell | None, expert: int, prior: float = 0.5) -> float:

@@ -4,10 +4,11 @@ Regression of the change on (x, u, 1), and on squares and products of these wher
 try first. So it is tried beside everything else, and where it codes what comes in fewer bits it gives the value
 (`relgym.model.calibration`). It claims nothing: it has no conditions.
 
-Of many products few rows tell all weights: in the midst of those rows a regression on products is better, far from them
-it errs by far more than the linear one. So its word counts as far as its leverage h allows. What it leaves, s in the
-mean square, is mostly misfit, and becomes s (1 + h)^2; the linear regression's is more by b everywhere. What adds up to
-the least error is b / (b + s (1 + h)^2 - s) of the one, and the rest of the other (shrinkage: James & Stein 1961).
+Where a row lies far from all that were learned, a regression errs by far more than among them, and the more so the more
+columns it has. So the second kind counts each word as far as its leverage h allows: first that nothing changes, then the
+linear one's, then the products'. What a regression leaves, s in the mean square, is mostly misfit, and becomes
+s (1 + h)^2; what the words before it leave is more by b everywhere. What adds up to the least error is
+b / (b + s (1 + h)^2 - s) of its word, and the rest of theirs (shrinkage: James & Stein 1961).
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from relgym.scene.objects import TASK
 __all__ = ["KINDS", "Regression"]
 
 KINDS = 2
-"""Linear, and with squares and products."""
+"""Linear; and what all together say, squares and products too, as far as the leverage allows."""
 
 FIRST = 64
 """So many rows tell where a column lies and how far it varies; from then on it is regressed on."""
@@ -62,7 +63,8 @@ class Regression:
         self._centre = np.zeros(0)
         self._scale = np.ones(0)
         self._range = np.zeros((2, 0))  # smallest and largest change of each target
-        self._left = np.zeros((KINDS, 0))  # mean squares of what each kind left of each target, where h is 0
+        # Mean squares of what was left of each target, where h is 0: by that nothing changes, and each regression.
+        self._left = np.zeros((1 + KINDS, 0))
         self._places: dict[int, tuple[SlotSignature, NDArray[np.intp] | None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -98,23 +100,22 @@ class Regression:
         spread = x.std(axis=0)
         self._scale = np.where(spread > 0.0, spread, 1.0)
         d = len(self._centre)
-        self._ridges = [OnlineRidge(d)]
+        self._ridges = [OnlineRidge(d, FIRST)]
         if d + d * (d + 1) // 2 <= self._most:
-            self._ridges.append(OnlineRidge(d + d * (d + 1) // 2))
+            self._ridges.append(OnlineRidge(d + d * (d + 1) // 2, FIRST))
         for row, y in self._waiting:
             self._add(row, y)
         self._waiting = []
 
     def _compare(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
-        """Take in what each kind would have left of an example that isn't learned yet; late ones count for more."""
-        if len(self._ridges) < KINDS:
-            return
+        """Take in what each would have left of an example that isn't learned yet; late ones count for more."""
         found, leverage = self._said(x[None])
-        if not np.isfinite(leverage[0]):  # a gross error, which isn't learned either
+        if not np.isfinite(leverage).all():  # a gross error, which isn't learned either
             return
-        size = np.stack([np.abs(found[0, 0] - y), np.abs(found[0, 1] - y) / (1.0 + leverage[0])])
+        size = np.abs(np.concatenate([np.zeros((1, len(y))), found[0]]) - y)
+        size[1:] /= 1.0 + leverage[0][:, None]
         known = np.isfinite(size)
-        rate = min(1.0, 2.0 / (self._ridges[1].rows - FIRST + 1))  # each counts in proportion to its number
+        rate = min(1.0, 2.0 / (self._ridges[0].rows - FIRST + 1))  # each counts in proportion to its number
         squares = np.square(np.minimum(np.where(known, size, 0.0), np.sqrt(SUMMABLE)))
         self._left = np.where(known, self._left + rate * (squares - self._left), self._left)
 
@@ -143,31 +144,31 @@ class Regression:
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
         found, leverage = self._said(x[:, places])
-        if len(self._ridges) == KINDS:
-            share = self._share(leverage)
-            found[:, 1] = found[:, 0] + share * (found[:, 1] - found[:, 0])
+        whole = np.zeros_like(found[:, 0])
+        for k in range(len(self._ridges)):
+            word = found[:, k]
+            whole = np.where(np.isfinite(word), whole + self._share(k, leverage[:, k]) * (word - whole), whole)
+        found[:, 1] = np.where(np.isfinite(found[:, 0]), whole, np.nan)
         return found
 
     def _said(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """What each regression says of rows of its columns, ``(n, KINDS, targets)``, and the leverage on products."""
+        """What each regression says of rows of its columns, ``(n, KINDS, targets)``, and leverages, ``(n, KINDS)``."""
         found = np.full((len(x), KINDS, len(self.targets)), np.nan)
-        leverage = np.zeros(len(x))
+        leverage = np.zeros((len(x), KINDS))
         with np.errstate(over="ignore", invalid="ignore"):  # of a gross error nothing is told
             shown = self._shown(self._scaled(x))
             for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
                 found[:, k, : len(ridge.weights)] = ridge.predict(columns)
-            if len(self._ridges) == KINDS:
-                leverage = self._ridges[1].leverage(shown[1])
+                leverage[:, k] = ridge.leverage(columns)
         least, most = self._range
         slack = BEYOND * (most - least)
         return np.clip(found, least - slack, most + slack), leverage
 
-    def _share(self, leverage: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far the word of products counts, at leverages ``(n,)``, for each target, shape ``(n, targets)``."""
-        linear, products = self._left
-        bias = np.maximum(linear - products, 0.0)
+    def _share(self, kind: int, leverage: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far a regression's word counts, at leverages ``(n,)``, for each target, shape ``(n, targets)``."""
+        bias = np.maximum(self._left[: kind + 1].min(axis=0) - self._left[kind + 1], 0.0)
         with np.errstate(over="ignore", invalid="ignore"):
-            more = products * ((2.0 + leverage) * leverage)[:, None]
+            more = self._left[kind + 1] * ((2.0 + leverage) * leverage)[:, None]
             return np.where(bias > 0.0, bias / (bias + more), 0.0)
 
     def sums(
@@ -177,7 +178,7 @@ class Regression:
     ):
         """What a target's regressions are: columns of a row, their centres and scales, weights, bounds.
 
-        Of the products this is what they say by themselves; `values` counts that as far as their leverage allows.
+        This is what they say by themselves: of the second kind of `values` it is a part.
         """
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
@@ -212,11 +213,8 @@ class Regression:
             "left": self._left.tolist(),
             "waiting": [[x.tolist(), y.tolist()] for x, y in self._waiting] if history else [],
             "ridges": [[r.rows, r.due, r.weights.tolist()] for r in self._ridges],
-        } | (
-            {"spread": {"mean": self._ridges[1].mean.tolist(), "inverse": _packed(self._ridges[1].spread)}}
-            if len(self._ridges) == KINDS
-            else {}
-        )
+            "spreads": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges],
+        }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Sums that further learning adds to."""
@@ -240,11 +238,10 @@ class Regression:
                 parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
         if "left" in data:
-            self._left = np.array(data["left"], dtype=np.float64).reshape(KINDS, len(self.targets))
-        if data.get("spread"):
-            products = self._ridges[1]
-            products.mean = np.array(data["spread"]["mean"], dtype=np.float64)
-            products.spread = _unpacked(data["spread"]["inverse"], products.columns)
+            self._left = np.array(data["left"], dtype=np.float64).reshape(1 + KINDS, len(self.targets))
+        for ridge, known in zip(self._ridges, data.get("spreads", ()), strict=False):
+            ridge.mean = np.array(known["mean"], dtype=np.float64)
+            ridge.spread = _unpacked(known["inverse"], ridge.columns)
 
 
 @cache

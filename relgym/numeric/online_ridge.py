@@ -28,6 +28,8 @@ class OnlineRidge:
     ----------
     columns
         Number of columns, d.
+    due
+        Number of rows at which weights are solved for the first time.
 
     Attributes
     ----------
@@ -57,14 +59,14 @@ class OnlineRidge:
     True
     """
 
-    def __init__(self, columns: int) -> None:
+    def __init__(self, columns: int, due: int = 2) -> None:
         self.rows = 0
         self.weights = np.zeros((0, columns + 1))
         self.mean = np.zeros(columns)
         self.spread = np.full((columns, columns), np.inf, dtype=np.float32)
         self._gram = np.zeros((columns + 1, columns + 1))
         self._moments = np.zeros((0, columns + 1))
-        self._due = 2
+        self._due = due
 
     @property
     def columns(self) -> int:

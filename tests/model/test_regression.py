@@ -48,7 +48,8 @@ def test_nothing_is_said_before_there_are_enough_examples_and_of_too_many_column
     assert taught(FIRST, most=2).values(SIGNATURE, rows) is None
     linear = taught(FIRST, most=3).values(SIGNATURE, rows)
     assert linear is not None
-    assert np.isnan(linear[0, 1]).all()
+    assert np.isfinite(linear[0]).all()
+    assert len(taught(FIRST, most=3)._ridges) == 1
 
 
 def test_products_count_as_far_as_their_leverage_allows() -> None:
@@ -58,14 +59,28 @@ def test_products_count_as_far_as_their_leverage_allows() -> None:
     own, leverage = found._said(rows[:, found._columns(SIGNATURE)])
     said = found.values(SIGNATURE, rows)
     assert said is not None
-    assert (leverage[:4] < 0.3).all() and (leverage[4:] > 10.0).all()
-    linear, products = found._left[:, 0]
-    for k in range(8):
-        bias, more = linear - products, products * ((1.0 + leverage[k]) ** 2 - 1.0)
-        share = bias / (bias + more)
-        assert said[k, 1, 0] == pytest.approx(share * own[k, 1, 0] + (1.0 - share) * own[k, 0, 0])
-    assert found._left[0, 1] <= found._left[1, 1]  # of a sum products know no more
-    np.testing.assert_array_equal(said[:, 1, 1], said[:, 0, 1])
+    assert (leverage[:4] < 0.3).all() and (leverage[4:, 1] > 10.0).all()
+    for target in (0, 1):
+        nothing, linear, products = found._left[:, target].tolist()
+        for k in range(8):
+            said_so_far, left = 0.0, nothing
+            for kind, s in enumerate((linear, products)):
+                bias, h = max(left - s, 0.0), leverage[k, kind]
+                share = bias / (bias + s * ((1.0 + h) ** 2 - 1.0)) if bias else 0.0
+                said_so_far += share * (own[k, kind, target] - said_so_far)
+                left = min(left, s)
+            assert said[k, 1, target] == pytest.approx(said_so_far)
+    np.testing.assert_array_equal(said[:, 0], own[:, 0])
+
+
+def test_nothing_is_said_of_what_nothing_tells() -> None:
+    rng = np.random.default_rng(3)
+    found = Regression(320)
+    for row in rng.normal(size=(400, len(SIGNATURE.columns))):
+        found.learn_one(SIGNATURE, row, {"x": float(rng.normal())})
+    said = found.values(SIGNATURE, rng.normal(size=(50, len(SIGNATURE.columns))))
+    assert said is not None
+    assert np.square(said[:, 1]).mean() < 0.5 * np.square(said[:, 0]).mean()
 
 
 def test_changes_never_go_far_beyond_those_that_were_seen() -> None:

@@ -185,11 +185,11 @@ def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) ->
                 all(len(row) == width + 1 for row in weights), where, "expected a weight for each column"
             )
         _require(all(len(each) == count for each in regression.left), where, "expected what is left of each target")
-        if regression.spread is not None:
-            _require(len(regression.ridges) == 2, where, "a spread of what there isn't")
-            width = d + d * (d + 1) // 2
-            _require(len(regression.spread.mean) == width, where, "expected a mean for each column")
-            _require(_decoded(regression.spread.inverse) == 2 * width * (width + 1), where, "expected a triangle")
+        _require(len(regression.left) in (0, 3), where, "expected what is left of nothing, and by two regressions")
+        _require(len(regression.spreads) <= len(regression.ridges), where, "a spread of what there isn't")
+        for spread, width in zip(regression.spreads, (d, d + d * (d + 1) // 2), strict=False):
+            _require(len(spread.mean) == width, where, "expected a mean for each column")
+            _require(_decoded(spread.inverse) == 2 * width * (width + 1), where, "expected a triangle")
 
 
 def _decoded(text: str) -> int:

@@ -471,7 +471,7 @@ class CalibrationRecord(Record):
 
 
 class SpreadRecord(Record):
-    """Where the columns of the regression on products lie, and how far (`OnlineRidge.spread`)."""
+    """Where the columns of a regression lie, and how far (`OnlineRidge.spread`)."""
 
     mean: list[float]
     inverse: Annotated[str, Meta(description="upper triangle, row by row: float32, little-endian, base64")]
@@ -488,8 +488,8 @@ class RegressionRecord(Record):
     range: tuple[list[float], list[float]]
     waiting: Annotated[list[tuple[list[float], list[float]]], Meta(max_length=64)]
     ridges: Annotated[list[tuple[Count, Count, list[list[float]]]], Meta(max_length=2)]
-    left: Annotated[list[list[Annotated[float, Meta(ge=0.0)]]], Meta(max_length=2)] = []
-    spread: SpreadRecord | None = None
+    left: Annotated[list[list[Annotated[float, Meta(ge=0.0)]]], Meta(max_length=3)] = []
+    spreads: Annotated[list[SpreadRecord], Meta(max_length=2)] = []
 
 
 class TableRecord(Record):
