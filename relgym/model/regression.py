@@ -213,7 +213,7 @@ class Regression:
             "left": self._left.tolist(),
             "waiting": [[x.tolist(), y.tolist()] for x, y in self._waiting] if history else [],
             "ridges": [[r.rows, r.due, r.weights.tolist()] for r in self._ridges],
-            "spreads": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges],
+            "leverage": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges],
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -239,7 +239,7 @@ class Regression:
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
         if "left" in data:
             self._left = np.array(data["left"], dtype=np.float64).reshape(1 + KINDS, len(self.targets))
-        for ridge, known in zip(self._ridges, data.get("spreads", ()), strict=False):
+        for ridge, known in zip(self._ridges, data.get("leverage", ()), strict=False):
             ridge.mean = np.array(known["mean"], dtype=np.float64)
             ridge.spread = _unpacked(known["inverse"], ridge.columns)
 

@@ -186,18 +186,10 @@ def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) ->
             )
         _require(all(len(each) == count for each in regression.left), where, "expected what is left of each target")
         _require(len(regression.left) in (0, 3), where, "expected what is left of nothing, and by two regressions")
-        _require(len(regression.spreads) <= len(regression.ridges), where, "a spread of what there isn't")
-        for spread, width in zip(regression.spreads, (d, d + d * (d + 1) // 2), strict=False):
+        _require(len(regression.leverage) <= len(regression.ridges), where, "leverage on what there isn't")
+        for spread, width in zip(regression.leverage, (d, d + d * (d + 1) // 2), strict=False):
             _require(len(spread.mean) == width, where, "expected a mean for each column")
-            _require(_decoded(spread.inverse) == 2 * width * (width + 1), where, "expected a triangle")
-
-
-def _decoded(text: str) -> int:
-    """Number of bytes that a text in base64 stands for; -1 where it is none."""
-    try:
-        return len(base64.b64decode(text, validate=True))
-    except ValueError:
-        return -1
+            _decoded(spread.inverse, "float32", (width * (width + 1) // 2,), where)
 
 
 def _target(record: TargetRecord) -> Target:

@@ -470,7 +470,7 @@ class CalibrationRecord(Record):
     cells: list[CellRecord]
 
 
-class SpreadRecord(Record):
+class LeverageRecord(Record):
     """Where the columns of a regression lie, and how far (`OnlineRidge.spread`)."""
 
     mean: list[float]
@@ -489,7 +489,7 @@ class RegressionRecord(Record):
     waiting: Annotated[list[tuple[list[float], list[float]]], Meta(max_length=64)]
     ridges: Annotated[list[tuple[Count, Count, list[list[float]]]], Meta(max_length=2)]
     left: Annotated[list[list[Annotated[float, Meta(ge=0.0)]]], Meta(max_length=3)] = []
-    spreads: Annotated[list[SpreadRecord], Meta(max_length=2)] = []
+    leverage: Annotated[list[LeverageRecord], Meta(max_length=2)] = []
 
 
 class TableRecord(Record):
