@@ -313,6 +313,8 @@ class ModeClusterer:
         """
         if not self.due:
             return False
+        if self._resort is None and not budget.left:
+            return False  # what waits holds no data
         if self._resort is None:
             self._resort = Resort.of(self.population, table, floor=self.floor)
         if not budget.work(self._resort.task):
