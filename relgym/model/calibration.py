@@ -271,13 +271,25 @@ class _Cell:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
 
+    @classmethod
+    def united(cls, cells: Sequence[_Cell], experts: int) -> _Cell:
+        """What some cells know together, of whoever spoke in one of them; runs have no order then."""
+        found = cls.new(PERSISTENCE, experts)
+        for cell in cells:
+            for sums, more in zip(found.squares, cell.squares, strict=True):
+                sums[:] = [a + b for a, b in zip(sums, more, strict=True)]
+            for expert, record in cell.records.items():
+                known = found.records.setdefault(expert, _Record())
+                known.trials += record.trials
+                known.hits += record.hits
+                for place, count in record.errors.items():
+                    known.errors[place] = known.errors.get(place, 0.0) + count
+        return found
+
     def silence(self, expert: int) -> None:
         """Forget how an expert did: another one takes its place."""
         self.records.pop(expert, None)
         self.squares[expert] = [0.0, 0.0, 0.0]
-        self._sure = None
-        if self.speaker == expert:
-            self.speaker = min(range(len(self.squares)), key=self.left)
 
     def sure(self, claims: tuple[float, float], bits: float) -> float:
         """How probably what would be claimed is right, after this record alone; 0 if no mode and no law speaks."""
@@ -351,9 +363,16 @@ class Calibration:
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
         self._assessed: dict[Key, tuple[tuple[int, ...], Assessment]] = {}
+        self._united: _Cell | None = None  # see `_whole`
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_assessed": {}, "_least": {}}
+        return self.__dict__ | {"_assessed": {}, "_least": {}, "_united": None}
+
+    def _changed(self) -> None:
+        """What was worked out from the cells is out of date."""
+        self._assessed.clear()
+        self._least.clear()
+        self._united = None
 
     @property
     def change(self) -> float:
@@ -414,22 +433,21 @@ class Calibration:
                 yield shown, bits, told, self.claims(key, told)
 
     def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
-        whole, family, winner, cell = (self._cells.get(each) for each in _levels(key))
+        family, winner, cell = (self._cells.get(each) for each in _levels(key))
+        family = family if key.winner else None
         bits = self._bits(_who(key))
         known = [c for c in (winner, cell) if c is not None and c.squares[PERSISTENCE][0]]
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-        elif whole is None or (OWN in able and _Record().share(_mean(family, OWN), bits) > self.probability):
+        elif not self._cells or (OWN in able and _Record().share(_mean(family, OWN), bits) > self.probability):
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:  # of a new winner nothing is known, and of those like it nothing good
-            trusted = whole
-            others = [k for k in able if k not in (OWN, LATEST)]
-            speaker = whole.speaker if whole.speaker in others else min(others, key=whole.left)
-            known = [whole]
+            trusted = family = self._whole()
+            speaker = min((k for k in able if k not in (OWN, LATEST)), key=trusted.left)
+            known = [trusted]
         latest = next((c.records[speaker] for c in (cell, winner) if c is not None and speaker in c.records), _Record())
-        prior = _mean(family, speaker, _mean(None if _makes_claims(speaker) else whole, speaker))
-        share = latest.share(prior, bits if speaker == OWN else 0.0) if self.trials else math.nan
+        share = latest.share(_mean(family, speaker), bits if speaker == OWN else 0.0) if self.trials else math.nan
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
@@ -437,6 +455,13 @@ class Calibration:
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
+
+    def _whole(self) -> _Cell:
+        """What all cells know together."""
+        if self._united is None:
+            cells = [c for k, c in sorted(self._cells.items()) if k.lead >= 0 or k == _WHOLE]
+            self._united = _Cell.united(cells, self.experts)
+        return self._united
 
     def claims(self, key: Key, told: Assessment) -> bool:
         """Whether a prediction in a cell is claimed: a mode or a law speaks, and it is right probably enough.
@@ -476,8 +501,7 @@ class Calibration:
     def vouch(self, bits: float) -> None:
         """Laws come in force, which describe what came in so many bits less than modes: so much likelier they are."""
         self._vouched = bits
-        self._assessed.clear()
-        self._least.clear()
+        self._changed()
 
     # ------------------------------------------------------------------ how it came out
     def look_back(
@@ -518,7 +542,7 @@ class Calibration:
             self._slips = [0.5 * each for each in self._slips]
             for cell in self._cells.values():
                 cell.heard *= 0.5
-        for key in dict.fromkeys(_levels(audit.key)):
+        for key in _levels(audit.key) if audit.key.winner else (audit.key,):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker, self.experts)
             if key.lead == OF_FAMILY:
@@ -526,16 +550,14 @@ class Calibration:
             else:
                 self._cells[key].count(errors, within)
         self._cells[audit.key].heard += 1.0
-        self._assessed.clear()
-        self._least.clear()
+        self._changed()
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
         self._cells = {
             k: c for k, c in self._cells.items() if k.winner <= 0 or k.lead <= OF_FAMILY or k.winner in modes
         }
-        self._assessed.clear()
-        self._least.clear()
+        self._changed()
 
     def renewed(self, expert: int) -> None:
         """An expert has another law: it begins as if it had been as good as who speaks in the latest few trials.
@@ -548,8 +570,7 @@ class Calibration:
             share = min(1.0, EVIDENCE / known[0]) if known[0] else 0.0
             cell.squares[expert] = [share * each for each in known]
             cell._sure = None
-        self._assessed.clear()
-        self._least.clear()
+        self._changed()
 
     def speakers(self) -> dict[int, float]:
         """Trials of the cells in which each expert gives the value, by place of the expert."""
@@ -568,12 +589,11 @@ class Calibration:
 
     def forget(self) -> None:
         """What follows is another model's word: only what mostly changes stays, and what the others know."""
-        whole = self._cells.get(_WHOLE)
-        self._cells, self._assessed, self._least, self._vouched = {}, {}, {}, 0.0
-        if whole is not None:
-            for expert in (OWN, LATEST, *range(len(EXPERTS), self.experts)):
-                whole.silence(expert)
-            self._cells[_WHOLE] = whole
+        whole = self._whole()
+        for expert in (OWN, LATEST, *range(len(EXPERTS), self.experts)):
+            whole.silence(expert)
+        self._cells, self._vouched = {_WHOLE: whole} if self._cells else {}, 0.0
+        self._changed()
 
     def share(self, outcome: int) -> float:
         """Share of what modes predicted with an outcome that were hits lately; NaN where there were none."""
@@ -676,12 +696,12 @@ def _winner(key: Key) -> Key:
 
 
 _WHOLE: Final = Key(0, 0, OF_ALL)
-"""The cell of all predictions."""
+"""What was known before the model was another one."""
 
 
-def _levels(key: Key) -> tuple[Key, Key, Key, Key]:
-    """The cells that a prediction is counted in, the widest first; where nobody won, all but the first are one."""
-    return _WHOLE, *((_family(key), _winner(key), key) if key.winner else (key, key, key))
+def _levels(key: Key) -> tuple[Key, Key, Key]:
+    """The cells that a prediction is counted in, the widest first; where nobody won they are one."""
+    return (_family(key), _winner(key), key) if key.winner else (key, key, key)
 
 
 def _mean(cell: _Cell | None, expert: int, prior: float = 0.5) -> float:

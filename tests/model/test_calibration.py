@@ -671,7 +671,7 @@ def test_a_cell_of_few_trials_lets_its_winner_tell_who_speaks() -> None:
 
 def test_whose_record_is_asked_by_hand() -> None:
     """The share of a cell, begun with that of all modes; of the winner's where the cell has no trials."""
-    known = Calibration()
+    known = Calibration(0.5)
     family, winner = Key(0, 1, OF_FAMILY), KEY._replace(lead=OF_WINNER)
     known._cells = {family: cell(59.5, 99.0), winner: cell(10.0, 19.0)}
     known.trials = 99
@@ -824,7 +824,6 @@ def test_cells_that_a_prediction_is_counted_in() -> None:
     seen(known, values(own=1.0), 1.0, key=Key(2, -3, 7))
     seen(known, values(), 1.0, key=Key(3, 0, 0))
     assert sorted(known._cells) == [
-        Key(0, 0, OF_ALL),
         Key(0, 1, OF_FAMILY),
         Key(0, 1, OF_WINNER),
         Key(0, 1, 3),
