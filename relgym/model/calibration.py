@@ -286,7 +286,7 @@ class _Cell:
                     known.errors[place] = known.errors.get(place, 0.0) + count
         return found
 
-    def silence(self, expert: int) -> None:
+    def drop(self, expert: int) -> None:
         """Forget how an expert did: another one takes its place."""
         self.records.pop(expert, None)
         self.squares[expert] = [0.0, 0.0, 0.0]
@@ -445,6 +445,8 @@ class Calibration:
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
             speaker = min((k for k in able if k not in (OWN, LATEST)), key=trusted.left)
+            if trusted.lead(speaker, PERSISTENCE) < EVIDENCE:
+                speaker = PERSISTENCE
             known = [trusted]
         latest = next((c.records[speaker] for c in (cell, winner) if c is not None and speaker in c.records), _Record())
         share = latest.share(_mean(family, speaker), bits if speaker == OWN else 0.0) if self.trials else math.nan
@@ -591,7 +593,7 @@ class Calibration:
         """What follows is another model's word: only what mostly changes stays, and what the others know."""
         whole = self._whole()
         for expert in (OWN, LATEST, *range(len(EXPERTS), self.experts)):
-            whole.silence(expert)
+            whole.drop(expert)
         self._cells, self._vouched = {_WHOLE: whole} if self._cells else {}, 0.0
         self._changed()
 

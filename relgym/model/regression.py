@@ -117,7 +117,8 @@ class Regression:
         known = np.isfinite(size)
         rate = min(1.0, 2.0 / (self._ridges[0].rows - FIRST + 1))  # each counts in proportion to its number
         squares = np.square(np.minimum(np.where(known, size, 0.0), np.sqrt(SUMMABLE)))
-        self._left = np.where(known, self._left + rate * (squares - self._left), self._left)
+        begun = np.where(np.isfinite(self._left), self._left, squares)
+        self._left = np.where(known, begun + rate * (squares - begun), self._left)
 
     def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
         with np.errstate(over="ignore"):  # what isn't finite is left out
@@ -166,19 +167,38 @@ class Regression:
 
     def _share(self, kind: int, leverage: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far a regression's word counts, at leverages ``(n,)``, for each target, shape ``(n, targets)``."""
-        bias = np.maximum(self._left[: kind + 1].min(axis=0) - self._left[kind + 1], 0.0)
+        bias, left = self._bias(kind)
         with np.errstate(over="ignore", invalid="ignore"):
-            more = self._left[kind + 1] * ((2.0 + leverage) * leverage)[:, None]
+            more = np.where(left > 0.0, left * ((2.0 + leverage) * leverage)[:, None], 0.0)
             return np.where(bias > 0.0, bias / (bias + more), 0.0)
+
+    def _bias(self, kind: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """How much more the words before a regression leave of each target, and what it leaves, in the mean square.
+
+        Where nobody ever compared them it has the last word.
+        """
+        left = self._left[kind + 1]
+        known = np.isfinite(left)
+        bias = np.maximum(self._left[: kind + 1].min(axis=0) - left, 0.0)
+        return np.where(known, bias, 1.0), np.where(known, left, 0.0)
 
     def sums(
         self, signature: SlotSignature, target: str
     ) -> (
-        tuple[list[int], list[float], list[float], tuple[tuple[float, ...], ...], tuple[float, float]] | None
+        tuple[
+            list[int],
+            list[float],
+            list[float],
+            tuple[tuple[float, ...], ...],
+            tuple[float, float],
+            list[tuple[tuple[float, ...], str, int, float, float]],
+        ]
+        | None
     ):
-        """What a target's regressions are: columns of a row, their centres and scales, weights, bounds.
+        """What `values` works out for a target: columns of a row, their centres and scales, weights, bounds.
 
-        This is what they say by themselves: of the second kind of `values` it is a part.
+        And of each regression how far its word counts: mean, packed spread, rows, and what the words before it leave
+        more than it, and it.
         """
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
@@ -187,7 +207,11 @@ class Regression:
         least, most = self._range[:, k].tolist()
         slack = BEYOND * (most - least)
         centre, scale = self._centre.tolist(), self._scale.tolist()
-        return places.tolist(), centre, scale, weights, (least - slack, most + slack)
+        reach = [
+            (tuple(r.mean.tolist()), _packed(r.spread), r.rows, *(float(each[k]) for each in self._bias(kind)))
+            for kind, r in enumerate(self._ridges)
+        ]
+        return places.tolist(), centre, scale, weights, (least - slack, most + slack), reach
 
     def _columns(self, signature: SlotSignature) -> NDArray[np.intp] | None:
         """Where the columns lie in a signature's rows; None where one is missing."""
@@ -203,6 +227,7 @@ class Regression:
     # ------------------------------------------------------------------ saving
     def to_json(self, *, history: bool) -> dict[str, Any]:
         """Plain data; with history what further learning needs, too, but the sums in `to_arrays`."""
+        compared = bool(np.isfinite(self._left).all())  # a file of earlier versions tells nothing of it
         return {
             "names": list(self.names),
             "seen": self.seen,
@@ -210,10 +235,12 @@ class Regression:
             "centre": self._centre.tolist(),
             "scale": self._scale.tolist(),
             "range": self._range.tolist(),
-            "left": self._left.tolist(),
+            "left": self._left.tolist() if compared else [],
             "waiting": [[x.tolist(), y.tolist()] for x, y in self._waiting] if history else [],
             "ridges": [[r.rows, r.due, r.weights.tolist()] for r in self._ridges],
-            "leverage": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges],
+            "leverage": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges]
+            if compared
+            else [],
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -237,8 +264,11 @@ class Regression:
             if f"gram{k}" in arrays:
                 parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
-        if "left" in data:
-            self._left = np.array(data["left"], dtype=np.float64).reshape(1 + KINDS, len(self.targets))
+        self._left = np.full((1 + KINDS, len(self.targets)), np.nan)
+        if data.get("left"):
+            self._left = np.array(data["left"], dtype=np.float64).reshape(self._left.shape)
+        for ridge in self._ridges:
+            ridge.spread = np.zeros_like(ridge.spread)
         for ridge, known in zip(self._ridges, data.get("leverage", ()), strict=False):
             ridge.mean = np.array(known["mean"], dtype=np.float64)
             ridge.spread = _unpacked(known["inverse"], ridge.columns)

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from relgym.model.calibration import PRODUCTS
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome
@@ -54,8 +53,6 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
         key = layout.types[index].name, a.property
         if key not in beliefs:
             beliefs[key] = tuple(_beliefs(model, able))
-        if any(belief.speaker == PRODUCTS for belief in beliefs[key]):
-            raise ir.BeyondError("values that regressions on products give")
         answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest, regression)))
     return replace(program, answers=tuple(answers))
 
@@ -90,6 +87,6 @@ def _regression(parts: Parts, layout: SceneLayout, index: int, a: ir.Answer) -> 
     said = known.sums(signature, a.property)
     if said is None:
         return None
-    places, centre, scale, weights, bounds = said
+    places, centre, scale, weights, bounds, leverage = said
     columns = tuple((gather[p], c, s) for p, c, s in zip(places, centre, scale, strict=True))
-    return ir.Regression(a.column, columns, weights, *bounds)
+    return ir.Regression(a.column, columns, weights, *bounds, tuple(ir.Leverage(*each) for each in leverage))

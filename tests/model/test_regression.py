@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from points import schema_of, transitions
 
 from relgym.model.fitting import compare_and_learn
-from relgym.model.regression import FIRST, Regression
+from relgym.model.regression import FIRST, Regression, _unpacked
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
@@ -168,11 +168,16 @@ def test_sums_say_what_values_say(n: int, seed: int) -> None:
     """Columns, centres, scales, weights and bounds are all that kernels read."""
     found = taught(n, seed=seed % 7)
     rows = 3.0 * np.random.default_rng(seed).normal(size=(4, len(SIGNATURE.columns)))
-    said, _ = found._said(rows[:, found._columns(SIGNATURE)])
+    said, leverage = found._said(rows[:, found._columns(SIGNATURE)])
     for k, target in enumerate(found.targets):
         told = found.sums(SIGNATURE, target)
         assert told is not None
-        places, centre, scale, weights, (least, most) = told
+        places, centre, scale, weights, (least, most), reach = told
+        for kind, (mean, spread, n, bias, left) in enumerate(reach):
+            assert (list(mean), n) == (found._ridges[kind].mean.tolist(), found._ridges[kind].rows)
+            assert _unpacked(spread, len(mean)).tobytes() == found._ridges[kind].spread.tobytes()
+            share = bias / (bias + left * ((1.0 + leverage[:, kind]) ** 2 - 1.0)) if bias else np.zeros(4)
+            np.testing.assert_allclose(found._share(kind, leverage[:, kind])[:, k], share)
         for row, expected in zip(rows, said, strict=True):
             z = [(row[p] - c) / s for p, c, s in zip(places, centre, scale, strict=True)]
             products = [a * b for i, a in enumerate(z) for b in z[i:]]
