@@ -1,12 +1,12 @@
 """How many transitions it takes until predictions are right, and until they are right again after a law has changed.
 
-``python -m relgym.experiments.transitions --seeds 0 1 2`` prints a line for each world and seed. In a world that changes,
-gravity is halved or friction doubled after the given steps, which nothing tells the learner:
+``python -m relgym.experiments.transitions --seeds 0 1 2`` prints a line for each world and seed. In a world that
+changes, gravity is halved or friction doubled after the given steps, which nothing tells the learner:
 
 - *right after*: steps until `RIGHT` of `WINDOW` predictions in a row, of all properties, were claimed and right;
 - *again after*: the same from the change on;
-- *claimed, off*: predictions after the change that were claimed and off by more than 5 % of what mostly changes, how many
-  until they are right again, and as a share of all: who is right always needs a miss or two to be doubted;
+- *claimed, off*: predictions after the change that were claimed and off by more than 5 % of what mostly changes: how
+  many until they are right again, and what share of all; what was always right is doubted after a miss or two;
 - *late*: the share of the last `WINDOW` steps that were claimed and right in all properties.
 """
 
@@ -100,9 +100,7 @@ WORLDS: Final[Mapping[str, World]] = {
     "falling, gravity halved": World(falling, 600, {"gravity": 0.5}),
     "sliding, friction doubled": World(sliding, 600, {"friction": 0.1}),
     "truck, gravity halved": World(_named("relgym/TruckPush-v0"), 800, {"gravity": 4.9}),
-    "ball, friction doubled": World(
-        _named("relgym/BallBoxRamp-v0", friction=0.1), 1_500, {"friction": 0.2}
-    ),
+    "ball, friction doubled": World(_named("relgym/BallBoxRamp-v0", friction=0.1), 1_500, {"friction": 0.2}),
 }
 """Worlds by name."""
 
@@ -164,8 +162,8 @@ def _reports(learner: ModelLearner, seed: int) -> Iterator[StepReport]:
 def _until(reports: Sequence[StepReport]) -> int | None:
     """Steps before the first `WINDOW` of which `RIGHT` are right in all properties."""
     right = np.array([bool(r.residuals) and not r.wrong for r in reports], dtype=np.int64)
-    sums = np.convolve(right, np.ones(WINDOW, dtype=np.int64), mode="valid") if len(right) >= WINDOW else []
-    found = np.flatnonzero(np.asarray(sums) >= RIGHT)
+    sums = np.concatenate([[0], np.cumsum(right)])
+    found = np.flatnonzero(sums[WINDOW:] - sums[:-WINDOW] >= RIGHT)
     return int(found[0]) if len(found) else None
 
 
@@ -197,7 +195,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("worlds", nargs="*", metavar="WORLD", help=", ".join(WORLDS))
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2])
     given = parser.parse_args(arguments)
-    print(f"{'world':<28} {'seed':>4} {'right after':>12} {'again after':>12} {'claimed, off':>16} {'late':>7}")
+    print(
+        f"{'world':<28} {'seed':>4} {'right after':>12} {'again after':>12} {'claimed, off':>16} {'late':>7}"
+    )
     for name in given.worlds or WORLDS:
         if name not in WORLDS:
             parser.error(f"there is no world {name!r}: {', '.join(WORLDS)}")

@@ -440,7 +440,9 @@ class Calibration:
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-        elif not self._cells or (OWN in able and _Record().share(_mean(family, OWN), bits) > self.probability):
+        elif not self._cells or (
+            OWN in able and _Record().share(_mean(family, OWN), bits) > self.probability
+        ):
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
@@ -448,8 +450,12 @@ class Calibration:
             if trusted.lead(speaker, PERSISTENCE) < EVIDENCE:
                 speaker = PERSISTENCE
             known = [trusted]
-        latest = next((c.records[speaker] for c in (cell, winner) if c is not None and speaker in c.records), _Record())
-        share = latest.share(_mean(family, speaker), bits if speaker == OWN else 0.0) if self.trials else math.nan
+        latest = next(
+            (c.records[speaker] for c in (cell, winner) if c is not None and speaker in c.records), _Record()
+        )
+        share = (
+            latest.share(_mean(family, speaker), bits if speaker == OWN else 0.0) if self.trials else math.nan
+        )
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)

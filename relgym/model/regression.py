@@ -5,8 +5,8 @@ try first. So it is tried beside everything else, and where it codes what comes 
 (`relgym.model.calibration`). It claims nothing: it has no conditions.
 
 Where a row lies far from all that were learned, a regression errs by far more than among them, and the more so the more
-columns it has. So the second kind counts each word as far as its leverage h allows: first that nothing changes, then the
-linear one's, then the products'. What a regression leaves, s in the mean square, is mostly misfit, and becomes
+columns it has. So the second kind counts each word as far as its leverage h allows: first that nothing changes, then
+the linear one's, then the products'. What a regression leaves, s in the mean square, is mostly misfit, and becomes
 s (1 + h)^2; what the words before it leave is more by b everywhere. What adds up to the least error is
 b / (b + s (1 + h)^2 - s) of its word, and the rest of theirs (shrinkage: James & Stein 1961).
 """
@@ -148,7 +148,9 @@ class Regression:
         whole = np.zeros_like(found[:, 0])
         for k in range(len(self._ridges)):
             word = found[:, k]
-            whole = np.where(np.isfinite(word), whole + self._share(k, leverage[:, k]) * (word - whole), whole)
+            whole = np.where(
+                np.isfinite(word), whole + self._share(k, leverage[:, k]) * (word - whole), whole
+            )
         found[:, 1] = np.where(np.isfinite(found[:, 0]), whole, np.nan)
         return found
 
@@ -207,10 +209,10 @@ class Regression:
         least, most = self._range[:, k].tolist()
         slack = BEYOND * (most - least)
         centre, scale = self._centre.tolist(), self._scale.tolist()
-        reach = [
-            (tuple(r.mean.tolist()), _packed(r.spread), r.rows, *(float(each[k]) for each in self._bias(kind)))
-            for kind, r in enumerate(self._ridges)
-        ]
+        reach = []
+        for kind, ridge in enumerate(self._ridges):
+            bias, left = (float(each[k]) for each in self._bias(kind))
+            reach.append((tuple(ridge.mean.tolist()), _packed(ridge.spread), ridge.rows, bias, left))
         return places.tolist(), centre, scale, weights, (least - slack, most + slack), reach
 
     def _columns(self, signature: SlotSignature) -> NDArray[np.intp] | None:

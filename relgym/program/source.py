@@ -580,9 +580,7 @@ class _Source:
         add(f"    {_number(r.least)}, {_number(r.most)}, (")
         for one in r.leverage:
             mean = ", ".join(map(_number, one.mean))
-            add(
-                f"        (({mean},), {one.spread!r}, {one.rows}, {_number(one.bias)}, {_number(one.left)}),"
-            )
+            add(f"        (({mean},), {one.spread!r}, {one.rows}, {_number(one.bias)}, {_number(one.left)}),")
         add("    ),\n)")
         return f"{name.upper()}_LEAST_SQUARES"
 

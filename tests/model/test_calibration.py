@@ -21,7 +21,6 @@ from relgym.model.calibration import (
     LEAVE,
     LINEAR,
     MEMORY,
-    OF_ALL,
     OF_FAMILY,
     OF_WINNER,
     OWN,

@@ -440,7 +440,9 @@ Kind: TypeAlias = tuple[
     Annotated[int, Meta(ge=-(2**31), le=2**31 - 1, description="id of a mode; a law is below 0; 0: nobody")],
     Annotated[
         int,
-        Meta(ge=-3, le=7, description="bin of the lead; below 0: all of a winner's, of all modes or laws, all"),
+        Meta(
+            ge=-3, le=7, description="bin of the lead; below 0: all of a winner's, of all modes or laws, all"
+        ),
     ],
 ]
 
