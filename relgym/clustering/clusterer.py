@@ -197,9 +197,11 @@ class ModeClusterer:
         self._estimating |= self.seen in ESTIMATE_AT
         core = table.signatures[table.signature_ids[row]].core
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
-        if largest > self._largest or abs(y) > self._reach or self._estimating:
+        # Of many targets not all estimate in the same step.
+        estimating = self._estimating and budget.left > 0
+        if largest > self._largest or abs(y) > self._reach or estimating:
             self._largest, self._reach = max(largest, self._largest), max(abs(y), self._reach)
-            self._rescale(table, budget)
+            self._rescale(table, budget, estimating=estimating)
         return example
 
     def _grow(self, table: ExampleTable, mode: int) -> None:
@@ -234,7 +236,7 @@ class ModeClusterer:
         self.labels[idle] = bare.id
 
     # ------------------------------------------------------------------ noise scale
-    def _rescale(self, table: ExampleTable, budget: Budget) -> None:
+    def _rescale(self, table: ExampleTable, budget: Budget, *, estimating: bool) -> None:
         if self.config.noise_std != "auto":
             self.population.scale = replace(self.scale, sigma=float(self.config.noise_std))
             return
@@ -242,7 +244,6 @@ class ModeClusterer:
         own = table.x[recent][:, : table.signatures[table.signature_ids[recent[-1]]].core]
         floor = rounding_noise(np.array([[self._largest]]), np.append(self.y[-256:], self._reach), own)
         self.floor = floor
-        estimating = self._estimating and budget.left > 0  # of many targets not all in the same step
         self._estimating &= not estimating
         if estimating and 2 * self.noise_examples > self.seen:
             budget.spend(ESTIMATE)
@@ -312,6 +313,8 @@ class ModeClusterer:
         """
         if not self.due:
             return False
+        if self._resort is None and not budget.left:
+            return False  # what waits holds no data
         if self._resort is None:
             self._resort = Resort.of(self.population, table, floor=self.floor)
         if not budget.work(self._resort.task):

@@ -39,7 +39,7 @@ class ModelConfig:
     cells_per_step
         What each transition earns for searches (for modes, approximations, causal order, guesses, and what
         `work_per_step` counts), in cells: numbers looked at, of which a thousand million take some four seconds.
-        Default 750,000, some 3 ms, range 1 to 10**15. A search that takes more than there is goes on after the next
+        Default 250,000, some 1 ms, range 1 to 10**15. A search that takes more than there is goes on after the next
         transitions. Raising it finds sooner what is hard to find and makes every step of a world that isn't
         understood slower.
     most_cells
@@ -47,7 +47,7 @@ class ModelConfig:
         some 20 ms, so that no step takes longer than a frame at 25 Hz.
     saved_cells
         Cells that are saved for later where nothing is to be searched, and that there are to begin with. Default
-        1,000,000,000, some 4 s: worlds that can be understood are, before it is spent.
+        500,000,000, some 2 s: worlds that can be understood are, before it is spent.
     frames
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
@@ -90,9 +90,9 @@ class ModelConfig:
     geometry: Literal["arrays", "fcl"] = "arrays"
     abstain: bool = True
     work_per_step: int = 400_000
-    cells_per_step: int = 750_000
+    cells_per_step: int = 250_000
     most_cells: int = 5_000_000
-    saved_cells: int = 1_000_000_000
+    saved_cells: int = 500_000_000
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()
     hypotheses: tuple[str, ...] = ()

@@ -78,8 +78,8 @@ _EXACT: Final = -(1 << 14)
 NO_RUNNER_UP: Final = 7
 """Bin of leads where there is nobody to lead."""
 
-OF_WINNER, OF_FAMILY = -1, -2
-"""Bins of leads that stand for all of a winner's, and for those of all modes or all laws."""
+OF_WINNER, OF_FAMILY, OF_ALL = -1, -2, -3
+"""Bins of leads that stand for all of a winner's, for those of all modes or all laws, and for all there are."""
 
 
 class Key(NamedTuple):
@@ -271,6 +271,26 @@ class _Cell:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
             self.speaker = best
 
+    @classmethod
+    def united(cls, cells: Sequence[_Cell], experts: int) -> _Cell:
+        """What some cells know together, of whoever spoke in one of them; runs have no order then."""
+        found = cls.new(PERSISTENCE, experts)
+        for cell in cells:
+            for sums, more in zip(found.squares, cell.squares, strict=True):
+                sums[:] = [a + b for a, b in zip(sums, more, strict=True)]
+            for expert, record in cell.records.items():
+                known = found.records.setdefault(expert, _Record())
+                known.trials += record.trials
+                known.hits += record.hits
+                for place, count in record.errors.items():
+                    known.errors[place] = known.errors.get(place, 0.0) + count
+        return found
+
+    def drop(self, expert: int) -> None:
+        """Forget how an expert did: another one takes its place."""
+        self.records.pop(expert, None)
+        self.squares[expert] = [0.0, 0.0, 0.0]
+
     def sure(self, claims: tuple[float, float], bits: float) -> float:
         """How probably what would be claimed is right, after this record alone; 0 if no mode and no law speaks."""
         if self._sure is None or self._sure[0] != bits:
@@ -343,9 +363,16 @@ class Calibration:
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
         self._assessed: dict[Key, tuple[tuple[int, ...], Assessment]] = {}
+        self._united: _Cell | None = None  # see `_whole`
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_assessed": {}, "_least": {}}
+        return self.__dict__ | {"_assessed": {}, "_least": {}, "_united": None}
+
+    def _changed(self) -> None:
+        """What was worked out from the cells is out of date."""
+        self._assessed.clear()
+        self._least.clear()
+        self._united = None
 
     @property
     def change(self) -> float:
@@ -406,18 +433,29 @@ class Calibration:
                 yield shown, bits, told, self.claims(key, told)
 
     def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
-        cells = [self._cells.get(each) for each in (_family(key), _winner(key), key)]
-        # Who speaks is told by this winner's record alone: what others won says nothing of a new law.
-        known = [c for c in cells[1:] if c is not None and c.squares[PERSISTENCE][0]]
-        if not known:
-            speaker = next(k for k in _BY_DEFAULT if k in able)
-        else:
+        family, winner, cell = (self._cells.get(each) for each in _levels(key))
+        family = family if key.winner else None
+        bits = self._bits(_who(key))
+        known = [c for c in (winner, cell) if c is not None and c.squares[PERSISTENCE][0]]
+        if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-        bits = self._bits(_who(key)) if speaker == OWN else 0.0
-        own = [_Record() if c is None else c.records.get(speaker, _Record()) for c in cells]
-        latest = own[2] if own[2].trials else own[1]
-        share = latest.share(own[0].mean(0.5), bits) if self.trials else math.nan
+        elif not self._cells or (
+            OWN in able and _Record().share(_mean(family, OWN), bits) > self.probability
+        ):
+            speaker = next(k for k in _BY_DEFAULT if k in able)
+        else:  # of a new winner nothing is known, and of those like it nothing good
+            trusted = family = self._whole()
+            speaker = min((k for k in able if k not in (OWN, LATEST)), key=trusted.left)
+            if trusted.lead(speaker, PERSISTENCE) < EVIDENCE:
+                speaker = PERSISTENCE
+            known = [trusted]
+        latest = next(
+            (c.records[speaker] for c in (cell, winner) if c is not None and speaker in c.records), _Record()
+        )
+        share = (
+            latest.share(_mean(family, speaker), bits if speaker == OWN else 0.0) if self.trials else math.nan
+        )
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
@@ -425,6 +463,13 @@ class Calibration:
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
+
+    def _whole(self) -> _Cell:
+        """What all cells know together."""
+        if self._united is None:
+            cells = [c for k, c in sorted(self._cells.items()) if k.lead >= 0 or k == _WHOLE]
+            self._united = _Cell.united(cells, self.experts)
+        return self._united
 
     def claims(self, key: Key, told: Assessment) -> bool:
         """Whether a prediction in a cell is claimed: a mode or a law speaks, and it is right probably enough.
@@ -443,7 +488,7 @@ class Calibration:
         share = (
             told.probability if cell is None else cell.sure((self.probability, self.allowed), self._bits(who))
         )
-        return min(told.probability, share) >= self.probability and share >= self._least[who]
+        return min(told.probability, share) > self.probability and share >= self._least[who]
 
     def _needed(self, who: int) -> float:
         """The least probability that is claimed."""
@@ -451,7 +496,7 @@ class Calibration:
         left = 1.0 + 0.5 * PRIOR + self.allowed * sum(c.heard for c in kinds)
         claims, bits = (self.probability, self.allowed), self._bits(who)
         for share, heard in sorted(((c.sure(claims, bits), c.heard) for c in kinds), reverse=True):
-            if share < self.probability:
+            if share <= self.probability:
                 break
             left -= (1.0 - share) * heard
             if left < 0.0:
@@ -464,8 +509,7 @@ class Calibration:
     def vouch(self, bits: float) -> None:
         """Laws come in force, which describe what came in so many bits less than modes: so much likelier they are."""
         self._vouched = bits
-        self._assessed.clear()
-        self._least.clear()
+        self._changed()
 
     # ------------------------------------------------------------------ how it came out
     def look_back(
@@ -506,7 +550,7 @@ class Calibration:
             self._slips = [0.5 * each for each in self._slips]
             for cell in self._cells.values():
                 cell.heard *= 0.5
-        for key in (_family(audit.key), _winner(audit.key), audit.key):
+        for key in _levels(audit.key) if audit.key.winner else (audit.key,):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker, self.experts)
             if key.lead == OF_FAMILY:
@@ -514,16 +558,14 @@ class Calibration:
             else:
                 self._cells[key].count(errors, within)
         self._cells[audit.key].heard += 1.0
-        self._assessed.clear()
-        self._least.clear()
+        self._changed()
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
         self._cells = {
-            k: c for k, c in self._cells.items() if k.winner <= 0 or k.lead == OF_FAMILY or k.winner in modes
+            k: c for k, c in self._cells.items() if k.winner <= 0 or k.lead <= OF_FAMILY or k.winner in modes
         }
-        self._assessed.clear()
-        self._least.clear()
+        self._changed()
 
     def renewed(self, expert: int) -> None:
         """An expert has another law: it begins as if it had been as good as who speaks in the latest few trials.
@@ -536,8 +578,7 @@ class Calibration:
             share = min(1.0, EVIDENCE / known[0]) if known[0] else 0.0
             cell.squares[expert] = [share * each for each in known]
             cell._sure = None
-        self._assessed.clear()
-        self._least.clear()
+        self._changed()
 
     def speakers(self) -> dict[int, float]:
         """Trials of the cells in which each expert gives the value, by place of the expert."""
@@ -555,8 +596,12 @@ class Calibration:
         return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 
     def forget(self) -> None:
-        """What follows is another model's word: only what mostly changes stays."""
-        self._cells, self._assessed, self._least, self.trials, self._vouched = {}, {}, {}, 0, 0.0
+        """What follows is another model's word: only what mostly changes stays, and what the others know."""
+        whole = self._whole()
+        for expert in (OWN, LATEST, *range(len(EXPERTS), self.experts)):
+            whole.drop(expert)
+        self._cells, self._vouched = {_WHOLE: whole} if self._cells else {}, 0.0
+        self._changed()
 
     def share(self, outcome: int) -> float:
         """Share of what modes predicted with an outcome that were hits lately; NaN where there were none."""
@@ -656,6 +701,21 @@ def _family(key: Key) -> Key:
 def _winner(key: Key) -> Key:
     """The cell of all predictions of one outcome and winner."""
     return Key(key.outcome, key.winner, OF_WINNER)
+
+
+_WHOLE: Final = Key(0, 0, OF_ALL)
+"""What was known before the model was another one."""
+
+
+def _levels(key: Key) -> tuple[Key, Key, Key]:
+    """The cells that a prediction is counted in, the widest first; where nobody won they are one."""
+    return (_family(key), _winner(key), key) if key.winner else (key, key, key)
+
+
+def _mean(cell: _Cell | None, expert: int, prior: float = 0.5) -> float:
+    """Posterior mean of an expert's hits in a cell; the prior where there is none."""
+    record = None if cell is None else cell.records.get(expert)
+    return prior if record is None else record.mean(prior)
 
 
 def _place(error: float) -> int:

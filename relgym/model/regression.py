@@ -3,10 +3,17 @@
 Regression of the change on (x, u, 1), and on squares and products of these where they are few, is what anybody would
 try first. So it is tried beside everything else, and where it codes what comes in fewer bits it gives the value
 (`relgym.model.calibration`). It claims nothing: it has no conditions.
+
+Where a row lies far from all that were learned, a regression errs by far more than among them, and the more so the more
+columns it has. So the second kind counts each word as far as its leverage h allows: first that nothing changes, then
+the linear one's, then the products'. What a regression leaves, s in the mean square, is mostly misfit, and becomes
+s (1 + h)^2; what the words before it leave is more by b everywhere. What adds up to the least error is
+b / (b + s (1 + h)^2 - s) of its word, and the rest of theirs (shrinkage: James & Stein 1961).
 """
 
 from __future__ import annotations
 
+from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -15,14 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
-from relgym.config.constants import BEYOND
+from relgym.config.constants import BEYOND, SUMMABLE
 from relgym.numeric.online_ridge import OnlineRidge
 from relgym.scene.objects import TASK
 
 __all__ = ["KINDS", "Regression"]
 
 KINDS = 2
-"""Linear, and with squares and products."""
+"""Linear; and what all together say, squares and products too, as far as the leverage allows."""
 
 FIRST = 64
 """So many rows tell where a column lies and how far it varies; from then on it is regressed on."""
@@ -56,6 +63,8 @@ class Regression:
         self._centre = np.zeros(0)
         self._scale = np.ones(0)
         self._range = np.zeros((2, 0))  # smallest and largest change of each target
+        # Mean squares of what was left of each target, where h is 0: by that nothing changes, and each regression.
+        self._left = np.zeros((1 + KINDS, 0))
         self._places: dict[int, tuple[SlotSignature, NDArray[np.intp] | None]] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -75,9 +84,10 @@ class Regression:
         x, y = row[places], np.array([changes.get(name, 0.0) for name in self.targets])
         missing = len(y) - self._range.shape[1]
         if missing:
-            self._range = np.pad(self._range, ((0, 0), (0, missing)))
+            self._range, self._left = (np.pad(a, ((0, 0), (0, missing))) for a in (self._range, self._left))
         self._range = np.stack([np.minimum(self._range[0], y), np.maximum(self._range[1], y)])
         if self._ridges:
+            self._compare(x, y)
             self._add(x, y)
             return
         self._waiting.append((x, y))
@@ -90,12 +100,25 @@ class Regression:
         spread = x.std(axis=0)
         self._scale = np.where(spread > 0.0, spread, 1.0)
         d = len(self._centre)
-        self._ridges = [OnlineRidge(d)]
+        self._ridges = [OnlineRidge(d, FIRST)]
         if d + d * (d + 1) // 2 <= self._most:
-            self._ridges.append(OnlineRidge(d + d * (d + 1) // 2))
+            self._ridges.append(OnlineRidge(d + d * (d + 1) // 2, FIRST))
         for row, y in self._waiting:
             self._add(row, y)
         self._waiting = []
+
+    def _compare(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+        """Take in what each would have left of an example that isn't learned yet; late ones count for more."""
+        found, leverage = self._said(x[None])
+        if not np.isfinite(leverage).all():  # a gross error, which isn't learned either
+            return
+        size = np.abs(np.concatenate([np.zeros((1, len(y))), found[0]]) - y)
+        size[1:] /= 1.0 + leverage[0][:, None]
+        known = np.isfinite(size)
+        rate = min(1.0, 2.0 / (self._ridges[0].rows - FIRST + 1))  # each counts in proportion to its number
+        squares = np.square(np.minimum(np.where(known, size, 0.0), np.sqrt(SUMMABLE)))
+        begun = np.where(np.isfinite(self._left), self._left, squares)
+        self._left = np.where(known, begun + rate * (squares - begun), self._left)
 
     def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
         with np.errstate(over="ignore"):  # what isn't finite is left out
@@ -121,22 +144,64 @@ class Regression:
         """
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
+        found, leverage = self._said(x[:, places])
+        whole = np.zeros_like(found[:, 0])
+        for k in range(len(self._ridges)):
+            word = found[:, k]
+            whole = np.where(
+                np.isfinite(word), whole + self._share(k, leverage[:, k]) * (word - whole), whole
+            )
+        found[:, 1] = np.where(np.isfinite(found[:, 0]), whole, np.nan)
+        return found
+
+    def _said(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What each regression says of rows of its columns, ``(n, KINDS, targets)``, and leverages, ``(n, KINDS)``."""
         found = np.full((len(x), KINDS, len(self.targets)), np.nan)
+        leverage = np.zeros((len(x), KINDS))
         with np.errstate(over="ignore", invalid="ignore"):  # of a gross error nothing is told
-            shown = self._shown(self._scaled(x[:, places]))
+            shown = self._shown(self._scaled(x))
             for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
                 found[:, k, : len(ridge.weights)] = ridge.predict(columns)
+                leverage[:, k] = ridge.leverage(columns)
         least, most = self._range
         slack = BEYOND * (most - least)
-        clipped: NDArray[np.float64] = np.clip(found, least - slack, most + slack)
-        return clipped
+        return np.clip(found, least - slack, most + slack), leverage
+
+    def _share(self, kind: int, leverage: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far a regression's word counts, at leverages ``(n,)``, for each target, shape ``(n, targets)``."""
+        bias, left = self._bias(kind)
+        with np.errstate(over="ignore", invalid="ignore"):
+            more = np.where(left > 0.0, left * ((2.0 + leverage) * leverage)[:, None], 0.0)
+            return np.where(bias > 0.0, bias / (bias + more), 0.0)
+
+    def _bias(self, kind: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """How much more the words before a regression leave of each target, and what it leaves, in the mean square.
+
+        Where nobody ever compared them it has the last word.
+        """
+        left = self._left[kind + 1]
+        known = np.isfinite(left)
+        bias = np.maximum(self._left[: kind + 1].min(axis=0) - left, 0.0)
+        return np.where(known, bias, 1.0), np.where(known, left, 0.0)
 
     def sums(
         self, signature: SlotSignature, target: str
     ) -> (
-        tuple[list[int], list[float], list[float], tuple[tuple[float, ...], ...], tuple[float, float]] | None
+        tuple[
+            list[int],
+            list[float],
+            list[float],
+            tuple[tuple[float, ...], ...],
+            tuple[float, float],
+            list[tuple[tuple[float, ...], str, int, float, float]],
+        ]
+        | None
     ):
-        """What `values` works out for a target: columns of a row, their centres and scales, weights, bounds."""
+        """What `values` works out for a target: columns of a row, their centres and scales, weights, bounds.
+
+        And of each regression how far its word counts: mean, packed spread, rows, and what the words before it leave
+        more than it, and it.
+        """
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
         k = self.targets.index(target)
@@ -144,7 +209,11 @@ class Regression:
         least, most = self._range[:, k].tolist()
         slack = BEYOND * (most - least)
         centre, scale = self._centre.tolist(), self._scale.tolist()
-        return places.tolist(), centre, scale, weights, (least - slack, most + slack)
+        reach = []
+        for kind, ridge in enumerate(self._ridges):
+            bias, left = (float(each[k]) for each in self._bias(kind))
+            reach.append((tuple(ridge.mean.tolist()), _packed(ridge.spread), ridge.rows, bias, left))
+        return places.tolist(), centre, scale, weights, (least - slack, most + slack), reach
 
     def _columns(self, signature: SlotSignature) -> NDArray[np.intp] | None:
         """Where the columns lie in a signature's rows; None where one is missing."""
@@ -160,6 +229,7 @@ class Regression:
     # ------------------------------------------------------------------ saving
     def to_json(self, *, history: bool) -> dict[str, Any]:
         """Plain data; with history what further learning needs, too, but the sums in `to_arrays`."""
+        compared = bool(np.isfinite(self._left).all())  # a file of earlier versions tells nothing of it
         return {
             "names": list(self.names),
             "seen": self.seen,
@@ -167,8 +237,12 @@ class Regression:
             "centre": self._centre.tolist(),
             "scale": self._scale.tolist(),
             "range": self._range.tolist(),
+            "left": self._left.tolist() if compared else [],
             "waiting": [[x.tolist(), y.tolist()] for x, y in self._waiting] if history else [],
             "ridges": [[r.rows, r.due, r.weights.tolist()] for r in self._ridges],
+            "leverage": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges]
+            if compared
+            else [],
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -192,6 +266,14 @@ class Regression:
             if f"gram{k}" in arrays:
                 parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
+        self._left = np.full((1 + KINDS, len(self.targets)), np.nan)
+        if data.get("left"):
+            self._left = np.array(data["left"], dtype=np.float64).reshape(self._left.shape)
+        for ridge in self._ridges:
+            ridge.spread = np.zeros_like(ridge.spread)
+        for ridge, known in zip(self._ridges, data.get("leverage", ()), strict=False):
+            ridge.mean = np.array(known["mean"], dtype=np.float64)
+            ridge.spread = _unpacked(known["inverse"], ridge.columns)
 
 
 @cache
@@ -199,6 +281,18 @@ def _products(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Pairs of columns, each with itself and with those behind it."""
     first, second = np.triu_indices(columns)
     return first, second
+
+
+def _packed(matrix: NDArray[np.float32]) -> str:
+    """A symmetric matrix as text: its upper triangle, row by row, little-endian, in base64."""
+    return b64encode(matrix[np.triu_indices(len(matrix))].astype("<f4").tobytes()).decode("ascii")
+
+
+def _unpacked(text: str, columns: int) -> NDArray[np.float32]:
+    """What `_packed` wrote."""
+    found = np.zeros((columns, columns), dtype=np.float32)
+    found[np.triu_indices(columns)] = np.frombuffer(b64decode(text), dtype="<f4")
+    return found + np.triu(found, 1).T
 
 
 def _core(signature: SlotSignature) -> list[int]:

@@ -87,6 +87,6 @@ def _regression(parts: Parts, layout: SceneLayout, index: int, a: ir.Answer) -> 
     said = known.sums(signature, a.property)
     if said is None:
         return None
-    places, centre, scale, weights, bounds = said
+    places, centre, scale, weights, bounds, leverage = said
     columns = tuple((gather[p], c, s) for p, c, s in zip(places, centre, scale, strict=True))
-    return ir.Regression(a.column, columns, weights, *bounds)
+    return ir.Regression(a.column, columns, weights, *bounds, tuple(ir.Leverage(*each) for each in leverage))

@@ -28,6 +28,8 @@ class OnlineRidge:
     ----------
     columns
         Number of columns, d.
+    due
+        Number of rows at which weights are solved for the first time.
 
     Attributes
     ----------
@@ -36,6 +38,9 @@ class OnlineRidge:
     weights
         One row for each response, the intercept first, shape ``(responses, d + 1)``; of a response that came later
         than some rows, as if it had been 0 in those.
+    mean, spread
+        Where the columns lie, shape ``(d,)``, and the inverse of the sums of squares about that, with the penalty, in
+        single precision, shape ``(d, d)``: what `leverage` is worked out from. Both are those of the latest solution.
 
     Notes
     -----
@@ -54,12 +59,14 @@ class OnlineRidge:
     True
     """
 
-    def __init__(self, columns: int) -> None:
+    def __init__(self, columns: int, due: int = 2) -> None:
         self.rows = 0
         self.weights = np.zeros((0, columns + 1))
+        self.mean = np.zeros(columns)
+        self.spread = np.full((columns, columns), np.inf, dtype=np.float32)
         self._gram = np.zeros((columns + 1, columns + 1))
         self._moments = np.zeros((0, columns + 1))
-        self._due = 2
+        self._due = due
 
     @property
     def columns(self) -> int:
@@ -103,8 +110,15 @@ class OnlineRidge:
         scaled = np.where(alive[:, None] & alive, covariance / (std_of[:, None] * std_of), 0.0)
         level = self._moments[:, 0] / n
         slope = np.where(alive, (self._moments[:, 1:] / n - level[:, None] * mean) / std_of, 0.0)
-        solved = np.linalg.solve(scaled + (PENALTY / n) * np.eye(len(scaled)), slope.T).T / std_of
+        inverse = np.linalg.inv(scaled + (PENALTY / n) * np.eye(len(scaled)))
+        solved = (slope @ inverse.T) / std_of
         if np.isfinite(solved).all():
+            self.mean = mean
+            # What never varied has no leverage: nothing is known of what it does, and the weights leave it out.
+            ends = np.where(alive, 1.0 / std_of, 0.0)
+            with np.errstate(over="ignore", under="ignore"):
+                spread = (inverse * (ends[:, None] * ends) / n).astype(np.float32)
+            self.spread = np.triu(spread) + np.triu(spread, 1).T
             level -= (solved * mean).sum(axis=1)
             # Rows lie side by side in memory: so sums along them are taken in the same order, however many there are.
             self.weights = np.ascontiguousarray(np.concatenate([level[:, None], solved], axis=1))
@@ -119,6 +133,18 @@ class OnlineRidge:
         for k, weights in enumerate(self.weights):
             found[:, k] = (rows * weights).sum(axis=1)
         return found
+
+    def leverage(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far rows ``(n, d)`` lie from those that the weights come from, shape ``(n,)``; 1/rows in their midst.
+
+        Of noise with a variance of 1 the weights are off by so much there, squared. Cost O(d^2) a row.
+        """
+        found = np.empty(len(x))
+        with np.errstate(over="ignore", invalid="ignore"):  # what lies that far is far from all
+            for k, off in enumerate((x - self.mean).astype(np.float32)):
+                # One by one: of a row alone the same bits as among others.
+                found[k] = np.einsum("i,i->", off, np.einsum("ij,j->i", self.spread, off))
+        return np.where(found >= 0.0, found, np.inf) + 1.0 / max(self.rows, 1)
 
     # ------------------------------------------------------------------ saving
     def to_arrays(self) -> dict[str, NDArray[Any]]:

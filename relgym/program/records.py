@@ -43,6 +43,7 @@ __all__ = [
     "IsA",
     "Landing",
     "Law",
+    "Leverage",
     "Literal",
     "Mode",
     "Motion",
@@ -463,6 +464,28 @@ class Reach:
 
 # ---------------------------------------------------------------------------------------------- who is believed
 @dataclass(frozen=True, slots=True)
+class Leverage:
+    """How far the word of a regression counts at a leverage h: ``bias / (bias + left ((1 + h)^2 - 1))``, 0 without bias.
+
+    Attributes
+    ----------
+    mean, spread
+        What leverage is worked out from (`relgym.numeric.online_ridge.OnlineRidge.leverage`); of the latter the upper
+        triangle, row by row, as little-endian float32 in base64.
+    rows
+        Number of rows learned from.
+    bias, left
+        By how much more the words before it leave, and what it leaves, in the mean square.
+    """
+
+    mean: tuple[float, ...]
+    spread: str
+    rows: int
+    bias: float
+    left: float
+
+
+@dataclass(frozen=True, slots=True)
 class Regression:
     """Least squares: ``present + weights @ (1, z)`` with ``z = (column - centre) / scale``, changes kept within bounds.
 
@@ -476,6 +499,8 @@ class Regression:
         Of 1 and z, then of 1, z and all products of two of them, row by row; one or two of them.
     least, most
         Bounds of the change.
+    leverage
+        How far the word of each counts in what all together say.
     """
 
     present: int
@@ -483,6 +508,7 @@ class Regression:
     weights: tuple[tuple[float, ...], ...]
     least: float
     most: float
+    leverage: tuple[Leverage, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,9 @@ class _Source:
             f'"""{_doc(self.told)}\n\nMade by relgym; needs numpy alone. `step` predicts one scene, `predict` many.'
             '\n"""\n'
         )
-        add(("import itertools\n" if p.casts else "") + "import math\n\nimport numpy as np\n")
+        fitted = any(a.trust is not None and a.trust.regression is not None for a in p.answers)
+        modules = [*(["base64"] if fitted else []), *(["itertools"] if p.casts else []), "math"]
+        add("".join(f"import {name}\n" for name in modules) + "\nimport numpy as np\n")
         add("# ---- the state vector")
         add(f"COLUMNS = {p.columns!r}")
         for k in range(p.width):
@@ -575,7 +577,11 @@ class _Source:
         columns = (f"({self.names[c]}, {_number(m)}, {_number(s)})" for c, m, s in r.columns)
         weights = (f"({', '.join(map(_number, row))},)" for row in r.weights)
         add(f"    {self.names[r.present]},\n    ({', '.join(columns)},),\n    ({', '.join(weights)},),")
-        add(f"    {_number(r.least)}, {_number(r.most)},\n)")
+        add(f"    {_number(r.least)}, {_number(r.most)}, (")
+        for one in r.leverage:
+            mean = ", ".join(map(_number, one.mean))
+            add(f"        (({mean},), {one.spread!r}, {one.rows}, {_number(one.bias)}, {_number(one.left)}),")
+        add("    ),\n)")
         return f"{name.upper()}_LEAST_SQUARES"
 
     # ------------------------------------------------------------------ the step
@@ -806,12 +812,33 @@ def settled(number, value, outcome, mode, margin, guess, x):
 '''
 
 _REGRESSION = '''
-def regressed(x, present, columns, weights, least, most):
-    """The next value by least squares on some numbers, and on these and their products; NaN where there is none."""
+SPREADS = {}  # what leverage is worked out from, by the text that says it
+
+
+def regressed(x, present, columns, weights, least, most, leverage):
+    """The next value by least squares on some numbers, and what that and least squares on their products say together.
+
+    Each counts as far as the leverage allows.
+    """
     z = [(x[c] - centre) / scale for c, centre, scale in columns]
     both = z, z + [z[i] * z[j] for i in range(len(z)) for j in range(i, len(z))]
-    found = [float((np.array([1.0, *shown]) * np.array(row)).sum()) for shown, row in zip(both, weights)]
-    return ([x[present] + min(max(change, least), most) for change in found] + [math.nan, math.nan])[:2]
+    words = [float((np.array([1.0, *shown]) * np.array(row)).sum()) for shown, row in zip(both, weights)]
+    words = [min(max(word, least), most) for word in words]
+    whole = 0.0
+    for word, shown, (mean, text, rows, bias, left) in zip(words, both, leverage):
+        if text not in SPREADS:
+            half = np.zeros((len(mean), len(mean)), dtype=np.float32)
+            half[np.triu_indices(len(mean))] = np.frombuffer(base64.b64decode(text), dtype="<f4")
+            SPREADS[text] = half + np.triu(half, 1).T
+        with np.errstate(over="ignore", invalid="ignore"):
+            off = (np.array(shown) - np.array(mean)).astype(np.float32)
+            far = float(np.einsum("i,i->", off, np.einsum("ij,j->i", SPREADS[text], off)))
+        h = (far if far >= 0.0 else math.inf) + 1.0 / max(rows, 1)
+        more = left * ((2.0 + h) * h) if left > 0.0 else 0.0
+        share = bias / (bias + more) if bias > 0.0 else 0.0
+        if math.isfinite(word):
+            whole = whole + share * (word - whole)
+    return x[present] + words[0], x[present] + whole if math.isfinite(words[0]) else math.nan
 
 '''
 

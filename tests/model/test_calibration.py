@@ -100,12 +100,25 @@ def test_a_new_kind_of_prediction_begins_with_what_the_others_tell() -> None:
     assert known.assess(Key(3, 0, 0), values(own=1.0)).probability == 0.5  # nor is another outcome's known
 
 
-def test_a_new_mode_speaks_whoever_was_better_than_those_before_it() -> None:
+def test_a_new_mode_speaks_once_it_was_right_whoever_was_better_than_those_before_it() -> None:
     known = Calibration()
     for k in range(40):
         seen(known, values(own=5.0 * (-1) ** k, now=0.0), 0.1)
     assert known.assess(KEY, values(own=5.0)).speaker == PERSISTENCE
-    assert known.assess(Key(0, 2, 3), values(own=5.0)).speaker == OWN
+    new = Key(0, 2, 3)
+    told = known.assess(new, values(own=5.0))
+    assert told.speaker == PERSISTENCE
+    assert told.spread == pytest.approx(0.1)
+    assert not known.claims(new, told)
+    seen(known, values(own=0.1), 0.1, key=new)
+    assert known.assess(new, values(own=5.0)).speaker == OWN
+
+
+def test_a_new_mode_speaks_at_once_where_those_before_it_were_right() -> None:
+    known = right(40)
+    told = known.assess(Key(0, 2, 3), values(own=5.0, linear=3.0))
+    assert told.speaker == OWN
+    assert known.claims(Key(0, 2, 3), told)
 
 
 @pytest.mark.parametrize(("hits", "misses"), [(100, 3), (500, 2)])
@@ -657,7 +670,7 @@ def test_a_cell_of_few_trials_lets_its_winner_tell_who_speaks() -> None:
 
 def test_whose_record_is_asked_by_hand() -> None:
     """The share of a cell, begun with that of all modes; of the winner's where the cell has no trials."""
-    known = Calibration()
+    known = Calibration(0.5)
     family, winner = Key(0, 1, OF_FAMILY), KEY._replace(lead=OF_WINNER)
     known._cells = {family: cell(59.5, 99.0), winner: cell(10.0, 19.0)}
     known.trials = 99
@@ -743,8 +756,8 @@ def test_what_is_no_kind_of_its_own_is_claimed_when_it_is_as_sure() -> None:
 def test_the_least_probability_holds_of_both() -> None:
     known = Calibration()
     known._cells[KEY], known.trials = cell(98.5, 99.0, heard=1.0), 99
-    assert known.claims(KEY, Assessment(OWN, 0.9, math.nan, math.nan))
-    assert not known.claims(KEY, Assessment(OWN, 0.899, math.nan, math.nan))
+    assert known.claims(KEY, Assessment(OWN, 0.901, math.nan, math.nan))
+    assert not known.claims(KEY, Assessment(OWN, 0.9, math.nan, math.nan))  # no likelier than asked
     known = Calibration()
     known._cells[KEY], known.trials = cell(89.0, 99.0, heard=1.0), 99
     assert not known.claims(KEY, Assessment(OWN, 0.99, math.nan, math.nan))
@@ -816,9 +829,7 @@ def test_cells_that_a_prediction_is_counted_in() -> None:
         Key(2, -3, OF_WINNER),
         Key(2, -3, 7),
         Key(2, -1, OF_FAMILY),
-        Key(3, 0, OF_FAMILY),
-        Key(3, 0, OF_WINNER),
-        Key(3, 0, 0),
+        Key(3, 0, 0),  # where nobody won there is nobody to tell apart
     ]
     assert {key: c.heard for key, c in known._cells.items() if c.heard} == {
         Key(0, 1, 3): 1.0,
@@ -856,10 +867,15 @@ def test_what_another_model_says_is_no_known_kind() -> None:
     known.vouch(5.0)
     change = known.change
     known.forget()
-    assert (known.trials, known.change) == (0, change)
+    assert (known.trials, known.change) == (40, change)
     told = known.assess(KEY, values(own=1.0))
-    assert math.isnan(told.probability) and math.isnan(told.interval) and math.isnan(told.spread)
-    assert known.claims(KEY, told)
+    assert (told.speaker, told.probability) == (PERSISTENCE, 0.5)  # what is known of that is still true
+    assert told.spread == 1.0
+    assert not known.claims(KEY, told)
+    seen(known, values(own=1.0), 1.0)
+    told = known.assess(KEY, values(own=1.0))
+    assert told.speaker == OWN
+    assert known.claims(KEY, told._replace(probability=0.95))
 
 
 def test_shares_of_an_outcome_and_doubts() -> None:

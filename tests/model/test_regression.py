@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from points import schema_of, transitions
 
 from relgym.model.fitting import compare_and_learn
-from relgym.model.regression import FIRST, Regression
+from relgym.model.regression import FIRST, Regression, _unpacked
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
@@ -48,7 +48,39 @@ def test_nothing_is_said_before_there_are_enough_examples_and_of_too_many_column
     assert taught(FIRST, most=2).values(SIGNATURE, rows) is None
     linear = taught(FIRST, most=3).values(SIGNATURE, rows)
     assert linear is not None
-    assert np.isnan(linear[0, 1]).all()
+    assert np.isfinite(linear[0]).all()
+    assert len(taught(FIRST, most=3)._ridges) == 1
+
+
+def test_products_count_as_far_as_their_leverage_allows() -> None:
+    found = taught(400)
+    here = np.random.default_rng(9).normal(size=(4, len(SIGNATURE.columns)))
+    rows = np.concatenate([here, 30.0 * here])
+    own, leverage = found._said(rows[:, found._columns(SIGNATURE)])
+    said = found.values(SIGNATURE, rows)
+    assert said is not None
+    assert (leverage[:4] < 0.3).all() and (leverage[4:, 1] > 10.0).all()
+    for target in (0, 1):
+        nothing, linear, products = found._left[:, target].tolist()
+        for k in range(8):
+            said_so_far, left = 0.0, nothing
+            for kind, s in enumerate((linear, products)):
+                bias, h = max(left - s, 0.0), leverage[k, kind]
+                share = bias / (bias + s * ((1.0 + h) ** 2 - 1.0)) if bias else 0.0
+                said_so_far += share * (own[k, kind, target] - said_so_far)
+                left = min(left, s)
+            assert said[k, 1, target] == pytest.approx(said_so_far)
+    np.testing.assert_array_equal(said[:, 0], own[:, 0])
+
+
+def test_nothing_is_said_of_what_nothing_tells() -> None:
+    rng = np.random.default_rng(3)
+    found = Regression(320)
+    for row in rng.normal(size=(400, len(SIGNATURE.columns))):
+        found.learn_one(SIGNATURE, row, {"x": float(rng.normal())})
+    said = found.values(SIGNATURE, rng.normal(size=(50, len(SIGNATURE.columns))))
+    assert said is not None
+    assert np.square(said[:, 1]).mean() < 0.5 * np.square(said[:, 0]).mean()
 
 
 def test_changes_never_go_far_beyond_those_that_were_seen() -> None:
@@ -136,12 +168,16 @@ def test_sums_say_what_values_say(n: int, seed: int) -> None:
     """Columns, centres, scales, weights and bounds are all that kernels read."""
     found = taught(n, seed=seed % 7)
     rows = 3.0 * np.random.default_rng(seed).normal(size=(4, len(SIGNATURE.columns)))
-    said = found.values(SIGNATURE, rows)
-    assert said is not None
+    said, leverage = found._said(rows[:, found._columns(SIGNATURE)])
     for k, target in enumerate(found.targets):
         told = found.sums(SIGNATURE, target)
         assert told is not None
-        places, centre, scale, weights, (least, most) = told
+        places, centre, scale, weights, (least, most), reach = told
+        for kind, (mean, spread, n, bias, left) in enumerate(reach):
+            assert (list(mean), n) == (found._ridges[kind].mean.tolist(), found._ridges[kind].rows)
+            assert _unpacked(spread, len(mean)).tobytes() == found._ridges[kind].spread.tobytes()
+            share = bias / (bias + left * ((1.0 + leverage[:, kind]) ** 2 - 1.0)) if bias else np.zeros(4)
+            np.testing.assert_allclose(found._share(kind, leverage[:, kind])[:, k], share)
         for row, expected in zip(rows, said, strict=True):
             z = [(row[p] - c) / s for p, c, s in zip(places, centre, scale, strict=True)]
             products = [a * b for i, a in enumerate(z) for b in z[i:]]

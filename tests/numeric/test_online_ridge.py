@@ -119,3 +119,19 @@ def test_the_largest_numbers_that_are_taken_give_finite_weights() -> None:
     ridge.solve()
     assert all(np.isfinite(array).all() for array in ridge.to_arrays().values())
     np.testing.assert_allclose(ridge.weights[0, 1:], [1.0, 0.0], atol=0.1)
+
+
+def test_leverage_is_that_of_standardised_columns() -> None:
+    x, y = rows(80)
+    ridge = OnlineRidge(x.shape[1])
+    for row, response in zip(x, y, strict=True):
+        ridge.add(row, response)
+    ridge.solve()
+    z = (x - x.mean(axis=0)) / x.std(axis=0)
+    inverse = np.linalg.inv(z.T @ z + np.eye(z.shape[1]))
+    expected = np.einsum("ni,ij,nj->n", z, inverse, z) + 1.0 / 80.0
+    np.testing.assert_allclose(ridge.leverage(x), expected, rtol=1e-5)
+    one = [ridge.leverage(row[None])[0] for row in x]
+    assert np.array(one).tobytes() == ridge.leverage(x).tobytes()
+    assert ridge.leverage(np.full((1, x.shape[1]), 1e200))[0] == np.inf
+    assert OnlineRidge(2).leverage(np.zeros((1, 2)))[0] == np.inf  # nothing is known

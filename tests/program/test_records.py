@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from base64 import b64encode
 from typing import Any
 
 import numpy as np
@@ -71,10 +72,17 @@ def test_a_name_of_what_stands_below_is_no_answers_name() -> None:
 
 
 def test_least_squares_by_hand() -> None:
-    """z = (4 - 2) / 2 = 1 and (1 - 0) / 1 = 1: 0.5 + z_1 + 2 z_2 = 3.5, kept to 3; with products less."""
+    """z = (4 - 2) / 2 = 1 and (1 - 0) / 1 = 1: 0.5 + z_1 + 2 z_2 = 3.5, kept to 3; with products 1.75.
+
+    With a leverage of 1/2 the first word counts 1 / (1 + 2 (9/4 - 1)), the second one 3 / (3 + 2 (9/4 - 1)).
+    """
     columns = ((1, 2.0, 2.0), (2, 0.0, 1.0))
     weights = ((0.5, 1.0, 2.0), (0.0, 1.0, 0.0, 0.0, 0.25, 0.5))  # 1, z1, z2; then z1 z1, z1 z2, z2 z2
-    squares = ir.Regression(0, columns, weights, -3.0, 3.0)
+    leverage = tuple(
+        ir.Leverage((0.0,) * d, b64encode(bytes(2 * d * (d + 1))).decode(), 2, bias, 2.0)
+        for d, bias in ((2, 1.0), (5, 3.0))
+    )
+    squares = ir.Regression(0, columns, weights, -3.0, 3.0, leverage)
     told = {}
     for speaker in (2, 3):
         beliefs = tuple(ir.Belief(1, 0, -2, able, speaker, 0.75, 0.125, True) for able in (0, 4, 8, 12))
@@ -85,7 +93,8 @@ def test_least_squares_by_hand() -> None:
         said = by_source(python_source(program, "", SENTENCES), np.array([[10.0, 4.0, 1.0]]))
         told[speaker] = said.after[0, 0]
         assert (said.outcomes[0, 0], said.probabilities[0, 0], said.intervals[0, 0]) == (1, 0.75, 0.125)
-    assert told == {2: 13.0, 3: 10.0 + 1.75}
+    first = 3.0 / 3.5
+    assert told == {2: 13.0, 3: pytest.approx(10.0 + first + 3.0 / 5.5 * (1.75 - first))}
 
 
 def test_text_that_a_model_says_stands_in_the_docstring_whatever_it_is() -> None:

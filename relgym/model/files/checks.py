@@ -184,6 +184,16 @@ def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) ->
             _require(
                 all(len(row) == width + 1 for row in weights), where, "expected a weight for each column"
             )
+        _require(
+            all(len(each) == count for each in regression.left), where, "expected what is left of each target"
+        )
+        _require(
+            len(regression.left) in (0, 3), where, "expected what is left of nothing, and by two regressions"
+        )
+        _require(len(regression.leverage) <= len(regression.ridges), where, "leverage on what there isn't")
+        for spread, width in zip(regression.leverage, (d, d + d * (d + 1) // 2), strict=False):
+            _require(len(spread.mean) == width, where, "expected a mean for each column")
+            _decoded(spread.inverse, "float32", (width * (width + 1) // 2,), where)
 
 
 def _target(record: TargetRecord) -> Target:

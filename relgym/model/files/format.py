@@ -440,7 +440,9 @@ Kind: TypeAlias = tuple[
     Annotated[int, Meta(ge=-(2**31), le=2**31 - 1, description="id of a mode; a law is below 0; 0: nobody")],
     Annotated[
         int,
-        Meta(ge=-2, le=7, description="bin of the lead; below 0: all of a winner's, of all modes or laws"),
+        Meta(
+            ge=-3, le=7, description="bin of the lead; below 0: all of a winner's, of all modes or laws, all"
+        ),
     ],
 ]
 
@@ -470,6 +472,13 @@ class CalibrationRecord(Record):
     cells: list[CellRecord]
 
 
+class LeverageRecord(Record):
+    """Where the columns of a regression lie, and how far (`OnlineRidge.spread`)."""
+
+    mean: list[float]
+    inverse: Annotated[str, Meta(description="upper triangle, row by row: float32, little-endian, base64")]
+
+
 class RegressionRecord(Record):
     """Least squares on all numbers of a type: columns, targets, and for each kind rows, when due, and weights."""
 
@@ -481,6 +490,8 @@ class RegressionRecord(Record):
     range: tuple[list[float], list[float]]
     waiting: Annotated[list[tuple[list[float], list[float]]], Meta(max_length=64)]
     ridges: Annotated[list[tuple[Count, Count, list[list[float]]]], Meta(max_length=2)]
+    left: Annotated[list[list[Annotated[float, Meta(ge=0.0)]]], Meta(max_length=3)] = []
+    leverage: Annotated[list[LeverageRecord], Meta(max_length=2)] = []
 
 
 class TableRecord(Record):

@@ -136,6 +136,8 @@ class Guesses:
         Cost O(`FOLDS` * rows * columns * terms) with at most `SEARCHED_CELLS` for rows times columns, some
         0.3 s among 500 features.
         """
+        if self._trials is None and not budget.left:
+            return  # what waits holds no data
         if self._trials is None:
             self._due = int(GROWTH * max(LEAST, clusterer.seen))
             numbers, slots = alike(clusterer, table)

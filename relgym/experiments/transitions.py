@@ -1,0 +1,216 @@
+"""How many transitions it takes until predictions are right, and until they are right again after a law has changed.
+
+``python -m relgym.experiments.transitions --seeds 0 1 2`` prints a line for each world and seed. In a world that
+changes, gravity is halved or friction doubled after the given steps, which nothing tells the learner:
+
+- *right after*: steps until `RIGHT` of `WINDOW` predictions in a row, of all properties, were claimed and right;
+- *again after*: the same from the change on;
+- *claimed, off*: predictions after the change that were claimed and off by more than 5 % of what mostly changes: how
+  many until they are right again, and what share of all; what was always right is doubted after a miss or two;
+- *late*: the share of the last `WINDOW` steps that were claimed and right in all properties.
+"""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, Final
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+import relgym  # noqa: F401 - registers the envs
+from relgym.model.prequential import StepReport
+from relgym.wrappers import ModelLearner
+
+__all__ = ["WORLDS", "Course", "World", "course", "falling", "main", "sliding"]
+
+WINDOW, RIGHT = 100, 99
+"""So many of so many steps in a row are right once a law is known: one slip is no relapse."""
+
+OFF: Final = 0.05
+"""Share of what mostly changes by which a claim may be off."""
+
+
+class _Point(gym.Env[NDArray[np.float64], NDArray[np.float64]]):
+    """A point whose velocity follows a law; pushed by the action."""
+
+    def __init__(self, law: Callable[[float, float], float], start: float) -> None:
+        self.observation_space = gym.spaces.Box(-np.inf, np.inf, (1,), np.float64)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (1,), np.float64)
+        self._law, self._start, self._v = law, start, start
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        super().reset(seed=seed)
+        self._v = self._start
+        return np.array([self._v]), {}
+
+    def step(
+        self, action: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
+        self._v = self._law(self._v, float(action[0]))
+        return np.array([self._v]), 0.0, False, abs(self._v) > 20.0, {}
+
+
+def falling(gravity: float = 1.0) -> gym.Env[Any, Any]:
+    """What falls, and is slowed by nothing but the end of an episode."""
+    return _Point(lambda v, u: v + 0.1 * u - gravity, 0.0)
+
+
+def sliding(friction: float = 0.05) -> gym.Env[Any, Any]:
+    """What a force moves, and friction in proportion to its speed slows."""
+    return _Point(lambda v, u: (1.0 - friction) * v + 0.3 * u, 3.0)
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What is learned, and what it becomes.
+
+    Attributes
+    ----------
+    make
+        The world, with arguments that differ from the default.
+    steps
+        Before the change, and after it.
+    changed
+        Arguments after the change; None: nothing changes.
+    """
+
+    make: Callable[..., gym.Env[Any, Any]]
+    steps: int
+    changed: Mapping[str, Any] | None = None
+
+
+def _named(env_id: str, **fixed: Any) -> Callable[..., gym.Env[Any, Any]]:
+    return lambda **given: gym.make(env_id, **{**fixed, **given})
+
+
+WORLDS: Final[Mapping[str, World]] = {
+    "ball": World(_named("relgym/BallBoxRamp-v0"), 1_500),
+    "ball-friction": World(_named("relgym/BallBoxRamp-v0", friction=0.2), 1_500),
+    "truck": World(_named("relgym/TruckPush-v0"), 800),
+    "mountain-car": World(_named("MountainCar-v0"), 2_000),
+    "pendulum": World(_named("Pendulum-v1"), 2_000),
+    "falling, gravity halved": World(falling, 600, {"gravity": 0.5}),
+    "sliding, friction doubled": World(sliding, 600, {"friction": 0.1}),
+    "truck, gravity halved": World(_named("relgym/TruckPush-v0"), 800, {"gravity": 4.9}),
+    "ball, friction doubled": World(_named("relgym/BallBoxRamp-v0", friction=0.1), 1_500, {"friction": 0.2}),
+}
+"""Worlds by name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """How a run went; counts of steps are None where that never came to be.
+
+    Attributes
+    ----------
+    first, again
+        Steps until predictions were right, from the beginning and from the change on.
+    slips
+        Predictions between the change and being right again that were claimed and off.
+    off
+        Share of all predictions after the change that were; NaN: no change.
+    late
+        Share of the last steps that were right in all properties.
+    """
+
+    first: int | None
+    again: int | None
+    slips: int
+    off: float
+    late: float
+
+
+def course(world: World, seed: int) -> Course:
+    """Learn a world from random actions, and what becomes of it."""
+    learner = ModelLearner(world.make())
+    before = list(islice(_reports(learner, seed), world.steps))
+    first = _until(before)
+    if world.changed is None:
+        return Course(first, None, 0, float("nan"), float(np.mean([not r.wrong for r in before[-WINDOW:]])))
+    other = ModelLearner(world.make(**world.changed), model=learner.get_wrapper_attr("model"))
+    after = list(islice(_reports(other, seed + 1_000), world.steps))
+    again = _until(after)
+    return Course(
+        first,
+        again,
+        int(_off(after)[:again].sum()),
+        float(_off(after).sum() / max(sum(len(r.residuals) for r in after), 1)),
+        float(np.mean([not r.wrong for r in after[-WINDOW:]])),
+    )
+
+
+def _reports(learner: ModelLearner, seed: int) -> Iterator[StepReport]:
+    """Reports of the steps of which something was predicted."""
+    learner.action_space.seed(seed)
+    learner.reset(seed=seed)
+    while True:
+        _, _, terminated, truncated, info = learner.step(learner.action_space.sample())
+        if info["relgym"].transition is not None:
+            yield info["relgym"]
+        if terminated or truncated:
+            learner.reset()
+
+
+def _until(reports: Sequence[StepReport]) -> int | None:
+    """Steps before the first `WINDOW` of which `RIGHT` are right in all properties."""
+    right = np.array([bool(r.residuals) and not r.wrong for r in reports], dtype=np.int64)
+    sums = np.concatenate([[0], np.cumsum(right)])
+    found = np.flatnonzero(sums[WINDOW:] - sums[:-WINDOW] >= RIGHT)
+    return int(found[0]) if len(found) else None
+
+
+def _off(every: Sequence[StepReport]) -> NDArray[np.int64]:
+    """How many predictions of each step were claimed and off."""
+    changes: dict[tuple[str, str], list[float]] = {}
+    for report in every:
+        if report.transition is not None:
+            for name, prop in report.residuals:
+                now, then = report.transition.before[name][prop], report.transition.after[name][prop]
+                changes.setdefault((name, prop), []).append(abs(then - now))
+    size = {key: float(np.median([c for c in some if c > 0.0] or [0.0])) for key, some in changes.items()}
+    return np.array(
+        [
+            sum(
+                told.ok and abs(report.residuals[key]) > max(1e-9, OFF * size[key])
+                for told in (() if report.prediction is None else report.prediction.parts)
+                if (key := (told.object, told.property)) in report.residuals
+            )
+            for report in every
+        ],
+        dtype=np.int64,
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print a line for each world and seed."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0] if __doc__ else None)
+    parser.add_argument("worlds", nargs="*", metavar="WORLD", help=", ".join(WORLDS))
+    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2])
+    given = parser.parse_args(arguments)
+    print(
+        f"{'world':<28} {'seed':>4} {'right after':>12} {'again after':>12} {'claimed, off':>16} {'late':>7}"
+    )
+    for name in given.worlds or WORLDS:
+        if name not in WORLDS:
+            parser.error(f"there is no world {name!r}: {', '.join(WORLDS)}")
+        for seed in given.seeds:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # other people's envs warn when they are made
+                found = course(WORLDS[name], seed)
+            first, again = ("-" if n is None else n for n in (found.first, found.again))
+            print(
+                f"{name:<28} {seed:>4} {first:>12} {again:>12} {found.slips:>7} {found.off:>8.2%} {found.late:>7.1%}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
