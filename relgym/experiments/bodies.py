@@ -46,6 +46,9 @@ TEST: Final = 510
 
 EXACT, CLOSE = 1e-9, 1e-6
 
+TOGETHER: Final = 50
+"""Scenes that are predicted at once while laws are learned."""
+
 
 @dataclass(frozen=True, slots=True)
 class Tally:
@@ -69,17 +72,33 @@ class Tally:
 
 
 def learned(rooms: Iterable[Room], *, seed: int = 0, learner: LawLearner | None = None) -> LawLearner:
-    """Laws learned from rooms, transition by transition; by a new learner unless one is handed in."""
+    """Laws learned from rooms, transition by transition; by a new learner unless one is handed in.
+
+    Every transition is predicted by the laws that were learned before it. As long as these stay the same, scenes are
+    predicted together.
+    """
     for room in rooms:
         learner = learner or LawLearner(room.schema, room.schema.targets or (), seed=seed)
-        cast = learner.book.cast(room.layout)
-        relations = Extractor(room.schema).extract(room.layout, room.vectors)
+        book, now = learner.book, room.vectors[:-1]
+        relations = Extractor(room.schema).extract(room.layout, now)
+        contacts = Contacts.of(book.cast(room.layout), relations, now)
         stays = dict.fromkeys(range(len(room.layout.names)), True)
+        laws: tuple[object, ...] = ()
         for k in range(len(room)):
-            here = Contacts.of(cast, relations.rows(slice(k, k + 1)), room.vectors[k : k + 1])
-            learner.learn_one(here, room.vectors[k], room.vectors[k + 1], stays)
+            first = k - k % TOGETHER
+            if k == first or laws != _laws(book):
+                part = slice(k, first + TOGETHER)
+                some = Contacts.of(contacts.cast, relations.rows(part), now[part])
+                laws, told, begun = _laws(book), book.motion(some, now[part]), k
+            motion = told.scene(k - begun)
+            learner.learn_one(contacts.scene(k), now[k], room.vectors[k + 1], stays, motion)
     assert learner is not None, "nothing to learn from"
     return learner
+
+
+def _laws(book: LawBook) -> tuple[object, ...]:
+    """What predictions follow from."""
+    return (*book.free.values(), book.pair, book.inertia, book.tolerance)
 
 
 def tally(book: LawBook, rooms: Iterable[Room], tolerance: float = EXACT) -> Tally:
