@@ -187,7 +187,7 @@ class Contacts:
     Attributes
     ----------
     relations
-        Where directions are read; None where points are known, which have their own.
+        Where directions are read; may be None where points are known, which have their own.
     pose
         Poses of all bodies, shape ``(n, K, 9)``.
     hits
@@ -212,10 +212,10 @@ class Contacts:
         points = find_points(cast.manifolds, pose, hits, cast.first, cast.second)
         met = np.zeros_like(hits)
         met[points.scene, points.pair] = True
-        return cls(cast, None, pose, met, points)
+        return cls(cast, relations, pose, met, points)
 
     def scene(self, number: int) -> Contacts:
-        """The contacts of one of the scenes."""
+        """The contacts of one of the scenes; quickly where they are points: these say all that laws ask for."""
         part = slice(number, number + 1)
         pose, hits = self.pose[part], self.hits[part]
         if self.points is None:
