@@ -142,9 +142,15 @@ def _features(rows: Rows, x: FloatArray, sense: FloatArray | None = None) -> tup
 
 def _law(rows: Rows, features: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
     """Velocities that the laws demand along the rows' axes, and which piece holds, shape ``(m, r)``."""
-    values = (rows.tables * features[:, :, None]).sum(axis=3)
+    values = _values(rows, features)
     choice = (rows.signs[..., None] * values).argmax(axis=2)
     return np.take_along_axis(values, choice[..., None], axis=2)[..., 0], choice
+
+
+def _values(rows: Rows, features: FloatArray) -> FloatArray:
+    """What each piece of the rows' laws says, shape ``(m, r, pieces)``."""
+    found: FloatArray = (rows.tables * features[:, :, None]).sum(axis=3)
+    return found
 
 
 def _times(gain: FloatArray, x: FloatArray) -> FloatArray:
@@ -258,7 +264,7 @@ def _leapt(rows: Rows, x: FloatArray, ray: FloatArray, choice: NDArray[np.intp])
 
 def _until(rows: Rows, here: FloatArray, change: FloatArray, choice: NDArray[np.intp]) -> FloatArray:
     """How many rays it takes from what laws read until another piece holds or a slip turns back, ``(m,)``."""
-    values, growing = (rows.signs[..., None] * (rows.tables * f[:, :, None]).sum(axis=3) for f in (here, change))
+    values, growing = (rows.signs[..., None] * _values(rows, f) for f in (here, change))
     held, rising = (np.take_along_axis(f, choice[..., None], axis=2) for f in (values, growing))
     c = here.shape[1] // 2
     left = np.concatenate([(held - values).reshape(len(here), -1), here[:, c:, 0]], axis=1)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.experiments.bodies import Tally, main, rolled, tally
+from relgym.experiments.bodies import main
+from relgym.experiments.body_trials import Tally, rolled, tally
 from relgym.experiments.body_worlds import ROOM, Setting, body_rooms
 from relgym.laws.book import LawBook
 from relgym.laws.learner import LawLearner
