@@ -277,7 +277,8 @@ def law_trial(
     Returns
     -------
     ``tallies`` of the tests, as lists; ``laws``, what was learned; ``inertia``, the largest relative error of masses
-    and of moments over masses; ``rolled``, errors of roll-outs, and ``grown``, the same for first velocities off by `NUDGE`.
+    and of moments over masses; ``rolled``, errors of roll-outs, and ``grown``, the same for first velocities off by
+    `NUDGE`; ``seconds``, processor time of learning.
     """
     home = setting_of(setting)
     rooms = body_rooms(home, episodes, seed=seed)
