@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -20,7 +20,7 @@ from relgym.scene.objects import ACTION, POSE, Float2D, Kinematics, ObjectType, 
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box, Compound, Prism, Shape, Sphere
 
-__all__ = ["BEAMS", "SHAPES", "Setting", "body_rooms", "body_schema"]
+__all__ = ["BEAMS", "SHAPES", "Setting", "body_masses", "body_rooms", "body_schema", "checked_rooms"]
 
 Array = NDArray[np.float64]
 
@@ -91,6 +91,12 @@ class Setting:
         Stiffness of a spring between the first two bodies' centres, in 1 / s^2.
     driven
         Whether the disc is pushed by forces that are the action.
+    heavy
+        Density of the disc, in units of what it would be.
+    materials
+        Coefficients of friction of the bodies that move, in turn, where they differ; empty: all have the same.
+    tilt
+        Angle by which walls are turned, in radians: two of them one way and two the other.
     """
 
     bodies: tuple[str, ...] = ("box", "box", "box")
@@ -105,6 +111,9 @@ class Setting:
     magnet: float = 0.0
     spring: float = 0.0
     driven: bool = True
+    heavy: float = 1.0
+    materials: tuple[float, ...] = ()
+    tilt: float = 0.0
 
     @property
     def iterations(self) -> int:
@@ -155,29 +164,69 @@ def body_rooms(setting: Setting, count: int, *, seed: int, steps: int = 200) -> 
     steps
         Transitions of each.
     """
+    return [room for room, _ in _rooms(setting, count, seed, steps, sweeps=1)]
+
+
+def checked_rooms(setting: Setting, count: int, *, seed: int, steps: int = 200) -> list[tuple[Room, Array]]:
+    """`body_rooms`, and how far the engine had settled: its own residual for each step and body that moves.
+
+    That is the change of a velocity (or turning rate) if the same step is solved with twice as many sweeps, in units or
+    radians per step; shape ``(steps, bodies)``. It says nothing of any law.
+    """
+    return list(_rooms(setting, count, seed, steps, sweeps=2))
+
+
+def _rooms(
+    setting: Setting, count: int, seed: int, steps: int, *, sweeps: int
+) -> Iterator[tuple[Room, Array]]:
     schema = body_schema(setting)
     rng = np.random.default_rng([seed, 30])
-    # Of constants of objects each has the same in all episodes, and for all seeds.
-    densities = np.random.default_rng(30).uniform(2.0, 8.0, len(setting.bodies) + 1)
-    return [Room(schema, schema.layout(), _episode(setting, densities, steps, rng=rng)) for _ in range(count)]
+    densities = _densities(setting)
+    for _ in range(count):
+        vectors, residual = _episode(setting, densities, steps, sweeps, rng=rng)
+        yield Room(schema, schema.layout(), vectors), residual
 
 
-def _episode(setting: Setting, densities: Array, steps: int, *, rng: np.random.Generator) -> Float2D:
+def _densities(setting: Setting) -> Array:
+    """Constants of objects: each has the same in all episodes, and for all seeds."""
+    return np.random.default_rng(30).uniform(2.0, 8.0, len(setting.bodies) + 1)
+
+
+def body_masses(setting: Setting, *, seed: int) -> list[Body]:
+    """What bodies that move are like in some episode, their masses among it."""
+    bodies = _bodies(setting, _densities(setting), rng=np.random.default_rng([seed, 30]))
+    return [body for body in bodies if not math.isinf(body.mass)]
+
+
+def _episode(
+    setting: Setting, densities: Array, steps: int, sweeps: int, *, rng: np.random.Generator
+) -> tuple[Float2D, Array]:
+    """State vectors, and what `sweeps` times as many sweeps of the engine change of each step."""
     bodies = _bodies(setting, densities, rng=rng)
-    world = BodyWorld(bodies, gravity=setting.gravity, damping=setting.damping, iterations=setting.iterations)
+    worlds = [
+        BodyWorld(bodies, gravity=setting.gravity, damping=setting.damping, iterations=k * setting.iterations)
+        for k in dict.fromkeys((1, sweeps))
+    ]
+    world = worlds[0]
     poses, velocities = _start(setting, bodies, rng=rng)
-    world.place(poses, velocities)
+    for each in worlds:
+        each.place(poses, velocities)
     now = world.poses()
-    rows, push = [], np.zeros(2)
+    moving = sum(not math.isinf(body.mass) for body in bodies)
+    rows, left, push = [], [], np.zeros(2)
     for step in range(steps + 1):
         if step % 20 == 0 and setting.driven:
             push = rng.uniform(-10.0, 10.0, 2)
         # The action is the change of velocity that it stands for, in units per step.
         rows.append(_vector(setting, bodies, now, velocities, push * TIME_STEP**2))
-        world.step(_accelerations(setting, bodies, now, velocities / TIME_STEP, push))
-        after = world.poses()
+        begun = world.state()
+        for each in worlds:
+            each.resume(begun)
+            each.step(_accelerations(setting, bodies, now, velocities / TIME_STEP, push))
+        after, surer = world.poses(), worlds[-1].poses()
+        left.append(np.abs(after - surer).max(axis=1)[:moving])
         velocities, now = after - now, after
-    return np.stack(rows)
+    return np.stack(rows), np.stack(left[:-1])
 
 
 def _bodies(setting: Setting, densities: Array, *, rng: np.random.Generator) -> list[Body]:
@@ -195,7 +244,9 @@ def _bodies(setting: Setting, densities: Array, *, rng: np.random.Generator) -> 
         ]
         # What has a constant of its own has it as its mass, whatever its size.
         mass = 0.1 * density if setting.masses == "own" else density * body.area
-        found.append(Body(shape, extents, mass, elasticity=elasticity, friction=friction))
+        mass *= 1.0 if k else setting.heavy
+        grip = setting.materials[k % len(setting.materials)] if setting.materials else friction
+        found.append(Body(shape, extents, mass, elasticity=elasticity, friction=grip))
     still = Body(Box(), (2.0 * ROOM + 2.0, 1.0), math.inf, elasticity=elasticity, friction=friction)
     belt = Body(
         Box(),
@@ -224,7 +275,8 @@ def _start(setting: Setting, bodies: Sequence[Body], *, rng: np.random.Generator
     crowded = max(1.0, math.sqrt(count / 6.0))
     first, second = np.triu_indices(len(bodies), 1)
     manifolds = Manifolds(Axes((0, 1), (0, 1, 2), 1.0), [body.shape for body in bodies])
-    poses = np.concatenate([np.zeros((count, 3)), _WALLS])
+    walls = _WALLS + setting.tilt * np.array([[0.0, 0.0, side] for side in (1.0, -1.0, -1.0, 1.0)])
+    poses = np.concatenate([np.zeros((count, 3)), walls])
     placed = 0
     while placed < count:
         reach = min(1.6, 1.2 * crowded)

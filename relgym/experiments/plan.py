@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.envs.scripted import push_knowing
+from relgym.envs.tasks import Task
 from relgym.envs.truck_push import GRAVITY
 from relgym.experiments.dyna import EPISODES, solved_at
 from relgym.planning import EnvSimulator, Objective, Planner, PlanningAgent, Steps, TreeSearch
@@ -181,10 +182,12 @@ class NeuralSimulator:
         An env whose observations are scenes.
     repeat
         Env steps that a decision lasts.
+    task
+        Gives rewards and ends, if they aren't learned.
     """
 
-    def __init__(self, model: Any, like: gym.Env[Any, Any], repeat: int) -> None:
-        self.model, self._repeat = model, repeat
+    def __init__(self, model: Any, like: gym.Env[Any, Any], repeat: int, task: Task | None = None) -> None:
+        self.model, self._repeat, self._task = model, repeat, task
         self.action_space, self.observation_space = like.action_space, like.observation_space
         self._layout = model.schema.layout(name for name, kind in model.schema.objects if kind != "action")
 
@@ -206,9 +209,14 @@ class NeuralSimulator:
             if not len(going):
                 break
             whole, joined = acting_all(self.model.schema, self._layout, found[going], actions[going])
-            paid, over = self.model.predict_rewards(whole, joined)
             told = self.model.predict_batch(whole, joined)
-            found[going] = np.delete(told.vectors, whole.slice(whole.index("action")), axis=1)
+            after = np.delete(told.vectors, whole.slice(whole.index("action")), axis=1)
+            if self._task is None:
+                paid, over = self.model.predict_rewards(whole, joined)
+            else:
+                outcome = self._task.evaluate(self._layout, found[going], actions[going], after)
+                paid, over = outcome.rewards, outcome.terminated
+            found[going] = after
             rewards[going] += paid
             ended[going] = over
         return Steps(found, rewards, ended, np.full(len(states), bool(self.model.ensemble.ready)))
@@ -231,7 +239,8 @@ def make_agent(course: Course, arm: Arm, *, seed: int, env: gym.Env[Any, Any] | 
         model = NeuralWorldModel(schema, features=features, ensemble=MLPEnsemble(seed=seed))
 
         def simulated(trainer: ModelTrainer) -> NeuralSimulator:
-            return NeuralSimulator(trainer.model, env, course.repeat)
+            given: Any = getattr(env.unwrapped, "task", None) if arm.task == "given" else None
+            return NeuralSimulator(trainer.model, env, course.repeat, given)
 
         options |= {"model": model, "simulator": simulated}
     return PlanningAgent(env, task=arm.task, **options)

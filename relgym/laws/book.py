@@ -58,6 +58,14 @@ class Motion:
     touched: NDArray[np.bool_]
     columns: Mapping[int, FloatArray]
 
+    def scene(self, number: int) -> Motion:
+        """What they predict for one of the scenes."""
+        part = slice(number, number + 1)
+        columns = {body: x[:, part] for body, x in self.columns.items()}
+        return Motion(
+            self.velocity[:, part], self.known[part], self.stated[part], self.touched[part], columns
+        )
+
 
 class LawBook:
     """Free laws, the law of pairs, and how moving pairs share an impulse.

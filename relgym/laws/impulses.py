@@ -110,7 +110,7 @@ def solve(rows: Rows) -> Solved:
     active = np.arange(m)
     for round_ in range(ROUNDS):
         part = rows.of(active)
-        found, done, fit = _tried(part, impulse[active])
+        found, done, fit = _tried(part, impulse[active], stepwise=round_ % 2 == 1)
         impulse[active[done]] = found[done]
         settled[active[done]] = fit[done]
         active = active[~done]
@@ -121,14 +121,18 @@ def solve(rows: Rows) -> Solved:
     return Solved(impulse, settled)
 
 
-def _features(rows: Rows, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What the laws read at some impulses, shape ``(m, r, 6)``, and the sense of each row's axis, ``(m, r)``."""
+def _features(rows: Rows, x: FloatArray, sense: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+    """What the laws read at some impulses, shape ``(m, r, 6)``, and the sense of each row's axis, ``(m, r)``.
+
+    The sense of a slip is that of its free motion, unless one is given.
+    """
     m, r = x.shape
     c = r // 2
     yields = np.diagonal(rows.gain, axis1=1, axis2=2)
     u = (rows.free + _times(rows.gain, x)) - yields * x
-    sense = np.ones((m, r))
-    sense[:, c:] = np.where(u[:, c:] < 0.0, -1.0, 1.0)
+    if sense is None:
+        sense = np.ones((m, r))
+        sense[:, c:] = np.where(u[:, c:] < 0.0, -1.0, 1.0)
     own, now = sense * u, sense * rows.now
     push = np.zeros((m, r))
     push[:, c:] = yields[:, c:] * x[:, :c]
@@ -138,9 +142,15 @@ def _features(rows: Rows, x: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _law(rows: Rows, features: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
     """Velocities that the laws demand along the rows' axes, and which piece holds, shape ``(m, r)``."""
-    values = (rows.tables * features[:, :, None]).sum(axis=3)
+    values = _values(rows, features)
     choice = (rows.signs[..., None] * values).argmax(axis=2)
     return np.take_along_axis(values, choice[..., None], axis=2)[..., 0], choice
+
+
+def _values(rows: Rows, features: FloatArray) -> FloatArray:
+    """What each piece of the rows' laws says, shape ``(m, r, pieces)``."""
+    found: FloatArray = (rows.tables * features[:, :, None]).sum(axis=3)
+    return found
 
 
 def _times(gain: FloatArray, x: FloatArray) -> FloatArray:
@@ -148,8 +158,13 @@ def _times(gain: FloatArray, x: FloatArray) -> FloatArray:
     return total
 
 
-def _tried(rows: Rows, start: FloatArray) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Solve with the pieces that hold, until they are those that held before."""
+def _tried(
+    rows: Rows, start: FloatArray, *, stepwise: bool
+) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Solve with the pieces that hold, until they are those that held before.
+
+    Stepwise, on the way to a solution at most one piece changes at once: solving may otherwise go round in circles.
+    """
     m = len(start)
     x, done, fit = start.copy(), np.zeros(m, dtype=bool), np.zeros(m, dtype=bool)
     active = np.arange(m)
@@ -157,9 +172,15 @@ def _tried(rows: Rows, start: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]
         part = rows.of(active)
         features, sense = _features(part, x[active])
         _, choice = _law(part, features)
-        new, unique = _solved(part, choice, sense)
-        x[active] = new
+        new, unique, ray = _solved(part, choice, sense)
         right = _obeyed(part, new)
+        going = np.where(right[:, None], new, _leapt(part, new, ray, choice))
+        if stepwise:
+            ahead, _ = _features(part, new, sense)
+            way = _until(part, features, ahead - features, choice)[:, None]
+            early = (way > 0.0) & (way < 1.0) & ~right[:, None]
+            going = np.where(early, x[active] + way * (new - x[active]), going)
+        x[active] = going
         done[active[right]], fit[active[right]] = True, unique[right]
         active = active[~right]
         if not len(active):
@@ -179,8 +200,13 @@ def _obeyed(rows: Rows, x: FloatArray, slack: float = SLACK) -> NDArray[np.bool_
     return obeyed & np.isfinite(x).all(axis=1)
 
 
-def _solved(rows: Rows, choice: NDArray[np.intp], sense: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Impulses at which these pieces hold, of equals the smallest; and whether velocities are the only ones."""
+def _solved(
+    rows: Rows, choice: NDArray[np.intp], sense: FloatArray
+) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
+    """Impulses at which these pieces hold, of equals the smallest; whether velocities are the only ones; and a ray.
+
+    The ray, shape ``(m, r)``, is how sweeps change impulses without end where the pieces contradict each other.
+    """
     m, r = rows.free.shape
     c = r // 2
     weights = np.take_along_axis(rows.tables, choice[..., None, None], axis=2)[:, :, 0]
@@ -208,7 +234,44 @@ def _solved(rows: Rows, choice: NDArray[np.intp], sense: FloatArray) -> tuple[Fl
     # Impulses that the pieces leave open must not move anything.
     loose = np.where(kept[:, :, None], 0.0, right) * scale[:, None]
     moved = np.abs((rows.gain[:, None] * loose[:, :, None]).sum(axis=3) * scale[:, None])
-    return x, moved.max(axis=(1, 2)) <= 1e3 * NULL
+    against = np.where(kept, 0.0, (left * (scale * value)[:, :, None]).sum(axis=1))
+    ray = (left * against[:, None]).sum(axis=2)
+    ray = np.where(kept, 0.0, (right * ray[:, None]).sum(axis=2))
+    ray = scale * (right * ray[:, :, None]).sum(axis=1)
+    return x, moved.max(axis=(1, 2)) <= 1e3 * NULL, ray
+
+
+def _leapt(rows: Rows, x: FloatArray, ray: FloatArray, choice: NDArray[np.intp]) -> FloatArray:
+    """Go on along a ray to where another piece of some row's law holds.
+
+    Where two points stick that can't both, impulses against each other grow alike from sweep to sweep, thousands of
+    times, until one of them slips.
+    """
+    x = x.copy()
+    active = np.flatnonzero(ray.any(axis=1))
+    # Along a ray each slip turns back at most once.
+    for _ in range(x.shape[1] // 2 + 1):
+        part = rows.of(active)
+        here, sense = _features(part, x[active])
+        same = (_law(part, here)[1] == choice[active]).all(axis=1)
+        active, part, here, sense = active[same], part.of(np.flatnonzero(same)), here[same], sense[same]
+        if not len(active):
+            break
+        ahead, _ = _features(part, x[active] + ray[active], sense)
+        x[active] += _until(part, here, ahead - here, choice[active])[:, None] * ray[active]
+    return x
+
+
+def _until(rows: Rows, here: FloatArray, change: FloatArray, choice: NDArray[np.intp]) -> FloatArray:
+    """How many rays it takes from what laws read until another piece holds or a slip turns back, ``(m,)``."""
+    values, growing = (rows.signs[..., None] * _values(rows, f) for f in (here, change))
+    held, rising = (np.take_along_axis(f, choice[..., None], axis=2) for f in (values, growing))
+    c = here.shape[1] // 2
+    left = np.concatenate([(held - values).reshape(len(here), -1), here[:, c:, 0]], axis=1)
+    closing = np.concatenate([(growing - rising).reshape(len(here), -1), -change[:, c:, 0]], axis=1)
+    ahead = (closing > 0.0) & (left >= 0.0)
+    until = np.where(ahead, left / np.where(ahead, closing, 1.0), np.inf).min(axis=1)
+    return np.where(np.isfinite(until), (1.0 + NULL) * until, 0.0)
 
 
 def _swept(rows: Rows, start: FloatArray) -> FloatArray:

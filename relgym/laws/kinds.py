@@ -83,7 +83,7 @@ def fit_apart(
     laws = []
     for fit, _, rows in groups:
         explained[rows] = fit.explained
-        laws.append(_law(fit, examples.rows(rows), kinds[rows], names))
+        laws.append(_law(fit, examples.rows(rows), kinds[rows], names, apart=True))
     apart = KindsFit(tuple(laws), explained)
     naming = float(len(present) * np.log2(len(groups)))
     return apart if apart.bits + naming < together.bits else together
@@ -138,7 +138,27 @@ def _form(operator: Operator, pieces: tuple[Piece, ...]) -> tuple[Operator, tupl
     return operator, tuple(sorted(tuple(name for name, _ in piece.terms) for piece in pieces))
 
 
-def _law(fit: AxisFit, examples: AxisExamples, kinds: NDArray[np.intp], names: Sequence[Kind]) -> AxisLaw:
+def _shown(fit: AxisFit, examples: AxisExamples, acts: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+    """For each piece with a number of its own, the examples that it alone explains, and that a contact acts on."""
+    explained = [examples.explains(piece) for piece in fit.pieces]
+    alone = sum(each.astype(np.intp) for each in explained) == 1
+    pairs = zip(fit.pieces, explained, strict=True)
+    return [each & alone & acts & fit.explained for piece, each in pairs if piece.free_parameters()]
+
+
+def _law(
+    fit: AxisFit,
+    examples: AxisExamples,
+    kinds: NDArray[np.intp],
+    names: Sequence[Kind],
+    *,
+    apart: bool = False,
+) -> AxisLaw:
+    """The law of some kinds of contacts; `apart` if others obey another one.
+
+    Then a number that goes with the material isn't known of a kind that never showed it: what stuck so far may have a
+    grip of its own.
+    """
     present = np.unique(kinds).tolist()
     # Contacts that let go as they should tell nothing of what a contact does.
     free = examples.x[:, examples.names.index(examples.free)]
@@ -147,6 +167,7 @@ def _law(fit: AxisFit, examples: AxisExamples, kinds: NDArray[np.intp], names: S
         names[k]
         for k in present
         if doubtful(int((~fit.explained[kinds == k]).sum()), int((acts & (kinds == k)).sum()), LEFT_OPEN)
+        or (apart and not all(shown[kinds == k].any() for shown in _shown(fit, examples, acts)))
     )
     # Sides of 0 on which no velocity was ever seen: what ends there would be outside experience.
     signs = (bool((examples.y < -examples.tolerance).any()), bool((examples.y > examples.tolerance).any()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -186,6 +186,10 @@ class Contacts:
 
     Attributes
     ----------
+    relations
+        Where directions are read; may be None where points are known, which have their own.
+    pose
+        Poses of all bodies, shape ``(n, K, 9)``.
     hits
         Which pairs of the cast touch, shape ``(n, P)``.
     points
@@ -193,7 +197,7 @@ class Contacts:
     """
 
     cast: Cast
-    relations: Relations
+    relations: Relations | None
     pose: NDArray[np.float64]
     hits: NDArray[np.bool_]
     points: Points | None = None
@@ -210,6 +214,15 @@ class Contacts:
         met[points.scene, points.pair] = True
         return cls(cast, relations, pose, met, points)
 
+    def scene(self, number: int) -> Contacts:
+        """The contacts of one of the scenes; quickly where they are points: these say all that laws ask for."""
+        part = slice(number, number + 1)
+        pose, hits = self.pose[part], self.hits[part]
+        if self.points is None:
+            return Contacts(self.cast, self._read().rows(part), pose, hits)
+        own = self.points.take(np.flatnonzero(self.points.scene == number))
+        return Contacts(self.cast, None, pose, hits, replace(own, scene=np.zeros_like(own.scene)))
+
     def groups(self) -> Iterator[Group]:
         """Scenes by their number of contacts, those without any left out."""
         counts = self.hits.sum(axis=1)
@@ -217,6 +230,10 @@ class Contacts:
             scenes = np.flatnonzero(counts == count)
             pairs = np.nonzero(self.hits[scenes])[1].reshape(len(scenes), count)
             yield Group(scenes, pairs, self.bearings(scenes[:, None], pairs))
+
+    def _read(self) -> Relations:
+        assert self.relations is not None, "bodies that touch in points have their directions there"
+        return self.relations
 
     def bearings(self, scenes: NDArray[np.intp], pairs: NDArray[np.intp]) -> Bearings:
         """Directions at contacts; the arguments have a common shape after broadcasting."""
@@ -232,7 +249,7 @@ class Contacts:
         for body in np.unique(a).tolist():
             part = a == body
             rows = np.broadcast_to(scenes, a.shape)[part]
-            normals[:, part] = self.relations.normals(body)[rows, b[part]].T
+            normals[:, part] = self._read().normals(body)[rows, b[part]].T
         return Bearings(normals, between / np.where(length > 0.0, length, 1.0), angles)
 
     def arms(self, scenes: NDArray[np.intp], bodies: NDArray[np.intp]) -> FloatArray:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from relgym.experiments.bodies import Tally, main, rolled, tally
-from relgym.experiments.body_worlds import ROOM, Setting, body_rooms
+from relgym.experiments.bodies import FORCES, STRANGE, main
+from relgym.experiments.body_trials import Tally, rolled, setting_of, tally
+from relgym.experiments.body_worlds import ROOM, Setting, body_masses, body_rooms, checked_rooms
 from relgym.laws.book import LawBook
 from relgym.laws.learner import LawLearner
 
@@ -21,6 +26,59 @@ def empty_book() -> LawBook:
 def test_shares() -> None:
     found = Tally(contacts=200, right=150, wrong=1, free=800, free_wrong=1)
     assert (found.right_share, found.wrong_share) == (75.0, 0.2)
+
+
+def test_what_the_engine_leaves_unsettled_is_counted_apart() -> None:
+    rooms = body_rooms(SETTING, 1, seed=1)
+    whole = tally(empty_book(), rooms)
+    residual = np.zeros((len(rooms[0]), 3))
+    residual[:, 1] = 1.0
+    found = tally(empty_book(), rooms, residuals=[residual])
+    assert found.unsettled > 0
+    assert found.contacts + found.unsettled == whole.contacts
+    assert found.free == whole.free
+    assert tally(empty_book(), rooms, 2.0, [residual]).unsettled == 0
+
+
+def test_the_engines_residual_tells_nothing_of_the_rooms() -> None:
+    falling = Setting(("box",), 0.5, 0.3, gravity=9.8, driven=False)
+    ((room, residual),) = checked_rooms(falling, 1, seed=3, steps=30)
+    assert np.array_equal(room.vectors, body_rooms(falling, 1, seed=3, steps=30)[0].vectors)
+    assert residual.shape == (30, 2)
+    assert (residual >= 0.0).all() and residual.max() < 1e-4
+
+
+def test_settings_vary_what_their_names_say() -> None:
+    plain, heavy = (body_masses(Setting(("box",), heavy=h), seed=4) for h in (1.0, 10.0))
+    assert heavy[0].mass == pytest.approx(10.0 * plain[0].mass)
+    assert heavy[1] == plain[1]
+    rough = body_masses(Setting(("box",) * 2, 0.25, materials=(0.9, 0.2)), seed=4)
+    assert [body.friction for body in rough] == [0.9, 0.2, 0.9]
+    room = body_rooms(Setting(("box",), tilt=0.25), 1, seed=4, steps=1)[0]
+    walls = [room.layout.slice(room.layout.index(f"wall{k}")).start + 5 for k in (1, 2, 3, 4)]
+    assert room.vectors[0, walls] == pytest.approx([0.25, -0.25, np.pi / 2 - 0.25, np.pi / 2 + 0.25])
+
+
+def test_settings_are_plain_data() -> None:
+    for setting in (*STRANGE.values(), *FORCES.values()):
+        assert setting_of(json.loads(json.dumps(asdict(setting)))) == setting
+
+
+def test_results_are_kept_and_a_page_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["masses", "--seeds", "1", "--episodes", "1", "--tests", "1", "--out", str(tmp_path)]
+    target = tmp_path / "bodies.md"
+    code = main([*options, "--page", str(target)])
+    first = capsys.readouterr()
+    assert "2 of 2 runs" in first.err
+    text = target.read_text(encoding="utf-8")
+    assert "## masses" in text and "masses that aren't seen" in text
+    assert "`python -m relgym.experiments.bodies masses --seeds 1 --episodes 1 --tests 1`" in text
+    target.write_text(text.replace("## masses", "## pushing\n\nkept\n\n## masses"), encoding="utf-8")
+    assert main([*options, "--page", str(target)]) == code
+    again = capsys.readouterr()
+    assert "1 of" not in again.err  # nothing was left to run
+    assert again.out == first.out
+    assert "## pushing\n\nkept\n\n## masses" in target.read_text(encoding="utf-8")
 
 
 def test_who_knows_nothing_claims_nothing() -> None:

@@ -115,6 +115,29 @@ def test_of_laws_that_contradict_one_another_nothing_is_settled() -> None:
     assert not solve(Rows(rows.gain, rows.free, rows.now, tables, rows.signs)).settled[0]
 
 
+def test_of_two_points_that_cannot_both_stick_one_slips() -> None:
+    """A brick bounces off both its lower corners, one of which lies deeper by 1e-4; as it turns both can't stick.
+
+    Held by impulses against each other, which grow from sweep to sweep, one of them gives way where they reach the
+    bound on friction.
+    """
+    bounce, gap = law("max", Piece((("u_n", 1.0),)), Piece((("v_n", -1.0),))), 1e-4
+    # Unit mass and moment; arms to the points (-1, -1) and (1, -1 + gap). Rows: both normals, both slips.
+    arms = np.array([[-1.0, -1.0], [1.0, -1.0 + gap]])
+    jacobian = np.array([[0.0, 1.0, x] for x, _ in arms] + [[-1.0, 0.0, y] for _, y in arms])
+    gain = jacobian @ jacobian.T
+    free = jacobian @ np.array([0.1, -2.0, -0.1])
+    rows = island(bounce, ROUGH, gain.tolist(), free.tolist(), free.tolist())
+    impulse, velocity, settled = after(rows)
+    assert settled
+    assert velocity[:2] == pytest.approx((-free[:2]).tolist(), abs=1e-12)
+    slips = [abs(v) > 1e-9 for v in velocity[2:]]
+    assert slips.count(True) == 1
+    slipping = slips.index(True)
+    assert abs(impulse[2 + slipping]) == pytest.approx(0.2 * impulse[slipping], rel=1e-9)
+    assert abs(impulse[3 - slipping]) <= 0.2 * impulse[1 - slipping] + 1e-12
+
+
 @st.composite
 def _islands(draw: st.DrawFn) -> Rows:
     """Bodies that lie about anyhow, on rough or smooth points."""

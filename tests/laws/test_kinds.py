@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relgym.laws.kinds import fit_together
+from relgym.laws.kinds import fit_apart, fit_together
 from relgym.laws.pieces import AxisExamples
 from relgym.laws.records import AxisLaw, PairLaw
 
@@ -22,6 +22,34 @@ def test_a_rare_kind_that_a_law_has_wrong_is_doubted(rng: np.random.Generator) -
     y[201:] = x[201:, 0]  # one exception alone tells nothing of its kind
     (law,) = fit_together(examples, kinds, [("box", "wall"), ("box", "belt")], rng=rng).laws
     assert law.doubted == ()
+
+
+def test_where_materials_differ_a_kind_shows_its_number_before_it_is_claimed(
+    rng: np.random.Generator,
+) -> None:
+    """Whether who only ever stuck slips at a rough or a smooth body's bound, or at another, is not known."""
+    n, names = 120, [("box", "ice"), ("box", "sand"), ("box", "glue")]
+    kinds = np.repeat([0, 1, 2], n)
+    push = rng.uniform(0.5, 1.0, 3 * n)
+    slip = push * rng.uniform(0.0, 0.1, 3 * n)  # sticks everywhere
+    fast = (rng.random(3 * n) < 0.5) & (kinds < 2)
+    slip[fast] += rng.uniform(1.0, 2.0, int(fast.sum()))
+    after = np.maximum(0.0, slip - np.repeat([0.1, 0.6, 0.9], n) * push)
+    x = np.stack([slip, push, np.ones(3 * n)], axis=1)
+    examples = AxisExamples(("u_t", "J_n", "1"), x, after, "u_t", 1e-9)
+
+    def doubted(some: int) -> set[tuple[str, str]]:
+        part = examples.rows(kinds < some)
+        together = fit_together(part, kinds[kinds < some], names, rng=rng)
+        found = fit_apart(part, kinds[kinds < some], names, together, np.inf, rng=rng)
+        assert found.explained.all()
+        return {kind for law in found.laws for kind in law.doubted}
+
+    assert doubted(2) == set()
+    assert doubted(3) == {("box", "glue")}
+    slip[-9:] = push[-9:] + rng.uniform(0.3, 0.5, 9)
+    x[:, 0], after[-9:] = slip, slip[-9:] - 0.9 * push[-9:]
+    assert doubted(3) == set()
 
 
 def test_a_law_that_says_nothing_of_a_kind() -> None:

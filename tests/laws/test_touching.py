@@ -117,6 +117,12 @@ def test_groups_and_their_directions() -> None:
     vectors = np.stack([apart, VECTOR, VECTOR])
     schema = SceneSchema((BALL, BLOCK, WALL), OBJECTS, planar=True)
     contacts = Contacts.of(cast, Extractor(schema).extract(cast.layout, vectors), vectors)
+    for k in range(len(vectors)):
+        alone = Contacts.of(
+            cast, Extractor(schema).extract(cast.layout, vectors[k : k + 1]), vectors[k : k + 1]
+        )
+        assert np.array_equal(contacts.scene(k).hits, alone.hits)
+        assert np.array_equal(contacts.scene(k).pose, alone.pose)
     (group,) = contacts.groups()  # scenes without contacts are left out
     assert group.scenes.tolist() == [1, 2]
     assert [cast.pairs[k] for k in group.pairs[0].tolist()] == [(0, 1), (0, 3)]

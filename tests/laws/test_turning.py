@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.experiments.bodies import learned, rolled, tally
+from relgym.experiments.body_trials import learned, rolled, tally
 from relgym.experiments.body_worlds import Setting, body_rooms
 from relgym.laws.account import accounts
 from relgym.laws.book import LawBook
@@ -45,6 +45,25 @@ def test_every_contact_of_fresh_scenes_is_right(rough: LawLearner) -> None:
     found = tally(rough.book, body_rooms(TWO, 3, seed=1001))
     assert found.contacts > 200
     assert (found.right, found.wrong, found.free_wrong) == (found.contacts, 0, 0)
+
+
+def test_scenes_of_a_batch_are_those_alone(rough: LawLearner) -> None:
+    """Learning from a room at once gives what learning from each scene on its own gives, to the last bit."""
+    room = body_rooms(TWO, 1, seed=1004, steps=80)[0]
+    book, now = rough.book, room.vectors[:-1]
+    whole = Contacts.of(book.cast(room.layout), Extractor(room.schema).extract(room.layout, now), now)
+    motion = book.motion(whole, now)
+    assert whole.points is not None and len(whole.points)
+    for k in range(len(now)):
+        relations = Extractor(room.schema).extract(room.layout, now[k : k + 1])
+        alone = Contacts.of(whole.cast, relations, now[k : k + 1])
+        points = whole.scene(k).points
+        assert points is not None and alone.points is not None
+        for name in ("scene", "pair", "normal", "arms"):
+            assert np.array_equal(getattr(points, name), getattr(alone.points, name))
+        told, part = book.motion(alone, now[k : k + 1]), motion.scene(k)
+        assert told.velocity.tobytes() == part.velocity.tobytes()
+        assert np.array_equal(told.known, part.known) and np.array_equal(told.touched, part.touched)
 
 
 def test_other_shapes_and_more_bodies_need_no_learning(rough: LawLearner) -> None:
