@@ -378,7 +378,8 @@ def _planned(seeds: Sequence[int], episodes: int) -> Section:
             seed=seed,
         )
         agent.learn(REAL)
-        shares.append(100.0 * Tests(DELIVERY, min(100, episodes)).successes(agent) / min(100, episodes))
+        good, played = Tests(DELIVERY, min(100, episodes)).successes(agent)
+        shares.append(100.0 * good / played)
     return "planned deliveries", [measured("delivered, % of episodes", 80.0, shares, ">=")], []
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.envs.scripted import push_knowing
 from relgym.envs.truck_push import GRAVITY
-from relgym.experiments.dyna import EPISODES, solved_at
+from relgym.experiments.dyna import ENOUGH, EPISODES, solved_at
 from relgym.planning import EnvSimulator, Objective, Planner, PlanningAgent, Steps, TreeSearch
 from relgym.planning.review import right
 from relgym.scene.objects import Float1D, Float2D, Scene
@@ -65,6 +65,8 @@ class Course:
         Decisions that an episode lasts at most; agents that learn find out by themselves.
     every
         Decisions between two tests.
+    final
+        Decisions after which there is a test in any case; None: none.
     agent
         Parameters of `PlanningAgent` that aren't the default.
     search
@@ -78,6 +80,7 @@ class Course:
     repeat: int = 1
     limit: int | None = None
     every: int = 50
+    final: int | None = None
     agent: Mapping[str, Any] = field(default_factory=dict)
     search: TreeSearch = field(default_factory=TreeSearch)
 
@@ -86,7 +89,12 @@ COURSES: Final = {
     course.name: course
     for course in (
         Course(
-            "truck", "TruckPush", "relgym/TruckPush-v0", limit=20, search=TreeSearch(horizon=20, batch=512)
+            "truck",
+            "TruckPush",
+            "relgym/TruckPush-v0",
+            limit=20,
+            final=300,
+            search=TreeSearch(horizon=20, batch=512),
         ),
         Course(
             "ball",
@@ -115,6 +123,8 @@ class Arm:
         Whether reward and termination are learned or given.
     explores
         Whether it looks for what is new, or acts at random until it has learned.
+    patience
+        How many times as many real decisions as others it may take.
     """
 
     name: str
@@ -122,6 +132,7 @@ class Arm:
     model: Literal["relational", "neural"] = "relational"
     task: Literal["learned", "given"] = "learned"
     explores: bool = True
+    patience: int = 1
 
 
 ARMS: Final = {
@@ -130,7 +141,7 @@ ARMS: Final = {
         Arm("relgym", "planner, relgym"),
         Arm("relgym-given", "planner, relgym, reward given", task="given"),
         Arm("greedy", "planner, relgym, without exploration", explores=False),
-        Arm("ensemble", "planner, MLP ensemble", model="neural"),
+        Arm("ensemble", "planner, MLP ensemble", model="neural", patience=5),
     )
 }
 
@@ -144,16 +155,24 @@ class Tests:
         Where.
     episodes
         How many, of `EPISODES`.
+    failures
+        Most episodes that may fail: one more ends a test. None: all episodes are played.
+
+    Attributes
+    ----------
+    decisions, seconds
+        Of all tests so far: decisions, and processor time to choose them.
     """
 
-    def __init__(self, course: Course, episodes: int = EPISODES) -> None:
+    def __init__(self, course: Course, episodes: int = EPISODES, *, failures: int | None = None) -> None:
         env = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
         self._env: gym.Env[Any, Any] = ActionRepeat(env, course.repeat) if course.repeat > 1 else env
         self._episodes = episodes
+        self._failures = episodes if failures is None else failures
         self.decisions, self.seconds = 0, 0.0
 
-    def successes(self, agent: Any) -> int:
-        """How many episodes the agent ends well; ``info["is_success"]`` at the end counts."""
+    def successes(self, agent: Any) -> tuple[int, int]:
+        """How many episodes the agent ends well, and of how many; ``info["is_success"]`` at the end counts."""
         good = 0
         for k in range(self._episodes):
             seen, _ = self._env.reset(seed=_FIRST_EPISODE + k)
@@ -167,7 +186,9 @@ class Tests:
                 seen, _, terminated, truncated, info = self._env.step(action)
                 over = terminated or truncated
             good += bool(info["is_success"])
-        return good
+            if k + 1 - good > self._failures:
+                return good, k + 1
+        return good, self._episodes
 
 
 class NeuralSimulator:
@@ -253,30 +274,43 @@ def learning(*, course: str, arm: str, seed: int, steps: int, episodes: int = EP
 
     Returns
     -------
-    ``curve``, (real decisions, successes of 100) at each test; ``solved_at``, decisions at the second good test in a
-    row or None; ``seconds`` of processor time without tests, ``decision``, mean processor time of a decision in the
-    last test, in seconds; ``laws``, what was learned.
+    ``curve``, (real decisions, successes in %) at each test; one that can't succeed any more is broken off, and its
+    share is that of the episodes played. ``solved_at``, decisions at the second good test in a row or None; ``final``,
+    successes in % of a whole test at `Course.final`, or None; ``seconds`` of processor time without tests,
+    ``decision``, mean processor time of a decision in the last test, in seconds; ``laws``, what was learned.
     """
     place = COURSES[course]
     agent = make_agent(place, ARMS[arm], seed=seed)
-    curve: list[tuple[int, int]] = []
-    spent, decision = 0.0, 0.0
-    for at in range(place.every, steps + 1, place.every):
+    spent = 0.0
+
+    def tested(at: int, *, whole: bool = False) -> tuple[int, float]:
+        nonlocal spent
         started = process_time()
         agent.learn(at * place.repeat)
         spent += process_time() - started
-        tests = Tests(place, episodes)
+        most = episodes if whole else episodes * (EPISODES - ENOUGH) // EPISODES
+        tests = Tests(place, episodes, failures=most)
         # Who has only acted at random so far has nothing to show: at most what random actions reach.
-        good = tests.successes(agent) if agent.ready else 0
-        decision = tests.seconds / max(1, tests.decisions)
-        curve.append((at, round(good * 100 / episodes)))
-        print(f"{course}, {arm}, seed {seed}: {good} of {episodes} after {at:,}", file=sys.stderr, flush=True)
+        good, played = tests.successes(agent) if agent.ready else (0, episodes)
+        told = f"{course}, {arm}, seed {seed}: {good} of {played} after {at:,}"
+        print(told, file=sys.stderr, flush=True)
+        return round(good * EPISODES / played), tests.seconds / max(1, tests.decisions)
+
+    curve: list[tuple[int, int]] = []
+    decision = 0.0
+    for at in range(place.every, steps * ARMS[arm].patience + 1, place.every):
+        good, decision = tested(at)
+        curve.append((at, good))
         if solved_at(curve) is not None:
             break
+    final = None if place.final is None else dict(curve).get(place.final)
+    if place.final is not None and final is None and curve and curve[-1][0] < place.final:
+        final = tested(place.final, whole=True)[0]
     describe = getattr(agent.model, "describe", None)
     return {
         "curve": curve,
         "solved_at": solved_at(curve),
+        "final": final,
         "seconds": spent,
         "decision": decision,
         "laws": describe() if describe is not None else "",
@@ -390,7 +424,8 @@ def recovering(*, seed: int, steps: int, episodes: int) -> dict[str, Any]:
     for at in range(0, steps + 1, course.every):
         agent.learn(_CHANGE + at)
         tests = Tests(replace(course, arguments=half) if at else course, episodes)
-        curve.append((at, round(tests.successes(agent) * 100 / episodes)))
+        good, played = tests.successes(agent)
+        curve.append((at, round(good * 100 / played)))
         print(f"changed world, seed {seed}: {curve[-1]}", file=sys.stderr, flush=True)
     return {"curve": curve}
 
@@ -402,9 +437,9 @@ def ceiling(*, course: str, episodes: int = EPISODES) -> dict[str, Any]:
     objective = Objective(discount=PlanningAgent.DISCOUNT)
     tests = Tests(place, episodes)
     simulator = EnvSimulator(env, repeat=place.repeat)
-    good = tests.successes(Planner(simulator, place.search, objective, limit=place.limit))
+    good, played = tests.successes(Planner(simulator, place.search, objective, limit=place.limit))
     return {
-        "successes": round(good * 100 / episodes),
+        "successes": round(good * 100 / played),
         "decision": tests.seconds / max(1, tests.decisions),
         "episodes": episodes,
     }

@@ -43,13 +43,23 @@ than 100 episodes the table says so. *learning* is processor time without tests,
 decision in the last test, with the searches that the plans it followed had cost. The rows of SAC and Dyna are those of
 the [page on dreaming](dream.md), tested every 250 decisions. The [guide](../guides/planning.md) says how it works."""
 
-_LIMITS: Final[Mapping[tuple[str, str], float]] = {
-    ("truck", "relgym"): 300,
-    ("truck", "relgym-given"): 200,
-    ("ball", "relgym"): 600,
-    ("ball", "relgym-given"): 200,
+_LIMITS: Final[Mapping[tuple[str, str], tuple[int, int | None]]] = {
+    ("truck", "relgym"): (300, 400),
+    ("truck", "relgym-given"): (200, None),
+    ("ball", "relgym"): (600, None),
+    ("ball", "relgym-given"): (250, None),
 }
-"""Median of the real decisions to success that is asked for."""
+"""Real decisions to success that are asked for: in the median, and in the worst seed. (Of the second test; the ball's
+first good one is to be that after 200.)"""
+
+_FINAL: Final[Mapping[tuple[str, str], float]] = {("truck", "relgym-given"): 97, ("ball", "relgym-given"): 90}
+"""Successes of 100 that are asked for at the course's final test."""
+
+_TIMES: Final = 5
+"""How many times as many real decisions nets are to need."""
+
+_BELOW: Final = 3
+"""Successes of 100 by which the learned model may stay behind the exact engine."""
 
 _EXPLORATION: Final = 1_500
 """Real steps in which agents get to know TruckPush."""
@@ -109,19 +119,45 @@ def told(course: str, found: Mapping[str, Sequence[Any]], *, steps: int, episode
     learned = {arm: runs for arm, runs in found.items() if runs and arm != "engine"}
     measures: list[Measure] = []
     for arm, runs in learned.items():
-        if (limit := _LIMITS.get((course, arm))) is not None:
-            name = ARMS[arm].title
-            measures.append(measured(f"{name}: decisions to success, median", limit, [_median(runs, steps)]))
-            measures.append(
-                measured(f"{name}: seconds a decision", _DECISION, [run["decision"] for run in runs])
-            )
-    rows: list[list[Cell]] = [_row(ARMS[arm].title, runs, steps) for arm, runs in learned.items()]
+        name = ARMS[arm].title
+        if (limits := _LIMITS.get((course, arm))) is not None:
+            middle, worst = limits
+            measures.append(measured(f"{name}: decisions to success, median", middle, [_median(runs, steps)]))
+            if worst is not None:
+                each = [_reached(run, steps) for run in runs]
+                measures.append(measured(f"{name}: decisions to success, each", worst, each))
+        if (least := _FINAL.get((course, arm))) is not None:
+            title = f"{name}: successes of 100 after {COURSES[course].final}"
+            ends = [run["final"] for run in runs if run["final"] is not None]
+            measures.append(measured(title, least, ends, ">="))
+        if limits is not None and course == "truck":
+            spent = [run["decision"] for run in runs]
+            measures.append(measured(f"{name}: seconds a decision", _DECISION, spent))
+    measures += _against_others(found, steps)
+    rows: list[list[Cell]] = [_row(ARMS[arm].title, runs, _most(arm, steps)) for arm, runs in learned.items()]
     for made in found.get("engine", ()):
         rest = made["successes"], "-", f"{made['decision']:.3f} s"
         rows.append(["the same search, exact engine", "-", "-", "-", *rest])
     rows += _others(course, others)
     heading = ["arm", "solved", "median", "each", "last, %", "learning", "decision"]
     return report(COURSES[course].title, measures, [table(heading, rows), f"Tests of {episodes} episodes."])
+
+
+def _against_others(found: Mapping[str, Sequence[Any]], steps: int) -> list[Measure]:
+    """The learned model beside nets and beside the exact engine, with the same search."""
+    own = found.get("relgym", ())
+    if not own:
+        return []
+    measures = []
+    if nets := found.get("ensemble", ()):
+        ratio = _median(nets, _most("ensemble", steps)) / _median(own, steps)
+        measures.append(
+            measured("MLP ensemble: times as many real decisions (at least)", _TIMES, [ratio], ">=")
+        )
+    for made in found.get("engine", ()):
+        below = [made["successes"] - run["curve"][-1][1] for run in own]
+        measures.append(measured("planner, relgym: successes of 100 below the exact engine's", _BELOW, below))
+    return measures
 
 
 def _row(title: str, runs: Sequence[Any], steps: int) -> list[Cell]:
@@ -136,6 +172,11 @@ def _row(title: str, runs: Sequence[Any], steps: int) -> list[Cell]:
         f"{median(run['seconds'] for run in runs):.0f} s",
         f"{median(run['decision'] for run in runs):.3f} s",
     ]
+
+
+def _most(arm: str, steps: int) -> int:
+    """Real decisions that a run of an arm may take."""
+    return steps * ARMS[arm].patience
 
 
 def _reached(run: Mapping[str, Any], steps: int) -> int:
