@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from time import process_time
 from typing import Any, Final, Literal
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from relgym.envs.scripted import push_knowing
 from relgym.envs.tasks import Task
 from relgym.envs.truck_push import GRAVITY
-from relgym.experiments.dyna import EPISODES, solved_at
+from relgym.experiments import dyna, dyna_arms
+from relgym.experiments.dyna import ENOUGH, EPISODES, solved_at
 from relgym.planning import EnvSimulator, Objective, Planner, PlanningAgent, Steps, TreeSearch
 from relgym.planning.review import right
 from relgym.scene.objects import Float1D, Float2D, Scene
@@ -28,7 +29,6 @@ __all__ = [
     "ARMS",
     "COURSES",
     "Arm",
-    "ChangingWorld",
     "Course",
     "Tests",
     "ceiling",
@@ -66,10 +66,14 @@ class Course:
         Decisions that an episode lasts at most; agents that learn find out by themselves.
     every
         Decisions between two tests.
+    final
+        Decisions after which there is a test in any case; None: none.
     agent
         Parameters of `PlanningAgent` that aren't the default.
     search
         How to plan.
+    expert
+        A controller that knows the way to the goal; None: there is none.
     """
 
     name: str
@@ -79,15 +83,23 @@ class Course:
     repeat: int = 1
     limit: int | None = None
     every: int = 50
+    final: int | None = None
     agent: Mapping[str, Any] = field(default_factory=dict)
     search: TreeSearch = field(default_factory=TreeSearch)
+    expert: Callable[[Scene], Any] | None = None
 
 
 COURSES: Final = {
     course.name: course
     for course in (
         Course(
-            "truck", "TruckPush", "relgym/TruckPush-v0", limit=20, search=TreeSearch(horizon=20, batch=512)
+            "truck",
+            "TruckPush",
+            "relgym/TruckPush-v0",
+            limit=20,
+            final=300,
+            search=TreeSearch(horizon=20, batch=512),
+            expert=push_knowing,
         ),
         Course(
             "ball",
@@ -95,8 +107,9 @@ COURSES: Final = {
             "relgym/BallGoal-v0",
             repeat=5,
             limit=100,
+            final=200,
             agent={"commit": 10},
-            search=TreeSearch(horizon=60, batch=512, expansions=8_192),
+            search=TreeSearch(horizon=100),
         ),
     )
 }
@@ -116,6 +129,8 @@ class Arm:
         Whether reward and termination are learned or given.
     explores
         Whether it looks for what is new, or acts at random until it has learned.
+    patience
+        How many times as many real decisions as others it may take.
     """
 
     name: str
@@ -123,6 +138,7 @@ class Arm:
     model: Literal["relational", "neural"] = "relational"
     task: Literal["learned", "given"] = "learned"
     explores: bool = True
+    patience: int = 1
 
 
 ARMS: Final = {
@@ -131,7 +147,7 @@ ARMS: Final = {
         Arm("relgym", "planner, relgym"),
         Arm("relgym-given", "planner, relgym, reward given", task="given"),
         Arm("greedy", "planner, relgym, without exploration", explores=False),
-        Arm("ensemble", "planner, MLP ensemble", model="neural"),
+        Arm("ensemble", "planner, MLP ensemble", model="neural", patience=5),
     )
 }
 
@@ -145,16 +161,24 @@ class Tests:
         Where.
     episodes
         How many, of `EPISODES`.
+    failures
+        Most episodes that may fail: one more ends a test. None: all episodes are played.
+
+    Attributes
+    ----------
+    decisions, seconds
+        Of all tests so far: decisions, and processor time to choose them.
     """
 
-    def __init__(self, course: Course, episodes: int = EPISODES) -> None:
+    def __init__(self, course: Course, episodes: int = EPISODES, *, failures: int | None = None) -> None:
         env = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
         self._env: gym.Env[Any, Any] = ActionRepeat(env, course.repeat) if course.repeat > 1 else env
         self._episodes = episodes
+        self._failures = episodes if failures is None else failures
         self.decisions, self.seconds = 0, 0.0
 
-    def successes(self, agent: Any) -> int:
-        """How many episodes the agent ends well; ``info["is_success"]`` at the end counts."""
+    def successes(self, agent: Any) -> tuple[int, int]:
+        """How many episodes the agent ends well, and of how many; ``info["is_success"]`` at the end counts."""
         good = 0
         for k in range(self._episodes):
             seen, _ = self._env.reset(seed=_FIRST_EPISODE + k)
@@ -168,7 +192,9 @@ class Tests:
                 seen, _, terminated, truncated, info = self._env.step(action)
                 over = terminated or truncated
             good += bool(info["is_success"])
-        return good
+            if k + 1 - good > self._failures:
+                return good, k + 1
+        return good, self._episodes
 
 
 class NeuralSimulator:
@@ -262,68 +288,86 @@ def learning(*, course: str, arm: str, seed: int, steps: int, episodes: int = EP
 
     Returns
     -------
-    ``curve``, (real decisions, successes of 100) at each test; ``solved_at``, decisions at the second good test in a
-    row or None; ``seconds`` of processor time without tests, ``decision``, mean processor time of a decision in the
-    last test, in seconds; ``laws``, what was learned.
+    ``curve``, (real decisions, successes in %) at each test; one that can't succeed any more is broken off, and its
+    share is that of the episodes played. ``solved_at``, decisions at the second good test in a row or None; ``final``,
+    successes in % of a whole test at `Course.final`, or None; ``seconds`` of processor time without tests,
+    ``decision``, mean processor time of a decision in the last test, in seconds; ``laws``, what was learned.
     """
     place = COURSES[course]
     agent = make_agent(place, ARMS[arm], seed=seed)
-    curve: list[tuple[int, int]] = []
-    spent, decision = 0.0, 0.0
-    for at in range(place.every, steps + 1, place.every):
+    spent = 0.0
+
+    def tested(at: int, *, whole: bool = False) -> tuple[int, float]:
+        nonlocal spent
         started = process_time()
         agent.learn(at * place.repeat)
         spent += process_time() - started
-        tests = Tests(place, episodes)
+        most = episodes if whole else episodes * (EPISODES - ENOUGH) // EPISODES
+        tests = Tests(place, episodes, failures=most)
         # Who has only acted at random so far has nothing to show: at most what random actions reach.
-        good = tests.successes(agent) if agent.ready else 0
-        decision = tests.seconds / max(1, tests.decisions)
-        curve.append((at, round(good * 100 / episodes)))
-        print(f"{course}, {arm}, seed {seed}: {good} of {episodes} after {at:,}", file=sys.stderr, flush=True)
+        good, played = tests.successes(agent) if agent.ready else (0, episodes)
+        told = f"{course}, {arm}, seed {seed}: {good} of {played} after {at:,}"
+        print(told, file=sys.stderr, flush=True)
+        return round(good * EPISODES / played), tests.seconds / max(1, tests.decisions)
+
+    curve: list[tuple[int, int]] = []
+    decision = 0.0
+    for at in range(place.every, steps * ARMS[arm].patience + 1, place.every):
+        good, decision = tested(at)
+        curve.append((at, good))
         if solved_at(curve) is not None:
             break
+    final = None if place.final is None else dict(curve).get(place.final)
+    if place.final is not None and final is None and curve and curve[-1][0] < place.final:
+        final = tested(place.final, whole=True)[0]
     describe = getattr(agent.model, "describe", None)
     return {
         "curve": curve,
         "solved_at": solved_at(curve),
+        "final": final,
         "seconds": spent,
         "decision": decision,
         "laws": describe() if describe is not None else "",
     }
 
 
-def knowing(*, explores: bool, seed: int, steps: int, every: int = 25) -> dict[str, Any]:
-    """How many real steps it takes to know TruckPush and its task: laws, reward and end of 99 % of fresh steps.
+def knowing(*, course: str, explores: bool, seed: int, steps: int, every: int = 25) -> dict[str, Any]:
+    """How many real decisions it takes to know a world: of 99 % of fresh steps all laws, and the task if it counts.
 
-    Fresh steps are those of random play and of a controller that knows the way to the goal, in equal shares.
+    Where there is an expert fresh steps are its own and those of random play, in equal shares, and reward and end
+    count. In BallGoal they are those of random play in which the ball touches something: the laws of contacts count.
 
     Parameters
     ----------
+    course
+        Name in `COURSES`.
     explores
         Whether the agent looks for what is new, or acts at random throughout, in whole episodes.
     seed
         Of everything random.
     steps
-        Real steps at most.
+        Real decisions at most.
     every
-        Real steps between two tests.
+        Real decisions between two tests.
 
     Returns
     -------
-    ``curve``: (real steps, share of laws right, share of rewards and ends right) at each test; ``known_at``: real steps
-    at the first test at which both are enough, or None.
+    ``curve``: (real decisions, share of laws right, share of rewards and ends right) at each test; ``known_at``: real
+    decisions at the first test at which both are enough, or None.
     """
-    course = COURSES["truck"]
+    place = COURSES[course]
     options = {} if explores else {"random_steps": 10**9, "restarts": False}
-    agent = make_agent(replace(course, agent={**course.agent, **options}), ARMS["relgym"], seed=seed)
-    fresh = _fresh_steps(course)
+    agent = make_agent(replace(place, agent={**place.agent, **options}), ARMS["relgym"], seed=seed)
+    fresh = _fresh_steps(place)
     curve: list[tuple[int, float, float]] = []
     known_at = None
     for at in range(every, steps + 1, every):
-        agent.learn(at)
+        agent.learn(at * place.repeat)
         laws = float(right(agent.model, [real.transition for real in fresh]).mean())
-        curve.append((at, laws, float(1.0 - agent.mistaken(fresh).mean())))
-        print(f"explores: {explores}, seed {seed}, {at:,}: {curve[-1][1:]}", file=sys.stderr, flush=True)
+        task = 1.0 if place.expert is None else float(1.0 - agent.mistaken(fresh).mean())
+        curve.append((at, laws, task))
+        told = f"{course}, explores: {explores}, seed {seed}, {at:,}: {curve[-1][1:]}"
+        print(told, file=sys.stderr, flush=True)
         if min(curve[-1][1:]) >= _KNOWN:
             known_at = at
             break
@@ -336,43 +380,17 @@ def _fresh_steps(course: Course) -> list[Experience]:
     found: list[Experience] = []
     for k in range(_FRESH):
         env.reset(seed=2 * _FIRST_EPISODE + k)
-        over = False
+        over, step, action = False, 0, None
         while not over:
-            scene = env.get_wrapper_attr("scene")
-            action = env.action_space.sample() if k % 2 else push_knowing(scene)
+            if course.expert is not None and k % 2 == 0:
+                action = course.expert(env.get_wrapper_attr("scene"))
+            elif step % course.repeat == 0:
+                action = env.action_space.sample()
+            touching = course.expert is not None or bool(env.get_wrapper_attr("contacts"))
             _, _, terminated, truncated, _ = env.step(action)
-            over = terminated or truncated
-        found += env.take()
+            over, step = terminated or truncated, step + 1
+            found += env.take() if touching else env.take()[:0]
     return found
-
-
-class ChangingWorld(gym.Wrapper[Any, Any, Any, Any]):
-    """One world at first and another one afterwards, from the next episode on.
-
-    Parameters
-    ----------
-    before, after
-        Worlds with the same spaces.
-    steps
-        So many steps the first one lasts at least.
-    """
-
-    def __init__(self, before: gym.Env[Any, Any], after: gym.Env[Any, Any], steps: int) -> None:
-        super().__init__(before)
-        self._after, self._left = after, steps
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode, in the new world if it is time."""
-        if self._left <= 0:
-            self.env = self._after
-        return self.env.reset(seed=seed, options=options)
-
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Step the world of this episode."""
-        self._left -= 1
-        return self.env.step(action)
 
 
 def recovering(*, seed: int, steps: int, episodes: int) -> dict[str, Any]:
@@ -389,19 +407,31 @@ def recovering(*, seed: int, steps: int, episodes: int) -> dict[str, Any]:
 
     Returns
     -------
-    ``curve``: (real steps since the change, successes of 100 in the world of that time) at each test.
+    ``curve``: (real steps since the change, successes in %) at each test in the world of that time; ``rival``: the same
+    of SAC, which is tested more seldom.
     """
     course = COURSES["truck"]
     half = {**course.arguments, "gravity": GRAVITY / 2.0}
     worlds = [gym.make(course.env_id, disable_env_checker=True, **made) for made in (course.arguments, half)]
-    agent = make_agent(course, ARMS["relgym"], seed=seed, env=ChangingWorld(worlds[0], worlds[1], _CHANGE))
+    world = dyna_arms.ChangingWorld(worlds[0], worlds[1], _CHANGE)
+    agent = make_agent(course, ARMS["relgym"], seed=seed, env=world)
     curve: list[tuple[int, int]] = []
     for at in range(0, steps + 1, course.every):
         agent.learn(_CHANGE + at)
-        tests = Tests(replace(course, arguments=half) if at else course, episodes)
-        curve.append((at, round(tests.successes(agent) * 100 / episodes)))
+        failures = episodes * (EPISODES - ENOUGH) // EPISODES
+        tests = Tests(replace(course, arguments=half) if at else course, episodes, failures=failures)
+        good, played = tests.successes(agent)
+        curve.append((at, round(good * EPISODES / played)))
         print(f"changed world, seed {seed}: {curve[-1]}", file=sys.stderr, flush=True)
-    return {"curve": curve}
+    sac = dyna.run(
+        dyna_arms.COURSES["truck"],
+        dyna_arms.ARMS["sac"],
+        seed=seed,
+        steps=_CHANGE + steps,
+        to_the_end=True,
+        change=dyna_arms.Change(_CHANGE, {"gravity": GRAVITY / 2.0}),
+    )
+    return {"curve": curve, "rival": [(at - _CHANGE, good) for at, good in sac.curve if at >= _CHANGE]}
 
 
 def ceiling(*, course: str, episodes: int = EPISODES) -> dict[str, Any]:
@@ -411,9 +441,9 @@ def ceiling(*, course: str, episodes: int = EPISODES) -> dict[str, Any]:
     objective = Objective(discount=PlanningAgent.DISCOUNT)
     tests = Tests(place, episodes)
     simulator = EnvSimulator(env, repeat=place.repeat)
-    good = tests.successes(Planner(simulator, place.search, objective, limit=place.limit))
+    good, played = tests.successes(Planner(simulator, place.search, objective, limit=place.limit))
     return {
-        "successes": round(good * 100 / episodes),
+        "successes": round(good * 100 / played),
         "decision": tests.seconds / max(1, tests.decisions),
         "episodes": episodes,
     }

@@ -21,6 +21,7 @@ from relgym.errors import ObservationError, QueryError
 from relgym.scene.types import (
     ACTION,
     POSE,
+    STILL,
     TASK,
     TERMINATED,
     Float1D,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ACTION",
     "POSE",
+    "STILL",
     "TASK",
     "TERMINATED",
     "Float1D",

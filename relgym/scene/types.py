@@ -16,6 +16,7 @@ from relgym.scene.shapes import Shape
 __all__ = [
     "ACTION",
     "POSE",
+    "STILL",
     "TASK",
     "TERMINATED",
     "Float1D",
@@ -38,6 +39,9 @@ ACTION = "action"
 
 TASK = "task"
 """Name of the bodiless object whose properties are reward and termination."""
+
+STILL = "still"
+"""Name of the type of the bodiless object that holds what never changes within an episode, in the scenes of a task."""
 
 TERMINATED = "terminated"
 """Property of `task`: 1 where the step ended the episode (terminated, not truncated), else 0."""

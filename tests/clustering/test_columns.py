@@ -76,3 +76,17 @@ def test_slots_by_type_leave_the_target_out() -> None:
     assert signature.slots_by_type == {"action": (1,), "ball": (2, 4), "wall": (3,)}
     assert signature.singleton(3)
     assert not signature.singleton(2)
+
+
+def test_what_never_changes_is_tried_last_for_what_a_step_is_worth() -> None:
+    moving, still, task = (
+        ObjectType("now", ("x",)),
+        ObjectType("still", ("size",)),
+        ObjectType("task", ("reward",)),
+    )
+    signature = SlotSignature((task, moving, still))
+    order, stages = signature.preference(Target("task", "reward"))
+    assert names(signature, order.tolist()) == ["1.x", "2.size"] and stages == (1, 2)
+    assert signature.core == len(signature.columns)  # conditions may speak of it all the same
+    elsewhere = SlotSignature((ObjectType("ball", ("v",)), still))
+    assert elsewhere.preference(Target("ball", "v"))[1] == (2,)

@@ -33,7 +33,14 @@ def tiny(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def made_up(solved_at: int | None, *successes: int, decision: float = 0.02) -> dict[str, Any]:
     curve = [(50 * (k + 1), good) for k, good in enumerate(successes)]
-    return {"curve": curve, "solved_at": solved_at, "seconds": 9.0, "decision": decision, "laws": ""}
+    return {
+        "curve": curve,
+        "solved_at": solved_at,
+        "seconds": 9.0,
+        "decision": decision,
+        "laws": "",
+        "final": None,
+    }
 
 
 def test_a_course_of_learning_is_tested_again_and_again() -> None:

@@ -6,9 +6,9 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
-from pit import Pit
 
 from relgym.errors import ConfigError
+from relgym.experiments.pit import Pit, falls
 from relgym.planning import PlanningAgent, TreeSearch
 from relgym.planning import agent as planning_agent
 
@@ -65,19 +65,6 @@ def test_a_task_that_is_given_must_be_there() -> None:
         PlanningAgent(gym.make("CartPole-v1"), task="given")
 
 
-def falls(agent: PlanningAgent, episodes: int) -> int:
-    env, found = Pit(begin=11.0, steps=20), 0
-    for k in range(episodes):
-        seen, _ = env.reset(seed=k)
-        state, over = None, False
-        while not over:
-            action, state = agent.predict(seen, state)
-            seen, _, terminated, truncated, info = env.step(action)
-            over = terminated or truncated
-        found += info["fallen"]
-    return found
-
-
 def test_a_safe_agent_does_not_walk_into_a_pit_that_it_never_saw() -> None:
     # Six steps lead no farther than 10.03, so while it learns it can't reach the edge: each step forward pays, and that
     # is all it knows.
@@ -86,8 +73,8 @@ def test_a_safe_agent_does_not_walk_into_a_pit_that_it_never_saw() -> None:
         PlanningAgent(Pit(begin=11.0, steps=6), search=search, random_steps=150, safe=safe).learn(150)
         for safe in (False, True)
     )
-    assert falls(bold, 5) == 5
-    assert falls(careful, 20) == 0
+    assert falls(bold, 5, begin=11.0) == 5
+    assert falls(careful, 20, begin=11.0) == 0
 
 
 def test_in_doubt_it_acts_at_random_and_learns_again() -> None:

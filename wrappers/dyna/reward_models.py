@@ -20,7 +20,17 @@ from relgym.model.files.storage import schema_from_json, schema_to_json
 from relgym.model.prediction import BatchPrediction
 from relgym.model.scenes import mismatch
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import ACTION, TASK, Float1D, Float2D, ObjectType, SceneLayout, Target, Transition
+from relgym.scene.objects import (
+    ACTION,
+    STILL,
+    TASK,
+    Float1D,
+    Float2D,
+    ObjectType,
+    SceneLayout,
+    Target,
+    Transition,
+)
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.dyna.acting import acting_all
 from relgym.wrappers.dyna.file_format import RewardModelBody
@@ -74,8 +84,8 @@ class LearnedRewardModel(RewardFunctions):
     """Learns reward and termination as properties of the bodiless object `task`, with modes and clauses.
 
     They are functions of the scene, the action and the next scene. So its model has a schema of its own, without
-    bodies: an object ``now`` with the properties of all objects that are the only one of their type, an object ``next``
-    with those of them that change, the action, and the task.
+    bodies: of all objects that are the only one of their type an object ``now`` with the properties that change, an
+    object ``next`` with the same one step on, and an object ``still`` with the others; the action, and the task.
 
     Parameters
     ----------
@@ -124,10 +134,9 @@ class LearnedRewardModel(RewardFunctions):
         single = [
             (name, schema.type(t)) for name, t in schema.objects if counts[t] == 1 and t not in (ACTION, TASK)
         ]
-        self._now = [(name, prop) for name, t in single for prop in t.properties]
-        self._next = [
-            (name, prop) for name, t in single for prop in t.properties if (t.name, prop) in changing
-        ]
+        every = [(name, t.name, prop) for name, t in single for prop in t.properties]
+        self._moving = [(name, prop) for name, kind, prop in every if (kind, prop) in changing]
+        self._still = [(name, prop) for name, kind, prop in every if (kind, prop) not in changing]
         self._action = schema.type(ACTION).properties if ACTION in schema.order else ()
         self.model = WorldModel(self._small_schema(), config or _EXACT)
         self._ends, self._latest = deque[Float1D](maxlen=_REMEMBERED), deque[Float1D]()
@@ -242,8 +251,9 @@ class LearnedRewardModel(RewardFunctions):
             return named([(name, prop) for name, prop in pairs if prop in kinds[name].flags])
 
         parts = {
-            _NOW: (named(self._now), flags(self._now)),
-            _NEXT: (named(self._next), flags(self._next)),
+            _NOW: (named(self._moving), flags(self._moving)),
+            _NEXT: (named(self._moving), flags(self._moving)),
+            STILL: (named(self._still), flags(self._still)),
             ACTION: (self._action, self.schema.type(ACTION).flags if self._action else ()),
         }
         types = [ObjectType(name, own, flags=known) for name, (own, known) in parts.items() if own]
@@ -262,8 +272,9 @@ class LearnedRewardModel(RewardFunctions):
         """Learn the reward and the end of a real step."""
         before, after = transition.before, transition.after
         values: dict[str, list[float]] = {
-            _NOW: [before[name][prop] for name, prop in self._now],
-            _NEXT: [after[name][prop] for name, prop in self._next],
+            _NOW: [before[name][prop] for name, prop in self._moving],
+            _NEXT: [after[name][prop] for name, prop in self._moving],
+            STILL: [before[name][prop] for name, prop in self._still],
         }
         if self._action:
             values[ACTION] = before[ACTION].values.tolist()
@@ -397,7 +408,8 @@ class LearnedRewardModel(RewardFunctions):
             acting = self._acting or partial(acting_all, self.schema)
             whole, joined = acting(layout, before, actions)
             return joined[:, whole.slice(whole.index(ACTION))]
-        pairs, vectors = (self._now, before) if name == _NOW else (self._next, after)
+        pairs = self._still if name == STILL else self._moving
+        vectors = after if name == _NEXT else before
         found: NDArray[np.float64] = vectors[:, [layout.column(layout.index(o), prop) for o, prop in pairs]]
         return found
 

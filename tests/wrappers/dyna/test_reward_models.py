@@ -310,3 +310,25 @@ def test_actions_come_into_scenes_as_the_env_has_them() -> None:
     np.testing.assert_allclose(told.rewards, [0.0, 1.0, 0.0], atol=1e-6)
     with pytest.raises(ConfigError, match=r"expected 4 numbers for each action.*Lens\(env\)\.acting"):
         LearnedRewardModel(schema, {("self", "x")}).evaluate(bare, nothing, choices, nothing)
+
+
+def test_what_a_reward_is_made_of_is_found_among_all_that_stays_the_same() -> None:
+    # Four laws, one for each side of the goal, in scenes of sixty properties, most of them constants of an episode.
+    env = TransitionRecorder(gym.make("relgym/BallGoal-v0", disable_env_checker=True))
+    env.action_space.seed(3)
+    steps: list[Experience] = []
+    for k in range(40):
+        env.reset(seed=k)
+        action = env.action_space.sample()
+        for _ in range(15):
+            env.step(action)
+        steps += env.take()
+    moving = {("ball", prop) for prop in ("px", "py", "vx", "vy")} | {
+        ("goal", prop) for prop in ("dx", "dy", "held")
+    }
+    reward_model = LearnedRewardModel(steps[0].start.schema, moving)
+    for k in np.random.default_rng(0).permutation(450):
+        reward_model.learn_step(steps[k].transition, steps[k].reward, terminated=steps[k].terminated)
+    fresh = steps[450:]
+    off = np.abs(verdicts(reward_model, fresh).rewards - [s.reward for s in fresh])
+    assert (off <= 1e-9).mean() >= 0.9
