@@ -170,10 +170,16 @@ def test_a_ball_that_still_overlaps_is_not_pushed_again() -> None:
     for episode in trial_episodes(1, [110, 111], 80):
         truth = episode.truth
         for step in range(1, len(episode)):
-            if not truth.pushing[step - 1] & (truth.touched[step] - truth.pushing[step]) or truth.corner[step]:
+            if (
+                not truth.pushing[step - 1] & (truth.touched[step] - truth.pushing[step])
+                or truth.corner[step]
+            ):
                 continue
             velocity, after = episode.columns("ball", "vx", "vy")[step : step + 2]
-            for again, row in ((after * [1, 0] + velocity * [0, -0.9], 5), (after * [0, 1] + velocity * [-0.9, 0], 0)):
+            for again, row in (
+                (after * [1, 0] + velocity * [0, -0.9], 5),
+                (after * [0, 1] + velocity * [-0.9, 0], 0),
+            ):
                 if np.abs(again - after).max() > 1e-6:
                     cause = cause_of(episode, step, 1, again)
                     assert cause in (CAUSES[row], "delayed falling")
