@@ -261,6 +261,8 @@ def _ball_truth(
         mode_names={"ball.vx": tuple(m.name for m in modes.x), "ball.vy": tuple(m.name for m in modes.y)},
         active=np.array([len(contacts) for contacts in acting]),
         corner=np.array([any(c.corner for c in contacts) for contacts in acting]),
+        touched=tuple(frozenset(c.other for c in contacts) for contacts in log),
+        pushing=tuple(frozenset(c.other for c in contacts) for contacts in acting),
     )
 
 

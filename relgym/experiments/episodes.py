@@ -32,12 +32,16 @@ class Truth:
     corner : bool array of shape ``(n,)``
         Whether one of those was with a corner: its normal depends on the geometry, so no linear mode
         explains it.
+    touched, pushing : tuples of n sets of names
+        What the ball overlapped, and what of that changed its velocity; empty where no ball is.
     """
 
     mode: Mapping[str, Int1D]
     mode_names: Mapping[str, tuple[str, ...]]
     active: Int1D
     corner: NDArray[np.bool_]
+    touched: tuple[frozenset[str], ...] = ()
+    pushing: tuple[frozenset[str], ...] = ()
 
 
 @dataclass(frozen=True)

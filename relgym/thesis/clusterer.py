@@ -10,7 +10,7 @@ from relgym.clustering.population import ClusterReport
 from relgym.scene.objects import SceneLayout
 from relgym.thesis.examples import Arrangement, Examples
 from relgym.thesis.modes import Cluster, roles_of
-from relgym.thesis.ransac import search, varied
+from relgym.thesis.ransac import Union, search, varied
 from relgym.thesis.regression import fit
 from relgym.thesis.settings import ThesisSettings
 
@@ -174,7 +174,7 @@ class Clusterer:
     def _unified(self, new: Cluster, members: Rows) -> Cluster | None:
         """Replace a mode and another one by one function for the examples of both; none if there is no such."""
         for old in self.clusters:
-            general = None if old is new else self._general(self.members(old.number), members)
+            general = None if old is new else self._general(old, new, members)
             if general is None or not _occam(general, old, new):
                 continue
             both = np.concatenate([self.members(old.number), members])
@@ -189,9 +189,19 @@ class Clusterer:
             return general
         return None
 
-    def _general(self, old: Rows, new: Rows) -> Cluster | None:
+    def _own(self, cluster: Cluster, members: Rows) -> NDArray[np.bool_]:
+        """Which of a mode's examples no other one explains; all of them if there are no such."""
+        others = [self._errors[c.number][members] for c in self.clusters if c is not cluster]
+        if not others:
+            return np.ones(len(members), dtype=np.bool_)
+        own: NDArray[np.bool_] = np.min(others, axis=0) > self._tolerance
+        return own if own.any() else ~own
+
+    def _general(self, first: Cluster, second: Cluster, new: Rows) -> Cluster | None:
         """A function for most of both, of the target and of objects that are alone of their type."""
+        old = self.members(first.number)
         rows = np.concatenate([old, new])
+        counted = np.concatenate([self._own(first, old), self._own(second, new)])
         groups = np.unique(self.examples.groups[rows]).tolist()
         arrangements = [self.examples.arrangements[g] for g in groups]
         shared = _shared(arrangements)
@@ -201,8 +211,8 @@ class Clusterer:
             flat = [c for part in columns for c in part]
             x[here] = self.examples.x(group, rows[here])[:, flat]
         ratio = self.settings.unify_ratio
-        wanted = (int(np.ceil(ratio * len(old))), int(np.ceil(ratio * len(new))))
-        found = search(x, self.examples.y[rows], self.settings, self._rng, wanted=wanted, old=len(old))
+        united = Union(len(old), counted, ratio)
+        found = search(x, self.examples.y[rows], self.settings, self._rng, united)
         if found.line is None:
             return None
         flat = [c for part in shared[0] for c in part]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relgym.thesis.regression import Line, fit, fit_samples
 from relgym.thesis.settings import ThesisSettings
 
-__all__ = ["Consensus", "search", "varied"]
+__all__ = ["Consensus", "Union", "search", "varied"]
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -53,14 +53,39 @@ class Consensus:
         return int(self.inliers.sum())
 
 
+@dataclass(frozen=True, slots=True)
+class Union:
+    """What a search for a function of two modes' examples must find (§3.2.5).
+
+    Attributes
+    ----------
+    old
+        How many rows are the first mode's; they come first.
+    counted
+        Rows that count, shape ``(n,)``.
+    ratio
+        Least share of those of each mode that fits.
+    """
+
+    old: int
+    counted: NDArray[np.bool_]
+    ratio: float
+
+    def enough(self, fits: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Whether a line does for both; `fits` has shape ``(n, lines)``."""
+        shown: NDArray[np.bool_] = np.ones(fits.shape[1], dtype=np.bool_)
+        for part in (slice(None, self.old), slice(self.old, None)):
+            counted = self.counted[part]
+            shown &= fits[part][counted].sum(axis=0) >= math.ceil(self.ratio * int(counted.sum()))
+        return shown
+
+
 def search(
     x: Floats,
     y: Floats,
     settings: ThesisSettings,
     rng: np.random.Generator,
-    *,
-    wanted: tuple[int, int] | None = None,
-    old: int = 0,
+    union: Union | None = None,
 ) -> Consensus:
     """Draw samples until the line through one fits enough rows, or N were drawn.
 
@@ -70,11 +95,8 @@ def search(
         Rows and responses, shapes ``(n, d)`` and ``(n,)``.
     settings
         T, N, σ and how samples are drawn.
-    wanted
-        For unification: least inliers among the first `old` rows, and among the others, from each of which a sample
-        takes half. Default: T of all.
-    old
-        How many rows come first.
+    union
+        For unification: a sample takes half of its rows from either mode. Default: T of all rows must fit.
 
     Notes
     -----
@@ -95,52 +117,42 @@ def search(
     while done < draws:
         count = min(_AT_ONCE, draws - done)
         done += count
-        samples = _samples(shown, count, old, settings, rng)
+        samples = _samples(shown, count, union.old if union else 0, settings, rng)
         columns, weights, intercepts = fit_samples(shown[samples], y[samples], settings.noise_variance)
         fits = _inliers(shown, y, columns, weights, intercepts, tolerance)
         sizes = fits.sum(axis=0)
-        for k in _promising(sizes, fits, wanted, old, best.size, settings):
+        for k in _promising(sizes, fits, union, best.size, settings):
             line = _line(varying, columns[k], weights[k], float(intercepts[k]))
             found = Consensus(line, fits[:, k])
             if found.size <= best.size:
                 continue
             if not verified(found):
                 continue
-            if wanted is None and settings.cross_check and not _holds(x, y, found, settings):
+            if union is None and settings.cross_check and not _holds(x, y, found, settings):
                 continue
             best = found
-            if _enough(best.inliers, wanted, old, settings):
+            if union is not None or best.size >= settings.min_examples:
                 return best
-        if settings.adaptive_draws and wanted is None:
+        if settings.adaptive_draws and union is None:
             draws = min(settings.draws, _draws(best.size, n, width))
-    return best if wanted is None else none
+    return best
 
 
 def _promising(
     sizes: NDArray[np.int64],
     fits: NDArray[np.bool_],
-    wanted: tuple[int, int] | None,
-    old: int,
+    union: Union | None,
     best: int,
     settings: ThesisSettings,
 ) -> list[int]:
     """Samples, in their order, whose line may be better than the best one."""
-    if wanted is not None:
-        enough = (fits[:old].sum(axis=0) >= wanted[0]) & (fits[old:].sum(axis=0) >= wanted[1])
-        return [int(k) for k in np.flatnonzero(enough)]
+    if union is not None:
+        return [int(k) for k in np.flatnonzero(union.enough(fits))]
     found = []
     for k in np.flatnonzero(sizes > max(best, 2)).tolist():
         if sizes[k] > best or sizes[k] >= settings.min_examples:
             found.append(int(k))
     return found
-
-
-def _enough(
-    inliers: NDArray[np.bool_], wanted: tuple[int, int] | None, old: int, settings: ThesisSettings
-) -> bool:
-    if wanted is None:
-        return int(inliers.sum()) >= settings.min_examples
-    return int(inliers[:old].sum()) >= wanted[0] and int(inliers[old:].sum()) >= wanted[1]
 
 
 def _draws(size: int, n: int, width: int) -> int:

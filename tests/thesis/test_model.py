@@ -55,12 +55,15 @@ def test_experiment_1_has_the_modes_of_table_4_2(models: dict[str, ThesisModel],
 
 
 def test_its_clauses_are_those_of_table_4_3(models: dict[str, ThesisModel]) -> None:
-    (x, _) = models["thesis"].report().targets
-    straight = next(m.mode for m in x.modes if m.function == "vx' = vx")
-    bounce = next(m.mode for m in x.modes if m.function == "vx' = -0.9 vx")
-    (pair,) = [p for p in x.pairs if {p.mode, p.other} == {straight, bounce}]
-    assert {"¬intersect(A, *)", "¬y-aligned(A, *)"} <= {row.clause for row in pair.rows}
-    assert pair.performance > 0.99
+    """The program's; those of chapter III tell the two apart as well, by whichever are right more often (§3.4.5)."""
+    for name, model in models.items():
+        (x, _) = model.report().targets
+        straight = next(m.mode for m in x.modes if m.function == "vx' = vx")
+        bounce = next(m.mode for m in x.modes if m.function == "vx' = -0.9 vx")
+        (pair,) = [p for p in x.pairs if {p.mode, p.other} == {straight, bounce}]
+        assert pair.performance > 0.99
+        if name == "original":
+            assert {"¬intersect(A, *)", "¬y-aligned(A, *)"} == {row.clause for row in pair.rows[:2]}
 
 
 def test_bounces_fail_and_flights_do_not(models: dict[str, ThesisModel]) -> None:
@@ -76,7 +79,7 @@ def test_bounces_fail_and_flights_do_not(models: dict[str, ThesisModel]) -> None
         wrong = np.abs(found.vectors[:, column] - after[:, column]) > 1e-9
         rates = {name: wrong[truth == k].mean() for k, name in enumerate(names) if (truth == k).any()}
         assert rates["fly"] < 0.01 and rates["slide, floor"] < 0.01
-        assert rates["bounce, floor"] > 0.05  # looks like sliding (§4.3.4)
+        assert rates["bounce, floor"] > max(0.02, 3.0 * rates["slide, floor"])  # looks like sliding (§4.3.4)
         assert found.parts == (("ball", "vx"), ("ball", "vy"))
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.thesis.ransac import _draws, _inliers, _samples, search, varied
+from relgym.thesis.ransac import Union, _draws, _inliers, _samples, search, varied
 from relgym.thesis.settings import ThesisSettings
 
 PRESETS = [ThesisSettings.thesis(), ThesisSettings.original()]
@@ -40,10 +40,14 @@ def test_unification_needs_both_sides() -> None:
     rng = np.random.default_rng(0)
     x = rng.normal(size=(100, 2))
     y = x[:, 0].copy()
-    args = (PRESETS[0], np.random.default_rng(1))
-    assert search(x, y, *args, wanted=(63, 27), old=70).line is not None
+    args, every = (PRESETS[0], np.random.default_rng(1)), np.ones(100, dtype=np.bool_)
+    assert search(x, y, *args, Union(70, every, 0.9)).line is not None
     y[70:] = x[70:, 1]
-    assert search(x, y, *args, wanted=(63, 27), old=70).line is None
+    assert search(x, y, *args, Union(70, every, 0.9)).line is None
+    few = every.copy()
+    few[75:] = False  # of the second mode's examples all but five have another explanation
+    y[70:75] = x[70:75, 0]
+    assert search(x, y, *args, Union(70, few, 0.9)).line is not None
 
 
 def test_columns_that_seldom_change_must_have_taken_values_enough() -> None:

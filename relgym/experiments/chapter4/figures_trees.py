@@ -17,7 +17,7 @@ from relgym.numeric.tree import DecisionTree
 __all__ = ["trees_shown"]
 
 _FIGURES: Final[Mapping[str, tuple[str, str, int, int]]] = {
-    "4.2": ("4.2", "y", 1, 3),
+    "4.2": ("4.2", "y", 1, 4),
     "4.10": ("4.9", "x", 1, 2),
     "4.11": ("4.9", "y", 4, 5),
 }

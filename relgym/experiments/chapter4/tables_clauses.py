@@ -8,7 +8,7 @@ from typing import Any, Final
 from relgym.experiments.chapter4.canvas import PRINTED, TITLES, text_figure
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
-from relgym.experiments.chapter4.published import MODES, PublishedPair, published_pairs
+from relgym.experiments.chapter4.published import MODES, published_pairs, rows_of_pair
 from relgym.experiments.chapter4.tables_modes import best_run, row_of
 from relgym.model.reports.text import Cell, table
 
@@ -39,7 +39,7 @@ def clauses_shown(_: Protocol, values: Values, number: str) -> Shown:
         for learner, runs in values.items()
         if target in best_run(runs)["modes"]
     }
-    return _pairs_shown(published_pairs(number), named)
+    return _pairs_shown(number, named)
 
 
 def pushing_clauses_shown(_: Protocol, values: Values) -> Shown:
@@ -48,7 +48,7 @@ def pushing_clauses_shown(_: Protocol, values: Values) -> Shown:
     for learner, runs in values.items():
         rows = {int(mode): row + 1 for mode, row in runs[0]["stated"].items()}
         named[learner] = _renamed(runs[0], "truck.vx", rows)
-    return _pairs_shown(published_pairs("3.2"), named)
+    return _pairs_shown("3.2", named)
 
 
 _Pairs = Mapping[frozenset[int], Mapping[str, Any]]
@@ -69,10 +69,10 @@ def _renamed(run: Mapping[str, Any], target: str, rows: Mapping[int, int]) -> _P
     return pairs
 
 
-def _pairs_shown(sections: Sequence[PublishedPair], named: Mapping[str, _Pairs]) -> Shown:
+def _pairs_shown(number: str, named: Mapping[str, _Pairs]) -> Shown:
     texts: list[str] = []
     data: list[list[Cell]] = [["learner", "mode", "other", *_HEADING]]
-    for section in sections:
+    for section in published_pairs(number):
         lines: list[list[Cell]] = [
             [c.clause, c.correct, c.incorrect, "yes" if c.tree else "no"] for c in section.clauses
         ]
@@ -84,7 +84,7 @@ def _pairs_shown(sections: Sequence[PublishedPair], named: Mapping[str, _Pairs])
         ]
         data += [[PRINTED, section.mode, section.other, *line] for line in lines]
         for learner, pairs in named.items():
-            pair = pairs.get(frozenset((section.mode, section.other)))
+            pair = pairs.get(rows_of_pair(number, section))
             if pair is None:
                 parts.append((f"{TITLES[learner]}: has not both modes", []))
                 continue
@@ -96,7 +96,10 @@ def _pairs_shown(sections: Sequence[PublishedPair], named: Mapping[str, _Pairs])
             )
             data += [[learner, pair["mode"], pair["other"], *line] for line in own]
         texts.append(_section(parts))
-    note = "Modes are numbered as in the thesis. The default learner needs no clauses where laws of contacts govern."
+    note = (
+        "Modes of ours are numbered as in the thesis' table of modes. The default learner needs no clauses where laws "
+        "of contacts govern."
+    )
     return Shown("\n\n".join([*texts, note]), data)
 
 

@@ -140,6 +140,12 @@ def test_roll_outs_and_why_they_fail() -> None:
         assert trial["failed"] == bool((errors > 1e-2).any()) == (trial["cause"] in CAUSES)
         if trial["failed"]:
             assert (errors[:, : trial["begins"]] <= 1e-6).all()
+        for step, cause in trial["mended"]:
+            assert cause in CAUSES[:2] and trial["imagined"][step] == trial["real"][step]
+        assert trial["mended"] or trial["unmended"]["cause"] == trial["cause"]
+        # What is mended happens before anything else goes wrong, and would have been the failure.
+        if trial["mended"] and trial["unmended"]["cause"]:
+            assert trial["unmended"]["cause"] == trial["mended"][0][1]
 
 
 def test_causes_come_from_what_really_happened() -> None:
@@ -147,7 +153,8 @@ def test_causes_come_from_what_really_happened() -> None:
     for episode in trial_episodes(1, [110], 16):
         names = episode.truth.mode_names["ball.vx"]
         for step in range(len(episode)):
-            cause = cause_of(episode, step, 1)
+            wild = episode.columns("ball", "vx", "vy")[step] + 0.37  # what no surface does
+            cause = cause_of(episode, step, 1, wild)
             if episode.truth.corner[step]:
                 assert cause == "bounce against a corner"
             elif episode.truth.active[step] > 1:
@@ -156,6 +163,29 @@ def test_causes_come_from_what_really_happened() -> None:
                 causes.setdefault(names[episode.truth.mode["ball.vx"][step]], []).append(cause)
     assert set(causes["bounce, left face"]) == set(causes["bounce, slope"]) == {"misclassified ramp bounce"}
     assert set(causes["fly"]) == {"misclassified contact with a level surface"}
+
+
+def test_a_ball_that_still_overlaps_is_not_pushed_again() -> None:
+    found: dict[str, int] = {}
+    for episode in trial_episodes(1, [110, 111], 80):
+        truth = episode.truth
+        for step in range(1, len(episode)):
+            if (
+                not truth.pushing[step - 1] & (truth.touched[step] - truth.pushing[step])
+                or truth.corner[step]
+            ):
+                continue
+            velocity, after = episode.columns("ball", "vx", "vy")[step : step + 2]
+            for again, row in (
+                (after * [1, 0] + velocity * [0, -0.9], 5),
+                (after * [0, 1] + velocity * [-0.9, 0], 0),
+            ):
+                if np.abs(again - after).max() > 1e-6:
+                    cause = cause_of(episode, step, 1, again)
+                    assert cause in (CAUSES[row], "delayed falling")
+                    found[cause] = found.get(cause, 0) + 1
+            assert not cause_of(episode, step, 1, after + 0.37).startswith("bad collision")
+    assert min(found[CAUSES[0]], found[CAUSES[5]]) > 3
 
 
 def test_several_contacts_at_once_belong_to_the_simplest_mode_that_explains_them() -> None:
