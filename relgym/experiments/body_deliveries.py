@@ -58,13 +58,16 @@ def delivered(*, arm: str, seed: int, episodes: int) -> dict[str, Any]:
         setup = dyna_arms.ARMS["sac20"]
         agent: Any = dyna_arms.make_agent(setup, dyna_arms.make_env(course, arm=setup), seed=seed)
         agent.learn(REAL // DELIVERY.repeat)
-        testing: Any = dyna.Examination(course, episodes)
+        testing = dyna.Examination(course, episodes).successes
     else:
         model = Arm(arm, ARMS[arm], "neural" if arm == "ensemble" else "relational", "given")
         agent = make_agent(DELIVERY, model, seed=seed)
         agent.learn(REAL)
-        testing = Tests(DELIVERY, episodes)
+
+        def testing(agent: Any) -> int:
+            return Tests(DELIVERY, episodes).successes(agent)[0]
+
     learning = process_time() - started
-    good = testing.successes(agent)
+    good = testing(agent)
     seconds = process_time() - started - learning
     return {"good": int(good), "episodes": episodes, "learning": learning, "testing": seconds}

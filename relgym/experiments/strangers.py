@@ -36,7 +36,7 @@ from relgym.experiments.any_env_data import Study, stream
 from relgym.files.writing import write_whole
 from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import OUTCOMES, Outcome
-from relgym.model.running import KERNEL
+from relgym.model.compiled import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
