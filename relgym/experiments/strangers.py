@@ -34,9 +34,9 @@ from relgym.envs.views import NumbersView
 from relgym.errors import DataError
 from relgym.experiments.any_env_data import Study, stream
 from relgym.files.writing import write_whole
+from relgym.model.compiled import KERNEL
 from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import OUTCOMES, Outcome
-from relgym.model.compiled import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
