@@ -110,8 +110,8 @@ class OnlineRidge:
         scaled = np.where(alive[:, None] & alive, covariance / (std_of[:, None] * std_of), 0.0)
         level = self._moments[:, 0] / n
         slope = np.where(alive, (self._moments[:, 1:] / n - level[:, None] * mean) / std_of, 0.0)
-        inverse = np.linalg.inv(scaled + (PENALTY / n) * np.eye(len(scaled)))
-        solved = (slope @ inverse.T) / std_of
+        inverse = _inverse(scaled + (PENALTY / n) * np.eye(len(scaled)))
+        solved = np.einsum("rj,ij->ri", slope, inverse) / std_of
         if np.isfinite(solved).all():
             self.mean = mean
             # What never varied has no leverage: nothing is known of what it does, and the weights leave it out.
@@ -166,3 +166,20 @@ class OnlineRidge:
     def due(self) -> int:
         """Number of rows at which weights are solved anew."""
         return self._due
+
+
+def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The inverse of a symmetric, positive definite matrix: Gauss-Jordan, which needs no pivots there.
+
+    Elementwise, so that it is the same to the bit whatever version of a linear algebra library lies behind NumPy, and
+    however many threads that would begin. Cost O(d^3): 2 ms for 120 columns, some 30 for 320.
+    """
+    found, change = matrix.copy(), np.empty_like(matrix)
+    for k in range(len(found)):
+        pivot = 1.0 / found[k, k]
+        row, column = found[k] * pivot, found[:, k].copy()
+        found -= np.multiply(column[:, None], row, out=change)
+        found[:, k] = -column * pivot
+        found[k] = row
+        found[k, k] = pivot
+    return found

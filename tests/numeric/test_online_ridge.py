@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from relgym.config.constants import SUMMABLE
-from relgym.numeric.online_ridge import GROWTH, PENALTY, OnlineRidge
+from relgym.numeric.online_ridge import GROWTH, PENALTY, OnlineRidge, _inverse
 
 
 def rows(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -135,3 +135,13 @@ def test_leverage_is_that_of_standardised_columns() -> None:
     assert np.array(one).tobytes() == ridge.leverage(x).tobytes()
     assert ridge.leverage(np.full((1, x.shape[1]), 1e200))[0] == np.inf
     assert OnlineRidge(2).leverage(np.zeros((1, 2)))[0] == np.inf  # nothing is known
+
+
+@pytest.mark.parametrize("columns", [0, 1, 7, 40])
+def test_the_inverse_is_one_whatever_solves_it(columns: int) -> None:
+    rng = np.random.default_rng(columns)
+    x = rng.normal(size=(3 * columns, columns)) * np.exp(rng.normal(size=columns))
+    matrix = x.T @ x / max(1, len(x)) + 1e-3 * np.eye(columns)
+    found = _inverse(matrix)
+    assert np.abs(found @ matrix - np.eye(columns)).max(initial=0.0) < 1e-10
+    assert (found == _inverse(matrix.copy(order="F"))).all()  # however it lies in memory
