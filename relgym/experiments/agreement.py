@@ -133,7 +133,8 @@ def _scenes(layout: SceneLayout, vectors: Float2D, count: int) -> Float2D:
     by = rng.choice(_SHAKEN, size=(count, 1)) * np.std(vectors, axis=0)
     for index in layout.bodies:
         by[:, [layout.offsets[index] + k for k in layout.types[index].pose_columns()[3:] if k >= 0]] = 0.0
-    return found + by * rng.normal(size=found.shape)
+    shaken: Float2D = found + by * rng.normal(size=found.shape)
+    return shaken
 
 
 def agreement(taught: Taught, *, scenes: int, exported: int) -> Agreement:
