@@ -129,7 +129,9 @@ def test_the_core_needs_five_libraries_alone() -> None:
         for i in m.imports
         if _third_party(i) and (m.name, _distribution(i)) not in {(FCL, "fcl"), (MACHINE, "llvmlite")}
     ]
-    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, fcl in {FCL}, llvmlite in {MACHINE}\n" + "\n".join(wrong)
+    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, fcl in {FCL}, llvmlite in {MACHINE}\n" + "\n".join(
+        wrong
+    )
 
 
 @pytest.mark.parametrize(("library", "user"), [("fcl", FCL), ("llvmlite", MACHINE)])
