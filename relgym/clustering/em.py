@@ -61,17 +61,16 @@ class Cluster:
     def error_one(self, table: ExampleTable, row: int, x: list[float], y: float, scale: Scale) -> float:
         """`errors` of one example, whose row of the table is ``x``; the same bits."""
         binding = self.binding(table, int(table.signature_ids[row]))
-        if binding is not None and not binding.open:
-            return abs(binding.value(x) - y)
-        return self.closest_one(table, row, y, scale)[0]
+        if binding is None:
+            return np.inf
+        return binding.closest_one(x, y, scale.sigma)[0] if binding.open else abs(binding.value(x) - y)
 
     def closest_one(self, table: ExampleTable, row: int, y: float, scale: Scale) -> tuple[float, int]:
         """`errors` of one example by the number of its row: the smallest residual, and the assignment's number."""
         binding = self.binding(table, int(table.signature_ids[row]))
         if binding is None:
             return np.inf, 0
-        error, assignment = binding.closest(table.x[row : row + 1], np.array([y]), scale.sigma)
-        return float(error[0]), int(assignment[0])
+        return binding.closest_one(table.x[row].tolist(), y, scale.sigma)
 
     def idle(self, table: ExampleTable, rows: NDArray[np.integer], tolerance: float) -> NDArray[np.bool_]:
         """Where the own role's terms all vanish and no other object has a say, shape ``(n,)``."""

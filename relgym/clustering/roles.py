@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -100,6 +101,17 @@ class Binding:
         best = errors.min(axis=1)
         return best, np.argmax(errors <= best[:, None] + slack, axis=1)
 
+    def closest_one(self, x: list[float], y: float, slack: float) -> tuple[float, int]:
+        """`closest` of one row; the same bits."""
+        if len(self.open) != 1:
+            error, assignment = self.closest(np.array([x]), np.array([y]), slack)
+            return float(error[0]), int(assignment[0])
+        errors = [abs(self.value(x, (slot,)) - y) for slot in self.assignments[:, 0].tolist()]
+        if any(map(math.isnan, errors)):
+            return math.nan, 0
+        best = min(errors)
+        return best, next(k for k, error in enumerate(errors) if error <= best + slack)
+
     @property
     def slots(self) -> NDArray[np.intp]:
         """Slot of every role but the target's under each assignment, shape ``(a, roles)``."""
@@ -109,7 +121,8 @@ class Binding:
 
     def roles_of(self, assignment: int) -> tuple[int, ...]:
         """Slot of every role but the target's under the given row of `assignments`."""
-        return tuple(int(s) for s in self.slots[assignment])
+        played = iter(self.assignments[assignment].tolist())
+        return tuple(next(played) if slot < 0 else slot for slot in self.forced)
 
 
 def bind(mode: Mode, signature: SlotSignature) -> Binding | None:

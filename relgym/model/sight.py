@@ -6,6 +6,9 @@ hundred. What the kernel can't look at is left to them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from threading import Lock
 from typing import NamedTuple
 
 import numpy as np
@@ -75,22 +78,34 @@ class Sight:
     ) -> None:
         check_bodies(extractor.axes, extractor.geometry, layout)
         program = _program(extractor, layout, numbers, parting=parting)
-        self._space = encoded(program).space()
-        self._machine, self._parting = machine, parting
+        self._space, self._parting, self._turn = encoded(program).space(), parting, Lock()
         count, width = len(program.bodies), len(program.facts) + numbers.shape[1]
-        self._shapes = (1, len(program.relations), count, count), (1, count), (1, count, width)
+        self._now = np.empty(program.width)
+        self._table = np.empty((1, len(program.relations), count, count), dtype=np.bool_)
+        self._close, self._struck = np.empty((2, 1, count), dtype=np.bool_)
+        self._pair, self._order = np.empty((1, count, width)), np.empty((1, count), dtype=np.int64)
+        told = self._now, self._table, self._close, self._struck, self._pair, self._order
+        self._see = partial(_see, machine.see, self._space.ctypes.data, *(each.ctypes.data for each in told))
 
     def see(self, vector: NDArray[np.float64], body: int) -> Seen | None:
         """What a body sees of a scene; None: arrays must look, or can say why not."""
-        square, row, block = self._shapes
-        told = np.empty(square, dtype=np.bool_), np.empty(row, dtype=np.bool_), np.empty(row, dtype=np.bool_)
-        pair, order = np.empty(block), np.empty(row, dtype=np.int64)
-        vector = np.ascontiguousarray(vector, dtype=np.float64)
-        places = (each.ctypes.data for each in (vector, *told, pair, order))
-        if self._machine.see(self._space.ctypes.data, body, *places):
-            return None
-        table, close, struck = told
-        return Seen(table, close, struck if self._parting else None, pair, order[:, 1:])
+        with self._turn:  # another thread may look before this one has copied what it saw
+            self._now[:] = vector
+            if self._see(body):
+                return None
+            return Seen(
+                self._table.copy(),
+                self._close.copy(),
+                self._struck.copy() if self._parting else None,
+                self._pair.copy(),
+                self._order[:, 1:].copy(),
+            )
+
+
+def _see(call: Callable[..., int], space: int, now: int, *places: int) -> int:
+    """Let the kernel look at a scene for a body, whose number comes last."""
+    *told, body = places
+    return call(space, body, now, *told)
 
 
 def _program(

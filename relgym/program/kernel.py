@@ -211,7 +211,7 @@ def place(s, k):
     count, n = s.code[at + CORNERS], s.code[at + OUTLINE] + 4
     width, height = s.x[s.code[at + COL_SX]], s.x[s.code[at + COL_SY]]
     angle = s.x[s.code[at + COL_ANGLE]] * s.numbers[TURN]
-    cos, sin = (1.0, 0.0) if angle == 0.0 else (math.cos(angle), math.sin(angle))
+    cos, sin = (1.0, angle) if angle == 0.0 else (math.cos(angle), math.sin(angle))  # zeros have signs
     for v in range(count):
         w = v + 1 if v + 1 < count else 0
         a, b = s.numbers[n + 2 * v] * width, s.numbers[n + 2 * v + 1] * height
@@ -220,7 +220,7 @@ def place(s, k):
         if up == 0.0:  # what the root and the quotients would be, to the last bit
             length, across, down = abs(along), 0.0, -1.0 if along > 0.0 else 1.0
         elif along == 0.0:
-            length, across, down = abs(up), 1.0 if up > 0.0 else -1.0, 0.0
+            length, across, down = abs(up), 1.0 if up > 0.0 else -1.0, -0.0
         else:
             length = math.sqrt(along * along + up * up)
             across, down = up / length, -along / length

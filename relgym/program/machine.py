@@ -165,7 +165,9 @@ def _write(file: Path, code: bytes) -> None:
 
 
 def _built() -> bytes | None:
-    """What a process of its own compiles; None: it failed."""
+    """What a process of its own compiles, or this one, if there is no Python to begin another; None: it failed."""
+    if not sys.executable or getattr(sys, "frozen", False):
+        return build()
     code = f"import sys; sys.path[:] = {sys.path!r}; from relgym.program.machine import main; main()"
     quiet: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     try:

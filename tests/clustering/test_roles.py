@@ -97,6 +97,19 @@ def test_the_closest_assignment_explains_and_ties_go_to_the_first() -> None:
     assert [binding.roles_of(int(a)) for a in assignment] == [(2,), (2,)]
 
 
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2]), st.sampled_from([0.0, 0.3]))
+def test_the_closest_assignment_of_one_row(seed: int, roles: int, slack: float) -> None:
+    rng = np.random.default_rng(seed)
+    binding = bind(mode_of(("v", 1.0), others=[friction(-0.3 * (k + 1)) for k in range(roles)]), THREE)
+    assert binding is not None
+    x, y = rng.normal(size=(1, 8)), rng.normal(size=1)
+    x[rng.random(x.shape) < 0.05] = np.nan
+    (error,), (assignment,) = binding.closest(x, y, slack)
+    np.testing.assert_array_equal(binding.closest_one(x[0].tolist(), float(y[0]), slack), (error, assignment))
+    slots = tuple(binding.slots[assignment].tolist())
+    assert binding.roles_of(int(assignment)) == slots
+
+
 @given(st.integers(0, 2**32 - 1))
 def test_one_row_gives_the_same_bits_as_many(seed: int) -> None:
     rng = np.random.default_rng(seed)

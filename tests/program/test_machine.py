@@ -61,6 +61,15 @@ def test_where_compiling_fails_there_is_none(
     assert not empty_folder.exists()
 
 
+def test_without_a_python_to_begin_this_process_compiles(
+    empty_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", None)
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: pytest.fail("a process was begun"))
+    assert machine.make() is not None
+    assert len(list(empty_folder.iterdir())) == 1
+
+
 def test_its_name_says_what_it_was_made_from(monkeypatch: pytest.MonkeyPatch) -> None:
     import llvmlite
 
