@@ -19,7 +19,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import HOPELESS
+from relgym.config.constants import HOPELESS, SEARCHED_CELLS
 from relgym.model.calibration import EXPERTS, OWN, Assessment, Calibration, Key
 from relgym.model.grouping import distinct, members
 from relgym.model.perception import Percept, Situation
@@ -121,6 +121,7 @@ class PropertyModel:
         self.surmise = False
         self.leaned_on = False
         self._unsettled = True
+        self._unmeasured = False
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -174,8 +175,11 @@ class PropertyModel:
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
-        if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
+        self._unmeasured |= self.clusterer.seen % MEASURE_EVERY == 0
+        if report.changed or (self._unmeasured and (budget is None or budget.left)):
             self._measure(table)
+            if budget is not None:  # so that not all of many targets are measured in the same step
+                budget.spend(SEARCHED_CELLS)
         refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
         if report.changed or refuted or self.stops.contradicted(report.mode, situation.signature, x[0]):
             self._follow(table)
@@ -233,6 +237,7 @@ class PropertyModel:
 
     def _measure(self, table: ExampleTable) -> None:
         """How far examples scatter, and how far approximations go."""
+        self._unmeasured = False
         self.spreads = measure(self.clusterer, table)
         # Of bodies relations may tell what the numbers of a row don't.
         bodiless = not any(t.has_body for t in self.schema.types)
