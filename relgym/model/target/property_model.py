@@ -48,8 +48,8 @@ DOUBTFUL = 500
 """With most of so many recent examples unexplained there is hardly a law."""
 
 
-RECENT, LEFT = 200, 0.05
-"""Where a larger share of so many recent examples is unexplained, regressions may know better."""
+LEFT = 0.05
+"""Where a larger share of the latest `HOPELESS` examples is unexplained, regressions may know better."""
 
 
 _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
@@ -171,7 +171,7 @@ class PropertyModel:
         seen = self._with_next(example, situation.signature, x, len(self.clusterer.y))
         self._compare(situation, seen, x[0], y)
         report = self.clusterer.learn_one(table, row, y, budget)
-        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
+        self._unsettled = _noisy(self.clusterer.labels[-HOPELESS:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
