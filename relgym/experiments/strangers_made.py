@@ -51,7 +51,7 @@ class Shop(gym.Env[dict[str, NDArray[Any]], NDArray[np.int64]]):
     """Goods are ordered, come a day later, and are sold as long as there are any; prices drift."""
 
     def __init__(self, goods: int = 3) -> None:
-        self.observation_space = spaces.Dict(
+        self.observation_space: spaces.Space[Any] = spaces.Dict(
             {
                 "stock": spaces.Box(0, 50, (goods,), np.int64),
                 "coming": spaces.Box(0, 5, (goods,), np.int64),
@@ -117,5 +117,5 @@ class Maze(gym.Env[NDArray[np.int64], np.int64]):
         return np.array([*self._at, self._left]), 0.0, False, self._left == 0, {}
 
 
-for _id, _env in zip(MADE, (Oscillators, Shop, Maze), strict=True):
-    gym.register(_id, _env, max_episode_steps=200)
+for _id, _name in zip(MADE, ("Oscillators", "Shop", "Maze"), strict=True):
+    gym.register(_id, f"{__name__}:{_name}", max_episode_steps=200)
