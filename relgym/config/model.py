@@ -47,7 +47,7 @@ class ModelConfig:
         some 20 ms, so that no step takes longer than a frame at 25 Hz.
     saved_cells
         Cells that are saved for later where nothing is to be searched, and that there are to begin with. Default
-        500,000,000, some 2 s: worlds that can be understood are, before it is spent.
+        1,000,000,000, some 4 s: worlds that can be understood are, before it is spent.
     frames
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
@@ -92,7 +92,7 @@ class ModelConfig:
     work_per_step: int = 400_000
     cells_per_step: int = 250_000
     most_cells: int = 5_000_000
-    saved_cells: int = 500_000_000
+    saved_cells: int = 1_000_000_000
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()
     hypotheses: tuple[str, ...] = ()

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from relgym.envs.views import NumbersView
 from relgym.errors import DataError
 from relgym.experiments.any_env_data import Study, stream
+from relgym.experiments.strangers_made import MADE
 from relgym.files.writing import write_whole
 from relgym.model.compiled import KERNEL
 from relgym.model.fitting import compare_and_learn
@@ -52,7 +53,15 @@ NAMED: Final = (
 )
 """What thresholds may be chosen on."""
 
-FINAL: Final = ("Hopper-v5", "Pusher-v5", "Acrobot-v1", "Swimmer-v5")
+FINAL: Final = (
+    "Hopper-v5",
+    "Pusher-v5",
+    "Acrobot-v1",
+    "Swimmer-v5",
+    "Walker2d-v5",
+    "MountainCarContinuous-v0",
+    *MADE,
+)
 """What nothing was chosen on."""
 
 STEPS: Final = 2_000

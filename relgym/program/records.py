@@ -465,7 +465,7 @@ class Reach:
 # ---------------------------------------------------------------------------------------------- who is believed
 @dataclass(frozen=True, slots=True)
 class Leverage:
-    """How far a regression's word counts at a leverage h: ``bias / (bias + left ((1 + h)^2 - 1))``, 0 without bias.
+    """How far the word of a regression counts at leverage h: ``bias / (bias + left ((1 + h)^2 - 1))``, 0 without bias.
 
     Attributes
     ----------

@@ -19,7 +19,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import HOPELESS
+from relgym.config.constants import HOPELESS, SEARCHED_CELLS
 from relgym.model.calibration import EXPERTS, OWN, Assessment, Calibration, Key
 from relgym.model.grouping import distinct, members
 from relgym.model.perception import Percept, Situation
@@ -48,8 +48,8 @@ DOUBTFUL = 500
 """With most of so many recent examples unexplained there is hardly a law."""
 
 
-RECENT, LEFT = 200, 0.05
-"""Where a larger share of so many recent examples is unexplained, regressions may know better."""
+LEFT = 0.05
+"""Where a larger share of the latest `HOPELESS` examples is unexplained, regressions may know better."""
 
 
 _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
@@ -121,6 +121,7 @@ class PropertyModel:
         self.surmise = False
         self.leaned_on = False
         self._unsettled = True
+        self._unmeasured = False
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -170,12 +171,15 @@ class PropertyModel:
         seen = self._with_next(example, situation.signature, x, len(self.clusterer.y))
         self._compare(situation, seen, x[0], y)
         report = self.clusterer.learn_one(table, row, y, budget)
-        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
+        self._unsettled = _noisy(self.clusterer.labels[-HOPELESS:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
-        if report.changed or self.clusterer.seen % MEASURE_EVERY == 0:
+        self._unmeasured |= self.clusterer.seen % MEASURE_EVERY == 0
+        if report.changed or (self._unmeasured and (budget is None or budget.left)):
             self._measure(table)
+            if budget is not None:  # so that not all of many targets are measured in the same step
+                budget.spend(SEARCHED_CELLS)
         refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
         if report.changed or refuted or self.stops.contradicted(report.mode, situation.signature, x[0]):
             self._follow(table)
@@ -233,6 +237,7 @@ class PropertyModel:
 
     def _measure(self, table: ExampleTable) -> None:
         """How far examples scatter, and how far approximations go."""
+        self._unmeasured = False
         self.spreads = measure(self.clusterer, table)
         # Of bodies relations may tell what the numbers of a row don't.
         bodiless = not any(t.has_body for t in self.schema.types)

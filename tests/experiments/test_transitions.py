@@ -1,0 +1,29 @@
+"""How many transitions it takes, counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relgym.experiments.transitions import WINDOW, WORLDS, World, course, falling, main, sliding
+
+
+@pytest.mark.parametrize(("make", "changed"), [(falling, {"gravity": 0.5}), (sliding, {"friction": 0.1})])
+def test_a_law_is_found_and_found_again_when_it_changes(make: object, changed: dict[str, float]) -> None:
+    found = course(World(make, 200, changed), 0)  # type: ignore[arg-type]
+    assert found.first is not None and found.first <= 20
+    assert found.again is not None and found.again <= 2 * found.first
+    assert 1 <= found.slips <= 3  # nobody knows before the first miss
+    assert found.off <= 0.02
+    assert found.late == 1.0
+
+
+def test_what_never_is_right_is_told_so(capsys: pytest.CaptureFixture[str]) -> None:
+    found = course(World(lambda: falling(np.pi), WINDOW - 1), 0)
+    assert found.first is None  # no so many steps in a row
+    main(["sliding, friction doubled", "--seeds", "3"])
+    told = capsys.readouterr().out
+    assert "sliding, friction doubled" in told and "100.0%" in told
+    with pytest.raises(SystemExit):
+        main(["nowhere"])
+    assert all(world.steps > WINDOW for world in WORLDS.values())
