@@ -52,7 +52,8 @@ pushes boxes in a room, or boxes fall and topple; relgym reads the laws of conta
 a time, and is then asked of scenes that it never saw. A *contact step* is one transition of one body that touches
 something; it is right if both components of the velocity and the turning rate are, and every one counts. Of what is
 neither right nor wrong relgym says that it doesn't know. *worst* and *median* are over training seeds (410 to 414; *of*
-says how many), on which nothing was chosen; all are tested on the same scenes. An episode has 200 steps.
+says how many: where it is fewer than five, no more were run), on which nothing was chosen; all are tested on the same
+scenes. An episode has 200 steps.
 
 Where boxes lie on each other the engine itself (pymunk, 10,000 sweeps a step) doesn't always come to an end. Its own
 residual is the change of a velocity when the same step is solved with twice as many sweeps: steps at which that is
