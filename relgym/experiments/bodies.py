@@ -52,7 +52,8 @@ pushes boxes in a room, or boxes fall and topple; relgym reads the laws of conta
 a time, and is then asked of scenes that it never saw. A *contact step* is one transition of one body that touches
 something; it is right if both components of the velocity and the turning rate are, and every one counts. Of what is
 neither right nor wrong relgym says that it doesn't know. *worst* and *median* are over training seeds (410 to 414; *of*
-says how many), on which nothing was chosen. An episode has 200 steps.
+says how many: where it is fewer than five, no more were run), on which nothing was chosen; all are tested on the same
+scenes. An episode has 200 steps.
 
 Where boxes lie on each other the engine itself (pymunk, 10,000 sweeps a step) doesn't always come to an end. Its own
 residual is the change of a velocity when the same step is solved with twice as many sweeps: steps at which that is
@@ -139,6 +140,14 @@ def _shares(name: str, found: Sequence[Any], right: float, wrong: float, test: i
     ]
 
 
+def _sizes(extent: Extent, episodes: int | None = None, tests: int | None = None) -> str:
+    """How much was learned from, and tested on."""
+    learned, tested = (
+        200 * min(most, some or most) for most, some in ((extent.episodes, episodes), (extent.tests, tests))
+    )
+    return f"Each seed: learned from {learned:,} transitions, tested on {tested:,}."
+
+
 def _said(name: str, found: Sequence[Any]) -> list[str]:
     """What was learned with the first seed."""
     return [f"{name}: {row}" for row in found[0]["laws"]] if found else []
@@ -169,7 +178,7 @@ def _pushing(extent: Extent, known: Known) -> Section:
                 f"much in 100 steps (median; at most {grown[-1]:.2g})"
             )
     notes += _said("with friction and elasticity", found)
-    return "pushing", [*measures, *rolls], notes
+    return "pushing", [*measures, *rolls], [_sizes(extent), *notes]
 
 
 def _stacks(extent: Extent, known: Known) -> Section:
@@ -178,7 +187,8 @@ def _stacks(extent: Extent, known: Known) -> Section:
         setting = Setting(("box",) * 3, 0.5, elasticity, gravity=9.8, driven=False)
         found = _laws(known, extent, setting, episodes=PART, tolerance=CLOSE, checked=True)
         measures += _shares(f"gravity, friction 0.5, elasticity {elasticity:g}", found, 98.0, 0.2)
-    return "boxes that fall, bounce, topple and stack (to 1e-6)", measures, []
+    title = "boxes that fall, bounce, topple and stack (to 1e-6)"
+    return title, measures, [_sizes(extent, PART)]
 
 
 def _masses(extent: Extent, known: Known) -> Section:
@@ -194,7 +204,7 @@ def _masses(extent: Extent, known: Known) -> Section:
                 measures.append(measured(f"{name}: largest relative error of {what}", limit, errors))
         measures += _shares(name, found, 99.9, 0.05)
         notes += [row for row in _said(name, found) if "mass" in row]
-    return "masses that aren't seen", measures, notes
+    return "masses that aren't seen", measures, [_sizes(extent, 2 * PART), *notes]
 
 
 def _transfer(extent: Extent, known: Known) -> Section:
@@ -208,7 +218,7 @@ def _transfer(extent: Extent, known: Known) -> Section:
         found = _laws(known, extent, home, *others.values(), episodes=PART)
         for k, name in enumerate(others):
             measures += _shares(f"friction {friction:g}, {name}", found, 99.9, 0.05, k)
-    return "learned with two boxes, used with others", measures, []
+    return "learned with two boxes, used with others", measures, [_sizes(extent, PART)]
 
 
 FORCES: Final = {
@@ -244,7 +254,8 @@ def _forces(extent: Extent, known: Known) -> Section:
                 wrong = [Tally(*each[key]).wrong_share for each in models]
                 what = f"{name}, the whole model {when}: claimed and wrong, %"
                 measures.append(measured(what, 0.1, wrong))
-    return "other forces", measures, notes
+    whole = f"The whole model: {_sizes(extent, FEW_EPISODES, FEW_EPISODES)}"
+    return "other forces", measures, [f"Laws: {_sizes(extent, PART)}", whole, *notes]
 
 
 def _strange(extent: Extent, known: Known) -> Section:
@@ -253,7 +264,7 @@ def _strange(extent: Extent, known: Known) -> Section:
         some = replace(extent, seeds=extent.seeds[:FEW], tests=min(extent.tests, FEW_EPISODES))
         found = _laws(known, some, setting, episodes=PART, tolerance=CLOSE, checked=True)
         measures += _shares(name, found, 98.0, 0.1)
-    return "worlds that nothing was made for (to 1e-6)", measures, []
+    return "worlds that nothing was made for (to 1e-6)", measures, [_sizes(extent, PART, FEW_EPISODES)]
 
 
 _FALLING: Final = Setting(("box",) * 3, 0.5, gravity=9.8, driven=False)
@@ -289,7 +300,11 @@ def _models(extent: Extent, known: Known) -> Section:
         measured("scenes claimed and wrong, %", 0.05, [each["scenes"][1] for each in found]),
         measured("learning from a transition, ms", 3.0, [each["cost"] for each in found]),
     ]
-    return "the whole model, three boxes", measures if found else [], []
+    return (
+        "the whole model, three boxes",
+        measures if found else [],
+        [_sizes(extent, PART // 2, FEW_EPISODES)],
+    )
 
 
 def _deliveries(extent: Extent, known: Known) -> Section:

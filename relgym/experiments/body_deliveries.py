@@ -5,9 +5,15 @@ from __future__ import annotations
 from time import process_time
 from typing import Any, Final
 
+import gymnasium as gym
+
 from relgym.experiments import dyna, dyna_arms
-from relgym.experiments.plan import Arm, Course, Tests, make_agent
-from relgym.planning import TreeSearch
+from relgym.experiments.plan import Course, NeuralSimulator, Tests
+from relgym.model.fitting import compare_and_learn
+from relgym.model.world_model import WorldModel
+from relgym.planning import ModelSimulator, Objective, Planner, PlanningAgent, TreeSearch
+from relgym.planning.simulators import Simulator
+from relgym.wrappers.dyna.recorder import TransitionRecorder
 
 __all__ = ["ARMS", "REAL", "delivered"]
 
@@ -20,7 +26,6 @@ DELIVERY: Final = Course(
     "relgym/BoxPush-v0",
     repeat=10,
     limit=100,
-    agent={"random_steps": REAL, "restarts": False},
     search=TreeSearch(horizon=30, batch=256, expansions=4_096),
 )
 """How parcels are delivered: a decision lasts ten steps. Who pushes gets nothing before he is behind the parcel; a tree
@@ -31,7 +36,7 @@ ARMS: Final = {
     "ensemble": "the same search in an ensemble of nets",
     "sac": "SAC, 20 updates a decision",
 }
-"""Names and titles. Both models learn from random actions and plan with the reward that the env states."""
+"""Names and titles. Both models learn from the same random actions, and plan with the reward that the env states."""
 
 
 def delivered(*, arm: str, seed: int, episodes: int) -> dict[str, Any]:
@@ -60,9 +65,8 @@ def delivered(*, arm: str, seed: int, episodes: int) -> dict[str, Any]:
         agent.learn(REAL // DELIVERY.repeat)
         testing = dyna.Examination(course, episodes).successes
     else:
-        model = Arm(arm, ARMS[arm], "neural" if arm == "ensemble" else "relational", "given")
-        agent = make_agent(DELIVERY, model, seed=seed)
-        agent.learn(REAL)
+        objective = Objective(discount=PlanningAgent.DISCOUNT)
+        agent = Planner(_simulator(arm, seed), DELIVERY.search, objective, limit=DELIVERY.limit)
 
         def testing(agent: Any) -> int:
             return Tests(DELIVERY, episodes).successes(agent)[0]
@@ -71,3 +75,38 @@ def delivered(*, arm: str, seed: int, episodes: int) -> dict[str, Any]:
     good = testing(agent)
     seconds = process_time() - started - learning
     return {"good": int(good), "episodes": episodes, "learning": learning, "testing": seconds}
+
+
+def _simulator(arm: str, seed: int) -> Simulator:
+    """What was learned from random actions, transition by transition, with the env's own reward."""
+    env = TransitionRecorder(gym.make(DELIVERY.env_id, disable_env_checker=True))
+    schema: Any = env.get_wrapper_attr("schema")
+    task: Any = env.get_wrapper_attr("task")
+    if arm == "relgym":
+        model: Any = WorldModel(schema)
+    else:
+        from relgym.baselines.ensemble import MLPEnsemble
+        from relgym.baselines.neural_world import NeuralWorldModel
+        from relgym.wrappers.flat import FlatView
+
+        # The nets see the scene as a policy does: relative and scaled, which is to their advantage.
+        features = FlatView(env).get_wrapper_attr("flattener")
+        model = NeuralWorldModel(schema, features=features, ensemble=MLPEnsemble(seed=seed))
+    env.action_space.seed(seed)
+    env.reset(seed=seed)
+    action = None
+    for step in range(REAL):
+        if step % DELIVERY.repeat == 0:
+            action = env.action_space.sample()  # who changes his mind at every step gets nowhere
+        _, _, terminated, truncated, _ = env.step(action)
+        for real in env.take():
+            if arm == "relgym":
+                compare_and_learn(model, real.transition, model.predict_one(real.transition.before))
+            else:
+                model.learn_one(real.transition)
+        if terminated or truncated:
+            env.reset()
+    if arm == "relgym":
+        model.finish()
+        return ModelSimulator(model, env, task=task, repeat=DELIVERY.repeat)
+    return NeuralSimulator(model, env, DELIVERY.repeat, task)

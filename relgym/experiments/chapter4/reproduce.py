@@ -28,6 +28,7 @@ __all__ = ["Made", "compute", "make", "page", "section"]
 PAGES: Final = {
     "dream.md": "What dreaming is worth",
     "plan.md": "What planning is worth",
+    "bodies.md": "Bodies that push, turn and stack",
     "any-env.md": "Other people's envs",
 }
 """Pages of results beside this one, and their titles."""
