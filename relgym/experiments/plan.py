@@ -108,7 +108,7 @@ COURSES: Final = {
             limit=100,
             final=200,
             agent={"commit": 10},
-            search=TreeSearch(horizon=100),
+            search=TreeSearch(horizon=100, batch=256),
         ),
     )
 }
