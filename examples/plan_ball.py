@@ -37,7 +37,7 @@ class Args:
 def main(args: Args) -> None:
     """Explore, print what was learned, plan."""
     # The way round an obstacle pays less at first: a tree goes there, too.
-    search = TreeSearch(horizon=60, batch=512, expansions=args.expansions)
+    search = TreeSearch(horizon=100, batch=256, expansions=args.expansions)
     agent = PlanningAgent(
         gym.make("relgym/BallGoal-v0"),
         task=args.task,

@@ -109,7 +109,7 @@ COURSES: Final = {
             limit=100,
             final=200,
             agent={"commit": 10},
-            search=TreeSearch(horizon=100),
+            search=TreeSearch(horizon=100, batch=256),
         ),
     )
 }
@@ -407,8 +407,8 @@ def recovering(*, seed: int, steps: int, episodes: int) -> dict[str, Any]:
 
     Returns
     -------
-    ``curve``: (real steps since the change, successes in %) at each test in the world of that time; ``rival``: the same
-    of SAC, which is tested more seldom.
+    ``curve``: (real steps since the change, successes in %) at each test in the world of that time; ``baseline``: the
+    same of SAC, which is tested more seldom.
     """
     course = COURSES["truck"]
     half = {**course.arguments, "gravity": GRAVITY / 2.0}
@@ -431,7 +431,7 @@ def recovering(*, seed: int, steps: int, episodes: int) -> dict[str, Any]:
         to_the_end=True,
         change=dyna_arms.Change(_CHANGE, {"gravity": GRAVITY / 2.0}),
     )
-    return {"curve": curve, "rival": [(at - _CHANGE, good) for at, good in sac.curve if at >= _CHANGE]}
+    return {"curve": curve, "baseline": [(at - _CHANGE, good) for at, good in sac.curve if at >= _CHANGE]}
 
 
 def ceiling(*, course: str, episodes: int = EPISODES) -> dict[str, Any]:

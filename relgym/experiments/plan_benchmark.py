@@ -38,10 +38,11 @@ _HEAD: Final = """# What planning is worth
 `relgym benchmark plan` wrote this page, but for what stands below the tables, which it leaves alone. An agent begins
 with random actions, learns the world's laws, and searches in what it has learned: nothing is trained. Success is 90 of
 100 in two tests of the same fixed episodes in a row, one test every 50 real decisions; the figure is the second test.
-Seeds are 0 to 9, on which nothing was chosen; where a table is of fewer, no more were run, and where tests had fewer
-than 100 episodes the table says so. *learning* is processor time without tests, of a whole run; *decision* that of one
-decision in the last test, with the searches that the plans it followed had cost. The rows of SAC and Dyna are those of
-the [page on dreaming](dream.md), tested every 250 decisions. The [guide](../guides/planning.md) says how it works."""
+A test that can't succeed any more is broken off, and its share is that of the episodes played. Seeds are 0 to 9, on
+which nothing was chosen; where a table is of fewer, no more were run, and where tests had fewer than 100 episodes the
+table says so. *learning* is processor time without tests, of a whole run; *decision* that of one decision in the last
+test, with the searches that the plans it followed had cost. The rows of SAC and Dyna are those of the
+[page on dreaming](dream.md), tested every 250 decisions. The [guide](../guides/planning.md) says how it works."""
 
 _LIMITS: Final[Mapping[tuple[str, str], tuple[int, int | None]]] = {
     ("truck", "relgym"): (300, 400),

@@ -65,10 +65,10 @@ class Foreign:
         As for `Planner`.
     good
         Whether an episode was solved, by its last observation.
-    rival, settings
+    baseline, settings
         Stable-Baselines3's algorithm and its parameters: those of rl-baselines3-zoo.
     limit, every
-        Real steps that the rival may take, and between two tests of it.
+        Real steps that the baseline may take, and between two tests of it.
     """
 
     title: str
@@ -77,7 +77,7 @@ class Foreign:
     search: Search
     commit: int | None
     good: Callable[[Any], bool]
-    rival: str
+    baseline: str
     settings: Mapping[str, Any]
     limit: int
     every: int
@@ -218,10 +218,10 @@ def agent_alone(*, name: str, seed: int, episodes: int = 100, enough: int = 95) 
             if self.num_timesteps % place.every:
                 return True
             curve.append((self.num_timesteps, _solved(place, self.model, episodes)[0]))
-            print(f"{name}, {place.rival}, seed {seed}: {curve[-1]}", file=sys.stderr, flush=True)
+            print(f"{name}, {place.baseline}, seed {seed}: {curve[-1]}", file=sys.stderr, flush=True)
             return curve[-1][1] < enough
 
-    made = getattr(stable_baselines3, place.rival)
+    made = getattr(stable_baselines3, place.baseline)
     made("MlpPolicy", place.env_id, seed=seed, device="cpu", **place.settings).learn(
         place.limit, callback=Check()
     )

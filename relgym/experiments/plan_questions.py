@@ -125,17 +125,17 @@ def _change_told(found: Sequence[tuple[Task, Any]]) -> tuple[list[Measure], list
     rows: list[list[Cell]] = []
     back, ahead = [], []
     for task, value in found:
-        curve, rival = value["curve"], value["rival"]
+        curve, baseline = value["curve"], value["baseline"]
         again = next((at for at, good in curve[1:] if good >= ENOUGH), None)
         back.append(_CHANGED + 50 if again is None else again)
         at_once = dict(map(tuple, curve))
-        ahead += [good - at_once[at] for at, good in rival if at in at_once]
+        ahead += [good - at_once[at] for at, good in baseline if at in at_once]
         rows.append(
             [
                 str(task.arguments["seed"]),
                 ", ".join(str(good) for _, good in curve),
                 "never" if again is None else str(again),
-                ", ".join(f"{good} after {at}" for at, good in rival),
+                ", ".join(f"{good} after {at}" for at, good in baseline),
             ]
         )
     measures = []
@@ -187,7 +187,7 @@ def _foreign_told(found: Sequence[tuple[Task, Any]]) -> tuple[list[Measure], lis
     measures: list[Measure] = []
     rows: list[list[Cell]] = []
     for name, place in FOREIGN.items():
-        own, rival = (
+        own, baseline = (
             [value for task, value in found if task.name == function and task.arguments["name"] == name]
             for function in ("planned", "agent_alone")
         )
@@ -201,11 +201,11 @@ def _foreign_told(found: Sequence[tuple[Task, Any]]) -> tuple[list[Measure], lis
                 f"{1000 * median(value['decision'] for value in own):.1f} ms",
             ]
             rows.append([place.title, "planner, relgym", "1,000", ", ".join(map(str, good)), *costs])
-        if rival:
-            at = [value["solved_at"] for value in rival]
+        if baseline:
+            at = [value["solved_at"] for value in baseline]
             steps = ", ".join(f"> {place.limit:,}" if one is None else f"{one:,}" for one in at)
-            good = [value["curve"][-1][1] for value in rival]
-            rows.append([place.title, place.rival, steps, ", ".join(map(str, good)), "-", "-"])
+            good = [value["curve"][-1][1] for value in baseline]
+            rows.append([place.title, place.baseline, steps, ", ".join(map(str, good)), "-", "-"])
     return measures, [table(["env", "agent", "real steps", "successes of 100", "learning", "decision"], rows)]
 
 

@@ -22,7 +22,7 @@ from relgym.planning.doubts import DoubtedTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
 from relgym.planning.review import learned_again, length, missed, mixed, right
-from relgym.planning.rollouts import Objective, Plan
+from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
 from relgym.planning.simulators import ModelSimulator, Simulator
 from relgym.planning.tree import TreeSearch
@@ -79,7 +79,7 @@ _BANG: Final = 0.5
 identified with binary noise: nothing excites a world more, and limits show where it is driven to them."""
 
 _LATEST: Final = 50
-"""Latest real steps by which the agent doubts its model, and episodes whose first plans tell what others promise."""
+"""Latest real steps by which the agent doubts its model."""
 
 
 @refusing_calls(ConfigError)
@@ -106,8 +106,7 @@ class PlanningAgent:
         Steps at random at first; in each episode actions are held for another number of decisions.
     restarts
         Whether it may begin a new episode when it likes: most of those at random are then short, and teach more of what
-        differs between episodes, and those in which it explores end when others promise more that is new. Leave it out
-        where a reset is expensive; steps are counted, resets aren't.
+        differs between episodes. Leave it out where a reset is expensive; steps are counted, resets aren't.
     exploration
         What a state that shows nothing but new pairs of values is worth while learning, in units of what a step pays
         (root mean square so far); 0: it does what the model says pays. Steps of unknown outcome count as entirely new.
@@ -193,7 +192,6 @@ class PlanningAgent:
         self._begun = 0
         self._wrong: deque[bool] = deque(maxlen=_LATEST)
         self._task_wrong: deque[bool] = deque(maxlen=_LATEST)
-        self._promises: deque[float] = deque(maxlen=_LATEST)
         self._at_random = True
         self._next_review = _FIRST_REVIEW
         self._size = Spread()
@@ -301,9 +299,6 @@ class PlanningAgent:
                     self._lasts = int(self._rng.choice(_LENGTHS, p=_LENGTH_SHARES))
                     self._hold = min(self._hold, max(1, self._lasts // _DIFFERENT))
             action = self._choose(self._observation)
-            if action is None:  # there is more to learn elsewhere
-                self._observation = None
-                continue
             self._observation, _, terminated, truncated, _ = self.env.step(action)
             for real in self._recorder.take():
                 self._take_up(real)
@@ -333,40 +328,19 @@ class PlanningAgent:
         return self._at_work(explores=False).predict(observation, state, episode_start, deterministic)
 
     def _choose(self, observation: Any) -> Any:
-        """A random action at first and while nothing is known, then the next of a plan; None: give the episode up."""
+        """A random action at first and while nothing is known; then the next of a plan."""
         if self._at_random:
             return self._random()
         assert self._thread is not None, "made with the episode"
-        searches = self._thread.searches
         try:
             action = self._at_work(explores=True).act(observation, self._thread)
         except QueryError:  # no target known yet
             return self._random()
         plan = self._thread.plan
-        if plan is None or self.exploration == 0.0:
-            return action
-        if self._thread.searches > searches and not self._goes_on(plan):
-            return None
-        if not plan.known and len(plan) == 1:
+        if plan is not None and not plan.known and len(plan) == 1:
             # Whatever it does now, it doesn't know what will happen: as at first.
             return self._random()
         return action
-
-    def _goes_on(self, plan: Plan) -> bool:
-        """Whether a new plan is worth following, or another episode promises more that is new.
-
-        An animal leaves a bush when it finds fewer berries there than it has been finding on the whole (the marginal
-        value theorem, Charnov 1976). What a new episode promises is what the first plans of the latest ones did.
-        """
-        assert self._thread is not None and self.coverage is not None, "made with the first step"
-        unknown = float(not plan.known)
-        promise = (float(self.coverage.novelty(plan.states[1:]).sum()) + unknown) / len(plan)
-        if self._thread.decisions == 1:
-            self._promises.append(promise)
-            return True
-        if plan.terminates or not (self.restarts and self._promises):
-            return True
-        return promise >= float(np.mean(self._promises))
 
     def _random(self) -> Any:
         left, action = self._held

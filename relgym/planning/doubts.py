@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relgym.arguments import refusing_calls
 from relgym.envs.tasks import RewardFunctions, TaskOutcome
 from relgym.errors import ConfigError
 from relgym.numeric.version_space import VersionSpace
-from relgym.scene.objects import TASK, Float2D, SceneLayout
+from relgym.scene.objects import TASK, Float1D, Float2D, SceneLayout
 from relgym.wrappers.dyna.reward_models import LearnedRewardModel
 
 __all__ = ["DoubtedTask"]
@@ -36,9 +37,11 @@ class DoubtedTask(RewardFunctions):
 
     Here each pair of modes of reward and end is compared with the rules (`VersionSpace`) that hold of all remembered
     steps of which the pair was right and of none of which its claim is wrong. Where only a share of them holds the step
-    is worth that share of what the model says; the rest counts as if the worst of all known modes held. And what was
-    paid beyond the model's word is expected again by the share of the rules that tell these steps from all others,
-    which is why an agent returns to where it was rewarded, and stays near to it.
+    is worth that share of what the model says; the rest counts as what is usual, if that is less: the median of what
+    all modes would say, each weighed by its examples, so that a bonus counts for nothing. Where the model doesn't know
+    which mode holds, what is usual is all that counts: what happens there is known, and a plan may lead through. And
+    what was paid beyond the model's word is expected again by the share of the rules that tell these steps from all
+    others, which is why an agent returns to where it was rewarded, and stays near to it.
 
     Parameters
     ----------
@@ -69,18 +72,17 @@ class DoubtedTask(RewardFunctions):
         rewards, ended, modes = self.model.outcomes(vectors)
         self._review()
         known = np.isfinite(rewards)
-        worth = rewards.copy()
+        share, least = known.astype(np.float64), np.full(len(vectors), np.inf)
         for pair, group in self._groups.items():
             rows = np.flatnonzero(known & (modes[:, 0] == pair[0]) & (modes[:, 1] == pair[1]))
-            if not len(rows):
-                continue
-            share = group.rules.share(vectors[rows])
-            rows, share = rows[share < 1.0], share[share < 1.0]
-            if not len(rows):
-                continue
-            others = self.model.claims(vectors[rows], ended[rows])
-            worst = np.minimum.reduce([group.worst + np.zeros(len(rows)), *others.values()])
-            worth[rows] = share * rewards[rows] + (1.0 - share) * np.minimum(worst, rewards[rows])
+            share[rows], least[rows] = group.rules.share(vectors[rows]), group.otherwise
+        worth = rewards.copy()
+        doubtful = np.flatnonzero(share < 1.0)
+        if len(doubtful):
+            usual = self._usual(vectors[doubtful], ended[doubtful])
+            said = np.where(known[doubtful], rewards[doubtful], usual)
+            rest = np.minimum(np.minimum(usual, said), least[doubtful])
+            worth[doubtful] = share[doubtful] * said + (1.0 - share[doubtful]) * rest
         if self._beyond is not None:
             share = self._beyond.rules.share(vectors)
             if self._beyond.ends:  # or it would be paid in one plan again and again
@@ -88,6 +90,18 @@ class DoubtedTask(RewardFunctions):
                 share = np.where(ended, share, 0.0)
             worth += self._beyond.surplus * share
         return TaskOutcome(worth, ended, np.zeros(len(before), dtype=bool))
+
+    def _usual(self, vectors: Float2D, ended: NDArray[np.bool_]) -> Float1D:
+        """The median of what all modes of the reward say of n steps, by their examples; NaN if there is no mode."""
+        modes, said = self.model.claims(vectors, ended)
+        if not modes:
+            return np.full(len(vectors), np.nan)
+        order = np.argsort(said, axis=1, kind="stable")
+        examples = np.cumsum(np.array([mode.examples for mode in modes])[order], axis=1)
+        middle = (2 * examples >= examples[:, -1:]).argmax(axis=1)
+        every = np.arange(len(vectors))
+        found: Float1D = said[every, order[every, middle]]
+        return found
 
     def _review(self) -> None:
         """Draw the rules again when there is something new to tell apart."""
@@ -104,22 +118,23 @@ class DoubtedTask(RewardFunctions):
         self._state = state
         rewards, ended, pairs = own.outcomes(lessons)
         right = (np.abs(paid - rewards) <= _RIGHT) & (ended == over)
-        claims = own.claims(lessons, over)
+        known, claims = own.claims(lessons, over)
         # Where nothing is known: beyond the most that any mode would have said.
-        told = np.where(np.isfinite(rewards), rewards, np.max([*claims.values()], axis=0, initial=-np.inf))
+        told = np.where(np.isfinite(rewards), rewards, claims.max(axis=1, initial=-np.inf))
         surplus = np.where(np.isfinite(told), paid - told, 0.0)
         features = own.unsaid(lessons)
         self._groups = {}
         for reward, end in sorted(set(map(tuple, pairs[right].tolist()))):
             mine = (pairs[:, 0] == reward) & (pairs[:, 1] == end)
             ends_so = bool(over[mine & right].all())
-            false = (np.abs(claims[reward] - paid) > _RIGHT) | (over != ends_so)
+            own_claim = claims[:, [mode.id for mode in known].index(reward)]
+            false = (np.abs(own_claim - paid) > _RIGHT) | (over != ends_so)
             if not false.any():
                 continue
             rules = VersionSpace(features[mine & right], features[false], rng=self._rng)
             if rules.found:
-                worst = float(paid[mine & ~right].min(initial=np.inf))
-                self._groups[reward, end] = _Group(rules, worst)
+                wrong = paid[mine & ~right]
+                self._groups[reward, end] = _Group(rules, float(wrong.mean()) if len(wrong) else np.inf)
         self._beyond = None
         if (most := float(surplus.max(initial=0.0))) > _RIGHT:
             # What is paid in several places for several reasons isn't told apart from the rest by one rule.
@@ -131,10 +146,10 @@ class DoubtedTask(RewardFunctions):
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """A pair of modes: rules that tell where it holds, and the least that was paid where it was wrong."""
+    """A pair of modes: rules that tell where it holds, and what was paid on average where it was wrong."""
 
     rules: VersionSpace
-    worst: float
+    otherwise: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,8 +45,8 @@ def test_exploration_is_compared_seed_by_seed(tmp_path: Path) -> None:
 
 def test_a_changed_world_is_beside_sac(tmp_path: Path) -> None:
     found = {
-        (0,): {"curve": [[0, 98], [50, 10], [100, 95], [250, 97]], "rival": [[0, 3], [250, 5]]},
-        (1,): {"curve": [[0, 98], [50, 10], [100, 20], [250, 30]], "rival": [[0, 3], [250, 50]]},
+        (0,): {"curve": [[0, 98], [50, 10], [100, 95], [250, 97]], "baseline": [[0, 3], [250, 5]]},
+        (1,): {"curve": [[0, 98], [50, 10], [100, 20], [250, 30]], "baseline": [[0, 3], [250, 50]]},
     }
     lines = told(tmp_path, "change", found, "seed")
     assert "450" in line(lines, "steps after the change") and "MISSED" in line(
@@ -64,8 +64,8 @@ def test_foreign_envs_are_told_beside_agents_alone(tmp_path: Path) -> None:
     own = {"successes": 97, "learning": 2.0, "decision": 0.001, "laws": ""}
     store, question = ResultStore(tmp_path), QUESTIONS["foreign"]
     for task in question.tasks((0,), 100):
-        rival = {"curve": [[1_000, 10], [2_000, 96]], "solved_at": 2_000}
-        store.put(task, Result(own if task.name == "planned" else rival, 1.0))
+        baseline = {"curve": [[1_000, 10], [2_000, 96]], "solved_at": 2_000}
+        store.put(task, Result(own if task.name == "planned" else baseline, 1.0))
     text = question.text(store, (0,), 100)
     assert "Pendulum swing-up: successes of 100" in text and "2,000" in text and "DQN" in text
 
@@ -104,7 +104,7 @@ def test_tasks_of_foreign_envs_say_what_the_envs_say() -> None:
             scene = after
 
 
-def test_a_rival_is_tested_until_it_is_good_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_baseline_is_tested_until_it_is_good_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("stable_baselines3")
     short = replace(plan_foreign.FOREIGN["mountain-car"], limit=40, every=20)
     monkeypatch.setitem(plan_foreign.FOREIGN, "mountain-car", short)

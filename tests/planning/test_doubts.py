@@ -76,3 +76,21 @@ def test_it_learns_on_with_the_model(rng: np.random.Generator) -> None:
         moved, paid, over = step(x, 2.0, 0.0)
         model.learn_step(moved, paid, terminated=over)
     assert expected(task, [0.0])[0] == pytest.approx(1.98)
+
+
+def test_where_no_mode_is_known_what_is_usual_counts() -> None:
+    # To the right every step pays its length, to the left it costs that; what crossing over pays nobody has seen.
+    model = LearnedRewardModel(SCHEMA, {("car", "x"), ("car", "v")})
+    rng = np.random.default_rng(1)
+    for _ in range(150):
+        side, v = rng.choice([-1.0, 1.0]), rng.uniform(1.0, 5.0)
+        moved, _, _ = step(side * rng.uniform(10.0, 20.0), v, v)
+        model.learn_step(moved, side * v, terminated=False)
+    task = DoubtedTask(model)
+    modes, said = model.claims(model.lessons(), np.zeros(150, dtype=np.bool_))
+    assert len(modes) == 2 and np.allclose(said.sum(axis=1), 0.0)
+    usual = task._usual(model.lessons(), np.zeros(150, dtype=np.bool_))
+    more = max(modes, key=lambda mode: mode.examples)
+    assert usual.tolist() == said[:, modes.index(more)].tolist()
+    far = expected(task, [-15.0, 15.0], 2.0)
+    assert far == pytest.approx([-2.0, 2.0])

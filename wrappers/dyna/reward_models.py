@@ -11,6 +11,7 @@ from typing import Any, Final, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.mode import Mode
 from relgym.config import ClusteringConfig, ModelConfig
 from relgym.envs.tasks import RewardFunctions, TaskOutcome
 from relgym.errors import ConfigError, ModelFileError, RelgymError
@@ -143,6 +144,8 @@ class LearnedRewardModel(RewardFunctions):
         self._earlier: list[Float1D] = []
         self._passed = 0
         self._rng = np.random.default_rng(0)
+        self._claimants: tuple[int, tuple[Mode, ...], list[list[tuple[int, float]]]] | None = None
+        self._places: tuple[SceneLayout, dict[str, NDArray[np.intp]]] | None = None
         self._together: set[tuple[int, int]] = set()
         self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
 
@@ -333,7 +336,7 @@ class LearnedRewardModel(RewardFunctions):
         modes = np.array(_pairs(found), dtype=np.int64).reshape(len(vectors), 2)
         return np.where(known, reward, np.nan), (ended > 0.5) & known, modes
 
-    def claims(self, vectors: Float2D, ended: NDArray[np.bool_]) -> dict[int, Float1D]:
+    def claims(self, vectors: Float2D, ended: NDArray[np.bool_]) -> tuple[tuple[Mode, ...], Float2D]:
         """What each mode of the reward says of n steps, whether it holds there or not.
 
         Parameters
@@ -345,20 +348,30 @@ class LearnedRewardModel(RewardFunctions):
 
         Returns
         -------
-        By the modes' ids, shape ``(n,)`` each.
+        The modes, and what they say, shape ``(n, modes)``.
         """
-        small = self.model.schema.layout()
-        found: dict[int, Float1D] = {}
-        for mode in self.model.modes(TASK, "reward"):
-            said = np.full(len(vectors), mode.intercept)
-            for role in mode.roles:
-                for prop, weight in role.terms:
-                    if prop.endswith("'"):  # of its own targets: whether the step ends the episode
-                        said += weight * ended
-                    else:
-                        said += weight * vectors[:, small.column(small.index(role.type), prop)]
-            found[mode.id] = said
-        return found
+        if self._claimants is None or self._claimants[0] != self.model.seen:
+            small, modes = self.model.schema.layout(), tuple(self.model.modes(TASK, "reward"))
+            # Of its own targets, with a prime, a reward knows whether the step ends the episode.
+            terms = [
+                [
+                    (
+                        -1 if prop.endswith("'") else small.column(small.index(role.type), prop),
+                        weight,
+                    )
+                    for role in mode.roles
+                    for prop, weight in role.terms
+                ]
+                for mode in modes
+            ]
+            self._claimants = self.model.seen, modes, terms
+        _, modes, terms = self._claimants
+        said = np.empty((len(vectors), len(modes)))
+        for k, mode in enumerate(modes):
+            said[:, k] = mode.intercept
+            for column, weight in terms[k]:
+                said[:, k] += weight * (ended if column < 0 else vectors[:, column])
+        return modes, said
 
     def lessons(self) -> Float2D:
         """The real steps that it remembers, as `joined` makes them, with their rewards and ends; ``(n, width)``."""
@@ -408,10 +421,19 @@ class LearnedRewardModel(RewardFunctions):
             acting = self._acting or partial(acting_all, self.schema)
             whole, joined = acting(layout, before, actions)
             return joined[:, whole.slice(whole.index(ACTION))]
-        pairs = self._still if name == STILL else self._moving
         vectors = after if name == _NEXT else before
-        found: NDArray[np.float64] = vectors[:, [layout.column(layout.index(o), prop) for o, prop in pairs]]
+        found: NDArray[np.float64] = vectors[:, self._columns(layout)[STILL if name == STILL else _NOW]]
         return found
+
+    def _columns(self, layout: SceneLayout) -> dict[str, NDArray[np.intp]]:
+        """Where in a layout what moves and what stays lies; steps of one layout are evaluated again and again."""
+        if self._places is None or self._places[0] is not layout:
+            found = {
+                name: np.array([layout.column(layout.index(o), prop) for o, prop in pairs], dtype=np.intp)
+                for name, pairs in ((_NOW, self._moving), (STILL, self._still))
+            }
+            self._places = layout, found
+        return self._places[1]
 
 
 def _pairs(found: BatchPrediction) -> list[tuple[int, int]]:
