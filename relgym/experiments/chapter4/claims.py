@@ -208,7 +208,7 @@ def _rolled(learner: str) -> Measure:
 
     def measure(values: Values) -> float:
         trials = values[f"rolled/{learner}"][0]["trials"]
-        return 80.0 * sum(t["failed"] for t in trials) / len(trials)
+        return 80.0 * float(sum(t["failed"] for t in trials)) / len(trials)
 
     return measure
 
