@@ -8,7 +8,6 @@ import pytest
 from relgym.experiments.chapter4.frequencies import count
 from relgym.experiments.chapter4.published import MODES
 from relgym.experiments.data import BALL_EXPERIMENTS, THESIS_EXPERIMENTS, ball_episodes
-from relgym.experiments.episodes import Episode
 from relgym.experiments.scenes import SCENES, TOLD_APART
 from relgym.experiments.seeds import FREQUENCY_SEEDS
 
