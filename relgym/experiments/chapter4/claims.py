@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
 from relgym.experiments.chapter4 import frequencies, plans
 from relgym.experiments.chapter4.job import Plan, Shown, Values
-from relgym.experiments.chapter4.protocol import Protocol
+from relgym.experiments.chapter4.protocol import WHOLE_TEST, Protocol
 from relgym.experiments.chapter4.published import MODES, published_pairs, rows_of_pair
 from relgym.experiments.chapter4.rolled import occurrences
 from relgym.experiments.chapter4.scores import pooled_scores, quantile
@@ -451,6 +451,7 @@ CLAIMS: Final = (
         _mode_rate("1/original", _Y, "floor"),
         (11.9, 26.9),
         (6, 36),
+        "those on the floor that sink in by less than a twentieth look like sliding; ours are two in five",
     ),
     Claim(
         "4.3.4",
@@ -467,6 +468,7 @@ CLAIMS: Final = (
         _mode_rate("1/original", _X, "slope"),
         (6.4, 14.4),
         (2, 30),
+        "17 of the 18 were taken for upright bounces; our clauses tell the ramp from them by its type",
     ),
     Claim(
         "4.3.4",
@@ -637,7 +639,15 @@ CLAIMS: Final = (
         (5, 60),
         _TIES,
     ),
-    Claim("4.8", "roll-outs that fail, of 80 (program)", "26", _rolled("original"), (16, 36), (10, 48)),
+    Claim(
+        "4.8",
+        "roll-outs that fail, of 80 (program)",
+        "26",
+        _rolled("original"),
+        (16, 36),
+        (10, 48),
+        "models that keep v' = 0 beside -0.9 v take fast bounces on the floor for sliding",
+    ),
     Claim(
         "4.8",
         "bad collision resolutions, vertical",
@@ -661,6 +671,7 @@ CLAIMS: Final = (
         _occurred("original", "bad collision resolution, level"),
         (0, 2),
         (0, 10),
+        "every bounce leaves one ball in ten inside, also on floors; ours are fast enough to be seen",
     ),
     Claim(
         "4.8",
@@ -678,7 +689,15 @@ CLAIMS: Final = (
         (2, 10),
         (1, 20),
     ),
-    Claim("4.8", "delayed falling", "7", _occurred("original", "delayed falling"), (3, 14), (1, 21)),
+    Claim(
+        "4.8",
+        "delayed falling",
+        "7",
+        _occurred("original", "delayed falling"),
+        (3, 14),
+        (1, 21),
+        "in 80 trials of our scenes three balls slide off an edge; the others bounce off it",
+    ),
     Claim("4.5", "experiment 3: 15 modes", "15", None),
     Claim("4.6", "σ² = 1e-15 and 1e-10 alike up to noise of 1e-10", "-", None),
     Claim("4.6", "σ² = 1e-5 is overgeneral", "-", None),
@@ -758,7 +777,11 @@ CLAIMS: Final = (
 
 
 def plan(protocol: Protocol) -> Plan:
-    """The thesis' two presets on experiments 1 and 2, roll-outs, transfer, box pushing, and the scenes."""
+    """The thesis' two presets on experiments 1 and 2, roll-outs, transfer, box pushing, and the scenes.
+
+    Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces.
+    """
+    protocol = replace(protocol, test_episodes=WHOLE_TEST)
     presets = ("original", "thesis")
     tasks: dict[str, Sequence[Any]] = {}
     for experiment in (1, 2):
@@ -795,8 +818,9 @@ def claims_shown(_: Protocol, values: Values) -> Shown:
     )
     batches = len(seen["1/original"])
     note = (
-        f"{len(CLAIMS)} claims: {told}.\n{batches} of the thesis' 50 batches. The bands are ours: the thesis prints "
-        "no spread; rates\nare called the same within 30 %, those of single modes within a factor 1.5."
+        f"{len(CLAIMS)} claims: {told}.\n{batches} of the thesis' 50 batches, tested on all 24,000 examples. The bands "
+        "are ours: the thesis prints no spread;\nrates are called the same within 30 %, those of single modes within a "
+        "factor 1.5."
     )
     return Shown(f"{table([str(h) for h in heading], lines)}\n\n{note}", [heading, *lines])
 
