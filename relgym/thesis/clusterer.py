@@ -190,12 +190,12 @@ class Clusterer:
         return None
 
     def _own(self, cluster: Cluster, members: Rows) -> NDArray[np.bool_]:
-        """Which of a mode's examples no other one explains; all of them if there are no such."""
+        """Which of a mode's examples no other one explains; all of them if these alone would found no mode."""
         others = [self._errors[c.number][members] for c in self.clusters if c is not cluster]
         if not others:
             return np.ones(len(members), dtype=np.bool_)
         own: NDArray[np.bool_] = np.min(others, axis=0) > self._tolerance
-        return own if own.any() else ~own
+        return own if own.sum() >= self.settings.min_examples else np.ones(len(members), dtype=np.bool_)
 
     def _general(self, first: Cluster, second: Cluster, new: Rows) -> Cluster | None:
         """A function for most of both, of the target and of objects that are alone of their type."""

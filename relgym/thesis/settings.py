@@ -243,7 +243,7 @@ DEVIATIONS: Final = (
         "both",
         "§3.2.5",
         "all examples of a mode count",
-        "of a mode that has examples of its own, those that no other mode explains",
+        "of a mode that has T examples of its own, those that no other mode explains",
         "where a ball flies straight down, both bounces off walls explain it: nine in ten examples of each (Table 4.9: "
         "388 of 437, 308 of 359), so that either one would do for both",
     ),

@@ -48,3 +48,19 @@ def test_rooms_with_one_object_only() -> None:
         setting = replace(THESIS_EXPERIMENTS[1], objects=(kind,))
         rooms = list(ball_episodes(setting, seed=901, episodes=8, order=None))
         assert {kind in room.layout.names for room in rooms} == {True}
+
+
+@pytest.mark.parametrize("experiment", [1, 2])
+def test_most_balls_that_fly_into_a_wall_are_hardly_in_it(experiment: int) -> None:
+    """Table 4.5, Table 4.14: they aren't x-aligned yet, so less than a twentieth of their width overlaps."""
+    shallow = counted = 0
+    for episode in ball_episodes(THESIS_EXPERIMENTS[experiment], seed=901, order=None):
+        x, width = episode.columns("ball", "px", "sx").T
+        for name, side in (("left_wall", 1.0), ("right_wall", -1.0)):
+            wall, thick = episode.columns(name, "px", "sx").T
+            depth = 0.5 * (width + thick) - side * (x - wall)
+            contacts = zip(episode.truth.touched, episode.truth.pushing, strict=True)
+            hit = [touched == {name} == pushing for touched, pushing in contacts]
+            shallow += int((depth[:-1][hit] < 0.05 * width[:-1][hit]).sum())
+            counted += sum(hit)
+    assert counted >= 10 and shallow > 0.6 * counted

@@ -13,6 +13,7 @@
   experiment 1 in some seconds, because examples with the same relations are counted together.
 - *Scenes* of chapter IV have the thesis' frequencies (`relgym.experiments.scenes`): what is known of them, and what
   is fitted on seeds of their own.
+- *Roll-outs* (`chapter4/rolled.py`) are corrected by hand as the thesis' were, and counted as they are, too.
 - *Claims* (`chapter4/claims.py`): the thesis' sentences with numbers, how ours are measured, and bands, which are
   ours.
 - *Staleness*: sections state a digest of the code behind them. A page may be older than the code if it says so at its

@@ -275,9 +275,13 @@ def _again(
 
 
 def _surfaces(episode: Episode, experiment: int) -> Mapping[str, int]:
-    """How many bounces there were against which kind of surface."""
+    """How many bounces there were against which kind of surface; of a ball that slides, too, against upright ones."""
     names = _surface_names(episode, experiment)
-    return Counter(name for name in names if name in ("vertical", "slope", "level"))
+    x = episode.columns("ball", "vx")[:, 0]
+    turned = (x[:-1] * x[1:] < 0.0) & (episode.truth.active > 1) & ~episode.truth.corner
+    upright = [name == "?" and bool(back) for name, back in zip(names, turned, strict=True)]
+    single = Counter(name for name in names if name in ("vertical", "slope", "level"))
+    return single + Counter({"vertical": sum(upright)})
 
 
 def _surface_names(episode: Episode, experiment: int) -> list[str]:
