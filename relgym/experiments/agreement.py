@@ -1,6 +1,6 @@
 """Whether a model says the same whoever runs it: arrays, the compiled kernel, and the Python it is exported as.
 
-``python -m relgym.experiments.agreement`` learns ten models, asks each of 100,000 scenes and prints a line for each:
+``python -m relgym.experiments.agreement`` learns models, asks each of 100,000 scenes and prints a line for each:
 shares of equal outcomes, largest differences of values, and whether a scene alone gets the bits that it gets among
 others. Scenes are those of fresh runs, a third as they are, a third shaken a little and a third a lot.
 """
@@ -115,13 +115,14 @@ _WORLDS: Final = [t for t in TRIALS if t.world.dimensions == 2]
 MODELS: Final[dict[str, Callable[[], Taught]]] = {
     "ball by laws": partial(_of_env, "relgym/BallBoxRamp-v0", 4000, {}, {}),
     "ball by modes": partial(_of_env, "relgym/BallBoxRamp-v0", 4000, {}, {"config": {"frames": "world"}}),
+    "ball with friction": partial(_of_env, "relgym/BallBoxRamp-v0", 4000, {"friction": 0.2}, {}),
     "truck": partial(_of_env, "relgym/TruckPush-v0", 1200, {"task": None}, {}),
     "truck with reward and end": partial(_of_env, "relgym/TruckPush-v0", 1200, {}, _TASK),
     "CartPole": partial(_of_env, "CartPole-v1", 1500, {}, {}),
     "Pendulum": partial(_of_env, "Pendulum-v1", 1500, {}, {}),
     "MountainCar": partial(_of_env, "MountainCar-v0", 1500, {}, {}),
     "MountainCarContinuous": partial(_of_env, "MountainCarContinuous-v0", 1500, {}, {}),
-    **{f"laws: {trial.name}": partial(_of_trial, trial) for trial in _WORLDS[:6]},
+    **{f"laws: {trial.name}": partial(_of_trial, trial) for trial in _WORLDS},
 }
 """What is learned, and where."""
 

@@ -73,7 +73,7 @@ class Kernel:
         warnings.warn(
             f"models are run by arrays, some 30 times slower, since there is no kernel: {self._missing}",
             SlowWarning,
-            stacklevel=4,
+            stacklevel=2,
         )
 
 
