@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
 
-from relgym.arguments import refusing_calls, whole
+from relgym.arguments import refusing_calls
 from relgym.config.constants import TALLY_DIGITS
 from relgym.errors import ConfigError
 
@@ -22,9 +22,6 @@ __all__ = ["ANY", "Clause", "Coverage", "Definition", "Literal"]
 
 ANY: Final = -1
 """The universally quantified argument of a negated literal, printed ``*``."""
-
-MOST_ARGUMENTS: Final = 1_000
-"""Of a target relation; far more than anybody could read."""
 
 _OPERATORS = (None, "<=", ">")
 
@@ -159,8 +156,7 @@ class Clause:
         in the order of their first appearance, and repeated literals are dropped.
         """
         literals = tuple(literals)
-        whole("arity", arity, 0, MOST_ARGUMENTS, ConfigError)
-        names: dict[int, int] = {variable: variable for variable in range(arity)}
+        names: dict[int, int] = {variable: variable for variable in _variables(literals) if variable < arity}
         names |= dict.fromkeys(_loose_variables(literals, arity), ANY)
         fresh = arity
         for variable in _variables(literals):
