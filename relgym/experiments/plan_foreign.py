@@ -101,7 +101,7 @@ FOREIGN: Final = {
         "MountainCar-v0",
         Uphill(),
         # The way up leads back down first, again and again: a tree spreads over places and speeds.
-        TreeSearch(horizon=200, expansions=2_048, batch=256, hold=32, patience=1),
+        TreeSearch(horizon=200, expansions=16_384, batch=256, hold=32, patience=1),
         None,
         lambda seen: bool(seen[0] >= _FLAG),
         "DQN",
