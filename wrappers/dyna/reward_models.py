@@ -135,9 +135,8 @@ class LearnedRewardModel(RewardFunctions):
         single = [
             (name, schema.type(t)) for name, t in schema.objects if counts[t] == 1 and t not in (ACTION, TASK)
         ]
-        every = [(name, t.name, prop) for name, t in single for prop in t.properties]
-        self._moving = [(name, prop) for name, kind, prop in every if (kind, prop) in changing]
-        self._still = [(name, prop) for name, kind, prop in every if (kind, prop) not in changing]
+        self._every = [(name, t.name, prop) for name, t in single for prop in t.properties]
+        self._divide(apart=True)
         self._action = schema.type(ACTION).properties if ACTION in schema.order else ()
         self.model = WorldModel(self._small_schema(), config or _EXACT)
         self._ends, self._latest = deque[Float1D](maxlen=_REMEMBERED), deque[Float1D]()
@@ -148,6 +147,13 @@ class LearnedRewardModel(RewardFunctions):
         self._places: tuple[SceneLayout, dict[str, NDArray[np.intp]]] | None = None
         self._together: set[tuple[int, int]] = set()
         self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
+
+    def _divide(self, *, apart: bool) -> None:
+        """Which properties the objects of its schema hold; not `apart`, as in earlier files, ``now`` holds them all."""
+        moving = [(name, prop) for name, kind, prop in self._every if (kind, prop) in self._changing]
+        others = [(name, prop) for name, kind, prop in self._every if (kind, prop) not in self._changing]
+        every = [(name, prop) for name, _, prop in self._every]
+        self._held = {_NOW: moving if apart else every, _NEXT: moving, STILL: others if apart else []}
 
     def adopt(self, acting: Acting) -> None:
         """Put actions into scenes as an env does, unless that was said at construction."""
@@ -223,6 +229,9 @@ class LearnedRewardModel(RewardFunctions):
             if prop not in schema.type(name).properties:
                 raise ModelFileError(f"type {name!r} has no property {prop!r} that could change")
         reward_model = cls(schema, set(body.changing))
+        if STILL not in model.schema.order:
+            reward_model._divide(apart=False)
+            reward_model.model = WorldModel(reward_model._small_schema())
         if (difference := mismatch(reward_model.model.schema, model.schema)) or model.frozen:
             raise ModelFileError(f"its model is of another world: {difference or 'it has no history'}")
         width = model.schema.layout().width
@@ -254,9 +263,7 @@ class LearnedRewardModel(RewardFunctions):
             return named([(name, prop) for name, prop in pairs if prop in kinds[name].flags])
 
         parts = {
-            _NOW: (named(self._moving), flags(self._moving)),
-            _NEXT: (named(self._moving), flags(self._moving)),
-            STILL: (named(self._still), flags(self._still)),
+            **{name: (named(pairs), flags(pairs)) for name, pairs in self._held.items()},
             ACTION: (self._action, self.schema.type(ACTION).flags if self._action else ()),
         }
         types = [ObjectType(name, own, flags=known) for name, (own, known) in parts.items() if own]
@@ -275,9 +282,8 @@ class LearnedRewardModel(RewardFunctions):
         """Learn the reward and the end of a real step."""
         before, after = transition.before, transition.after
         values: dict[str, list[float]] = {
-            _NOW: [before[name][prop] for name, prop in self._moving],
-            _NEXT: [after[name][prop] for name, prop in self._moving],
-            STILL: [before[name][prop] for name, prop in self._still],
+            part: [(after if part == _NEXT else before)[name][prop] for name, prop in pairs]
+            for part, pairs in self._held.items()
         }
         if self._action:
             values[ACTION] = before[ACTION].values.tolist()
@@ -422,7 +428,7 @@ class LearnedRewardModel(RewardFunctions):
             whole, joined = acting(layout, before, actions)
             return joined[:, whole.slice(whole.index(ACTION))]
         vectors = after if name == _NEXT else before
-        found: NDArray[np.float64] = vectors[:, self._columns(layout)[STILL if name == STILL else _NOW]]
+        found: NDArray[np.float64] = vectors[:, self._columns(layout)[name]]
         return found
 
     def _columns(self, layout: SceneLayout) -> dict[str, NDArray[np.intp]]:
@@ -430,7 +436,7 @@ class LearnedRewardModel(RewardFunctions):
         if self._places is None or self._places[0] is not layout:
             found = {
                 name: np.array([layout.column(layout.index(o), prop) for o, prop in pairs], dtype=np.intp)
-                for name, pairs in ((_NOW, self._moving), (STILL, self._still))
+                for name, pairs in self._held.items()
             }
             self._places = layout, found
         return self._places[1]
