@@ -17,6 +17,7 @@ __all__ = [
     "HOPELESS",
     "LEAST_EXEMPLARS",
     "LEFT_OPEN",
+    "MOST_STEPS",
     "PIVOT",
     "POWERS",
     "ROUGH",
@@ -89,3 +90,6 @@ DIGITS: Final = 7
 
 FIRST_ROOM: Final = 256
 """Rows that a growing array has room for at first; it doubles whenever it is full."""
+
+MOST_STEPS: Final = 10**9
+"""Steps of a roll-out, whose predictions all lie in memory: no machine holds more."""

@@ -7,7 +7,7 @@ from relgym.scene.axes import Axes
 from relgym.scene.objects import SceneLayout, pose_columns
 from relgym.scene.shapes import Box, Compound, Sphere, outline
 
-__all__ = ["body_of", "check_bodies"]
+__all__ = ["body_of", "check_bodies", "constants_of"]
 
 
 def check_bodies(axes: Axes, geometry: str, layout: SceneLayout) -> None:
@@ -27,6 +27,12 @@ def check_bodies(axes: Axes, geometry: str, layout: SceneLayout) -> None:
         raise ir.BeyondError(f"the geometry {geometry!r}")
     if len(layout.bodies) > ir.MOST_BODIES:
         raise ir.BeyondError(f"more than {ir.MOST_BODIES} bodies")
+
+
+def constants_of(layout: SceneLayout) -> tuple[int, int, int]:
+    """Registers of NaN, 0 and 1, behind those of the scene before and after."""
+    nan, zero, one = range(2 * layout.width, 2 * layout.width + 3)
+    return nan, zero, one
 
 
 def body_of(axes: Axes, layout: SceneLayout, number: int, spin: str | None = None) -> ir.Body:

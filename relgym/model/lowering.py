@@ -26,7 +26,7 @@ from relgym.laws.records import ONE, AxisLaw, PairLaw, Piece
 from relgym.laws.shares import EXTENT
 from relgym.laws.touching import Cast
 from relgym.logic.clause import Clause, Literal
-from relgym.model.bodies import body_of, check_bodies
+from relgym.model.bodies import body_of, check_bodies, constants_of
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Perception, Situation
 from relgym.model.scenes import angle_columns
@@ -63,8 +63,8 @@ class _Lowering:
         self.parts, self.layout = parts, layout
         self.perception: Perception = parts.perception
         self.axes = Axes.of(parts.schema)
-        self.registers = 2 * layout.width + 3
-        self.nan, self.zero, self.one = (2 * layout.width + k for k in range(3))
+        self.nan, self.zero, self.one = constants_of(layout)
+        self.registers = self.one + 1
         self.keys: dict[tuple[str, str], int] = {}
         self.everything = False
         self.wanted: set[int] = set()

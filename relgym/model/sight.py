@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.model.bodies import body_of, check_bodies
+from relgym.model.bodies import body_of, check_bodies, constants_of
 from relgym.program import records as ir
 from relgym.program.machine import Machine
 from relgym.program.tape import encoded
@@ -113,11 +113,11 @@ def _program(
 ) -> ir.Program:
     """A program that predicts nothing, but asks for all that there is to be seen."""
     axes, schema = extractor.axes, extractor.schema
-    nan = 2 * layout.width
+    nan, _, one = constants_of(layout)
     names = sorted({layout.types[i].name for i in layout.bodies})
     return ir.Program(
         layout.width,
-        2 * layout.width + 3,
+        one + 1,
         (),
         tuple(body_of(axes, layout, k) for k in range(len(layout.bodies))),
         tuple(names.index(layout.types[i].name) for i in layout.bodies),

@@ -18,6 +18,7 @@ from relgym.arguments import array_of, refusing, whole
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.config.checks import checked_count
+from relgym.config.constants import MOST_STEPS
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, RelgymError
 from relgym.files.reading import FileLimits
 from relgym.html import html_text
@@ -641,7 +642,7 @@ class WorldModel:
         -------
         One prediction per step; the last one is not `ok` when the roll-out ended early.
         """
-        checked_count("steps", steps, 1, 10**9)
+        checked_count("steps", steps, 1, MOST_STEPS)
         if actions is not None:
             given = np.asarray(actions, dtype=np.float64)
             width = len(scene.layout.types[scene.layout.index(ACTION)].properties)

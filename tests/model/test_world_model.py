@@ -79,7 +79,7 @@ def test_a_rollout_takes_its_actions_from_the_plan() -> None:
     steps = model.rollout(cart(1.0, 99.0), 3, actions=[[0.5], [0.0], [-1.0]])
     assert [s.scene["cart"]["x"] for s in steps] == pytest.approx([1.4, 1.26, 0.134], abs=1e-12)
     assert [s.scene["action"]["u"] for s in steps] == [0.5, 0.0, -1.0]
-    with pytest.raises(ConfigError, match="at least 1"):
+    with pytest.raises(ConfigError, match="from 1 to"):
         model.rollout(cart(1.0, 0.0), 0)
     with pytest.raises(ObservationError, match="action"):
         with_action(cart(1.0, 0.0), [1.0, 2.0])
