@@ -39,7 +39,7 @@ class ModelConfig:
     cells_per_step
         What each transition earns for searches (for modes, approximations, causal order, guesses, and what
         `work_per_step` counts), in cells: numbers looked at, of which a thousand million take some four seconds.
-        Default 250,000, some 1 ms, range 1 to 10**15. A search that takes more than there is goes on after the next
+        Default 500,000, some 2 ms, range 1 to 10**15. A search that takes more than there is goes on after the next
         transitions. Raising it finds sooner what is hard to find and makes every step of a world that isn't
         understood slower.
     most_cells
@@ -90,7 +90,7 @@ class ModelConfig:
     geometry: Literal["arrays", "fcl"] = "arrays"
     abstain: bool = True
     work_per_step: int = 400_000
-    cells_per_step: int = 250_000
+    cells_per_step: int = 500_000
     most_cells: int = 5_000_000
     saved_cells: int = 1_000_000_000
     frames: Literal["auto", "world"] = "auto"

@@ -7,6 +7,7 @@ bands are ours: the thesis prints no spread. What nothing here measures says so.
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
@@ -805,12 +806,17 @@ def claims_shown(_: Protocol, values: Values) -> Shown:
     heading: list[Cell] = ["§", "claim", "printed", "ours", "verdict", "same if", "why"]
     lines: list[list[Cell]] = []
     counts: dict[str, int] = {}
+    reasons: list[str] = []
     for claim in CLAIMS:
         ours = _ours(claim, seen)
         verdict = verdict_of(claim, ours)
         counts[verdict] = counts.get(verdict, 0) + 1
         band = "" if ours is None else f"{claim.same[0]:g} to {claim.same[1]:g}"
-        why = claim.why if verdict in ("partly", "doesn't") else ""
+        why = ""
+        if claim.why and verdict in ("partly", "doesn't"):
+            if claim.why not in reasons:
+                reasons.append(claim.why)
+            why = f"({reasons.index(claim.why) + 1})"
         number = "" if ours is None else f"{ours:.3g}"
         lines.append([claim.section, claim.text, claim.printed, number, verdict, band, why])
     told = ", ".join(
@@ -822,7 +828,8 @@ def claims_shown(_: Protocol, values: Values) -> Shown:
         "are ours: the thesis prints no spread;\nrates are called the same within 30 %, those of single modes within a "
         "factor 1.5."
     )
-    return Shown(f"{table([str(h) for h in heading], lines)}\n\n{note}", [heading, *lines])
+    notes = [textwrap.fill(f"({k}) {why}", 116, subsequent_indent="    ") for k, why in enumerate(reasons, 1)]
+    return Shown("\n\n".join([table([str(h) for h in heading], lines), note, *notes]), [heading, *lines])
 
 
 def _ours(claim: Claim, values: Mapping[str, Any]) -> float | None:
