@@ -114,7 +114,6 @@ def world_of(facts: Facts, index: int) -> World:
     return World(relations, facts.exists[index], numeric, facts.relative)
 
 
-@refusing(ConfigError)
 def solutions(clause: Clause, world: World, bound: Sequence[int]) -> Iterator[tuple[int, ...]]:
     """Yield every assignment of objects to the clause's variables that makes it true (§3.4.3).
 
