@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import FIRST_ROOM
+from relgym.numeric.growing import grown
 
 __all__ = ["AssignmentLog"]
 
@@ -58,10 +59,7 @@ class AssignmentLog:
     def append(self, row: int, y: float) -> int:
         """Add an example, which is noise until it is assigned, and return its number."""
         if self._size == len(self._y):
-            room = (0, max(FIRST_ROOM, self._size))
-            self._y = np.pad(self._y, room)
-            self._label = np.pad(self._label, room)
-            self._row = np.pad(self._row, room)
+            self._y, self._label, self._row = grown(self._y), grown(self._label), grown(self._row)
         self._y[self._size], self._label[self._size], self._row[self._size] = y, NOISE, row
         self._size += 1
         self.seen += 1

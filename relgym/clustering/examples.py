@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.config.constants import FIRST_ROOM
+from relgym.numeric.growing import grown
 
 __all__ = ["ExampleTable"]
 
@@ -130,12 +131,9 @@ class ExampleTable:
         """
         number = self.signature_id(signature)
         if self._size == len(self._x):
-            grow = ((0, max(FIRST_ROOM, len(self._x))), (0, 0))
-            self._x = np.pad(self._x, grow)
-            self._signature = np.pad(self._signature, grow[0])
-            self._stratum = np.pad(self._stratum, grow[0])
-            self._bodies = np.pad(self._bodies, grow)
-            self._serial = np.pad(self._serial, grow[0])
+            self._x, self._bodies = grown(self._x), grown(self._bodies)
+            self._signature, self._stratum = grown(self._signature), grown(self._stratum)
+            self._serial = grown(self._serial)
         # What stood there before keep() is gone, behind the row as well: equal tables are equal bytes.
         self._x[self._size, len(row) :], self._bodies[self._size, len(bodies) :] = 0.0, -1
         self._x[self._size, : len(row)] = row

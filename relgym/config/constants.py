@@ -89,7 +89,7 @@ DIGITS: Final = 7
 """Significant digits of numbers in formulas, unless somebody asks for others."""
 
 FIRST_ROOM: Final = 256
-"""Rows that a growing array has room for at first; it doubles whenever it is full."""
+"""Rows that a growing array has room for at first, and for at least so many more whenever it is full."""
 
 MOST_STEPS: Final = 10**9
 """Steps of a roll-out, whose predictions all lie in memory: no machine holds more."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.constants import FIRST_ROOM
+from relgym.numeric.growing import grown
 
 __all__ = ["Store"]
 
@@ -58,9 +59,7 @@ class Store:
         if self._size == self.limit:
             return self._make_room(cell)
         if self._size == len(self._rows):
-            room = min(self.limit, 2 * self._size) - self._size
-            self._rows = np.pad(self._rows, ((0, room), (0, 0)))
-            self._cells = np.pad(self._cells, (0, room))
+            self._rows, self._cells = grown(self._rows, self.limit), grown(self._cells, self.limit)
         return self._size
 
     def put(self, place: int, row: NDArray[np.float64], *, cell: int) -> None:
@@ -103,8 +102,3 @@ class Store:
         self._rows = np.array(arrays["rows"], dtype=np.float64)
         self._cells = np.array(arrays["cells"], dtype=np.int64)
         self._size, self._counts = len(self._rows), None
-        if not self._size:
-            self._rows, self._cells = (
-                np.zeros((FIRST_ROOM, self._rows.shape[1])),
-                np.zeros(FIRST_ROOM, dtype=np.int64),
-            )

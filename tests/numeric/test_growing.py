@@ -1,0 +1,36 @@
+"""Tests of arrays that rows are appended to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relgym.config.constants import FIRST_ROOM
+from relgym.numeric.growing import grown
+
+
+@pytest.mark.parametrize(
+    ("rows", "most", "room"),
+    [
+        (0, None, FIRST_ROOM),
+        (FIRST_ROOM, None, 2 * FIRST_ROOM),
+        (16 * FIRST_ROOM, None, 18 * FIRST_ROOM),
+        (FIRST_ROOM, FIRST_ROOM + 3, FIRST_ROOM + 3),
+        (FIRST_ROOM, FIRST_ROOM, FIRST_ROOM),
+    ],
+)
+def test_rows(rows: int, most: int | None, room: int) -> None:
+    for shape in ((rows,), (rows, 3)):
+        full = np.arange(float(np.prod(shape))).reshape(shape)
+        found = grown(full, most)
+        assert found.shape == (room, *shape[1:])
+        np.testing.assert_array_equal(found[:rows], full)
+        assert not found[rows:].any()
+        assert grown(full.astype(np.int16), most).dtype == np.int16
+
+
+def test_appending_copies_few_rows() -> None:
+    rows, copied = np.zeros(FIRST_ROOM, dtype=np.uint8), 0
+    while len(rows) < 200_000:
+        copied, rows = copied + len(rows), grown(rows)
+    assert copied <= 10 * len(rows)
