@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import resource
+import statistics
 import sys
 import time
 from pathlib import Path
@@ -12,9 +13,10 @@ from typing import Any, Final
 import gymnasium as gym
 
 import relgym  # noqa: F401 - registers the envs
+from relgym.config import ModelConfig
 from relgym.wrappers import ModelLearner
 
-__all__ = ["WORLDS", "main", "soak"]
+__all__ = ["WORLDS", "main", "soak", "summary"]
 
 WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "ball": ("relgym/BallBoxRamp-v0", {}),
@@ -82,6 +84,34 @@ def soak(
     return rows
 
 
+def summary(rows: list[list[float]], bound: int) -> str:
+    """What became of memory and cost in a long life.
+
+    A line's memory is that of one moment, in which a search may be under way; so medians of quarters are compared.
+
+    Parameters
+    ----------
+    rows
+        As `soak` returns them.
+    bound
+        Transitions after which no more examples are kept than before.
+
+    Returns
+    -------
+    A sentence on each, of a run with four lines at least after the bound; else that it was too short.
+    """
+    after = [row for row in rows if row[0] >= bound]
+    if (quarter := len(after) // 4) == 0:
+        return f"too short to say what becomes of memory after {bound:,} transitions"
+    first, last = (statistics.median(row[2] for row in some) for some in (after[:quarter], after[-quarter:]))
+    then, at_end = rows[min(1, len(rows) - 1)], statistics.median(row[3] for row in after[-quarter:])
+    return (
+        f"memory after {bound:,} transitions: {first:.1f} MB in the first quarter, {last:.1f} in the last "
+        f"({100.0 * (last / first - 1.0):+.1f} %), {max(row[2] for row in after):.1f} at most\n"
+        f"cost: {then[3]:.3f} ms at {then[0]:,}, {at_end:.3f} in the last quarter ({at_end / then[3]:.2f} times)"
+    )
+
+
 def _memory() -> float:
     """Memory of this process in MB: at present where the system tells, else its peak."""
     statm = Path("/proc/self/statm")
@@ -100,7 +130,8 @@ def main() -> None:
     parser.add_argument("--history", type=int, help="examples kept per type; default: the learner's")
     given = parser.parse_args()
     for name in given.worlds:
-        soak(name, given.steps, every=given.every, hours=given.hours, history=given.history)
+        rows = soak(name, given.steps, every=given.every, hours=given.hours, history=given.history)
+        print(summary(rows, ModelConfig().history if given.history is None else given.history))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relgym.experiments.outliers import errors_on, learned
-from relgym.experiments.soak import soak
+from relgym.experiments.soak import soak, summary
 
 
 def test_a_soak_tells_memory_cost_and_worst_step(capsys: pytest.CaptureFixture[str]) -> None:
@@ -15,6 +15,15 @@ def test_a_soak_tells_memory_cost_and_worst_step(capsys: pytest.CaptureFixture[s
     assert all(row[2] > 10.0 and 0.0 < row[3] <= row[4] for row in rows)
     assert "memory MB" in capsys.readouterr().out
     assert len(soak("cart", 60, every=50, hours=0.0)) == 1
+
+
+def test_a_summary_compares_quarters_after_the_bound() -> None:
+    rows = [[10.0 * k, 0.0, 50.0 + k, 1.0 + k, 9.0] for k in range(1, 13)]
+    rows[8][2] = 99.0  # a moment
+    said = summary(rows, 50)
+    assert "55.5 MB in the first quarter, 61.5 in the last (+10.8 %), 99.0 at most" in said
+    assert "3.000 ms at 20.0, 12.500 in the last quarter (4.17 times)" in said
+    assert summary(rows, 100).startswith("too short")
 
 
 def test_wrong_numbers_cost_nothing() -> None:
