@@ -275,8 +275,9 @@ def likeness(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
         return 0.0
     scaled = x[pick][:, columns]
     scaled = scaled / scaled.std(axis=0)
-    distance = np.square(scaled[:, None] - scaled[None]).sum(axis=2)
-    np.fill_diagonal(distance, np.inf)
+    distance = np.diag(np.full(len(pick), np.inf))
+    for column in scaled.T:  # all at once are as many tables
+        distance += np.square(column[:, None] - column)
     rest = left[pick] - left[pick].mean()
     variance = float(np.square(rest).mean())
     return float((rest * rest[distance.argmin(axis=1)]).mean()) / variance if variance > 0.0 else 0.0

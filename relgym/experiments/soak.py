@@ -14,6 +14,7 @@ import gymnasium as gym
 
 import relgym  # noqa: F401 - registers the envs
 from relgym.config import ModelConfig
+from relgym.model.forgetting import SLACK
 from relgym.wrappers import ModelLearner
 
 __all__ = ["WORLDS", "main", "soak", "summary"]
@@ -131,7 +132,8 @@ def main() -> None:
     given = parser.parse_args()
     for name in given.worlds:
         rows = soak(name, given.steps, every=given.every, hours=given.hours, history=given.history)
-        print(summary(rows, ModelConfig().history if given.history is None else given.history))
+        history = ModelConfig().history if given.history is None else given.history
+        print(summary(rows, int(SLACK * history)))
 
 
 if __name__ == "__main__":

@@ -80,21 +80,22 @@ def draw_samples(
     first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
     style = np.arange(draws) % 3
     found = np.empty((draws, min(size, n)), dtype=np.intp)
-    for part in _pieces(draws, DRAWN, n):
-        base, how = first[part], style[part, None]
-        keys = rng.random((len(base), n))
-        if strata is not None:
-            other = strata[None, :] != strata[base][:, None]
-            further = 2.0 * other
-            if apart is not None:
-                few = n - other.sum(axis=1) < size
-                further[few] = np.where(other[few], 1.0 + apart[base[few]], 0.0)
-            keys += np.where(how == 1, further, 0.0)
-        age = np.abs(np.arange(n)[None, :] - base[:, None])
-        keys += np.where(how == 2, age // (2 * size), 0.0)
-        keys[np.arange(len(base)), base] = -1.0
-        found[part] = np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
-        yield CALL + 2 * keys.size
+    for piece in _pieces(draws, DRAWN, n):
+        for part in _pieces(len(first[piece]), CHUNK, n):
+            base, how = first[piece][part], style[piece][part, None]
+            keys = rng.random((len(base), n))
+            if strata is not None:
+                other = strata[None, :] != strata[base][:, None]
+                further = 2.0 * other
+                if apart is not None:
+                    few = n - other.sum(axis=1) < size
+                    further[few] = np.where(other[few], 1.0 + apart[base[few]], 0.0)
+                keys += np.where(how == 1, further, 0.0)
+            age = np.abs(np.arange(n)[None, :] - base[:, None])
+            keys += np.where(how == 2, age // (2 * size), 0.0)
+            keys[np.arange(len(base)), base] = -1.0
+            found[piece][part] = np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
+        yield CALL + 2 * len(first[piece]) * n
     return found
 
 
