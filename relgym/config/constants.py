@@ -17,6 +17,7 @@ __all__ = [
     "HOPELESS",
     "LEAST_EXEMPLARS",
     "LEFT_OPEN",
+    "MORE_ROOM",
     "MOST_STEPS",
     "PIVOT",
     "POWERS",
@@ -90,6 +91,9 @@ DIGITS: Final = 7
 
 FIRST_ROOM: Final = 256
 """Rows that a growing array has room for at first, and for at least so many more whenever it is full."""
+
+MORE_ROOM: Final = 0.125
+"""Share of its rows that a growing array has room for when it was full: a row is copied eight times on the average."""
 
 MOST_STEPS: Final = 10**9
 """Steps of a roll-out, whose predictions all lie in memory: no machine holds more."""

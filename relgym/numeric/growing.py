@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import FIRST_ROOM
+from relgym.config.constants import FIRST_ROOM, MORE_ROOM
 
 __all__ = ["grown"]
 
@@ -17,7 +17,7 @@ S = TypeVar("S", bound=np.generic)
 def grown(array: NDArray[S], most: int | None = None) -> NDArray[S]:
     """An array that is full, with room for more rows, which are zeros.
 
-    It grows by an eighth, as lists do, and by `FIRST_ROOM` rows at least: appending a row costs amortised O(width), and
+    It grows by the share `MORE_ROOM`, and by `FIRST_ROOM` rows at least: appending a row costs amortised O(width), and
     a learner that runs for days holds no twice as much as it keeps.
 
     Parameters
@@ -28,6 +28,6 @@ def grown(array: NDArray[S], most: int | None = None) -> NDArray[S]:
         Rows that there is never more room for; None: no such number.
     """
     n = len(array)
-    room = n + max(FIRST_ROOM, n // 8)
+    room = n + max(FIRST_ROOM, int(MORE_ROOM * n))
     room = room if most is None else min(room, most)
     return np.pad(array, ((0, room - n),) + ((0, 0),) * (array.ndim - 1))
