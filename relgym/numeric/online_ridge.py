@@ -141,8 +141,8 @@ class OnlineRidge:
         """
         found = np.empty(len(x))
         with np.errstate(over="ignore", invalid="ignore"):  # what lies that far is far from all
-            for k, off in enumerate((x - self.mean).astype(np.float32)):
-                # One by one: of a row alone the same bits as among others.
+            for k, off in enumerate((x - self.mean).astype(np.float32, order="C")):
+                # One by one, each in one piece: of a row alone the same bits as among others.
                 found[k] = np.einsum("i,i->", off, np.einsum("ij,j->i", self.spread, off))
         return np.where(found >= 0.0, found, np.inf) + 1.0 / max(self.rows, 1)
 

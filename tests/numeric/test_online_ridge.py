@@ -132,7 +132,8 @@ def test_leverage_is_that_of_standardised_columns() -> None:
     expected = np.einsum("ni,ij,nj->n", z, inverse, z) + 1.0 / 80.0
     np.testing.assert_allclose(ridge.leverage(x), expected, rtol=1e-5)
     one = [ridge.leverage(row[None])[0] for row in x]
-    assert np.array(one).tobytes() == ridge.leverage(x).tobytes()
+    for laid in (x, np.asfortranarray(x)):
+        assert np.array(one).tobytes() == ridge.leverage(laid).tobytes()
     assert ridge.leverage(np.full((1, x.shape[1]), 1e200))[0] == np.inf
     assert OnlineRidge(2).leverage(np.zeros((1, 2)))[0] == np.inf  # nothing is known
 
