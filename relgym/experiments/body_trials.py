@@ -22,7 +22,7 @@ from relgym.laws.learner import LawLearner
 from relgym.laws.text import law_rows
 from relgym.laws.touching import Contacts
 from relgym.model.fitting import compare_and_learn
-from relgym.model.prediction import ScenePrediction
+from relgym.model.prediction import OUTCOMES, Outcome, ScenePrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.geometry.areas import mean_squares
 from relgym.scene.objects import Float2D, SceneLayout, Transition
@@ -217,16 +217,37 @@ def asked(model: WorldModel, rooms: Iterable[Room]) -> Tally:
     """How a model's claims come out where it doesn't go on learning, as `watched` counts."""
     counts = np.zeros(5, dtype=int)
     for room in rooms:
-        for transition in room.transitions():
-            counts += _told_of(room, model.predict_one(transition.before), transition)
+        found = model.predict_batch(room.layout, room.vectors[:-1])
+        columns = [room.layout.column(room.layout.index(name), prop) for name, prop in found.parts]
+        off = ~(np.abs(found.vectors - room.vectors[1:])[:, columns] <= EXACT)
+        claimed = found.outcomes == OUTCOMES.index(Outcome.PREDICTED)
+        touched = _touched(room, room.vectors[:-1])
+        names = [name for name, _ in found.parts]
+        for name in dict.fromkeys(names):
+            own = [k for k, other in enumerate(names) if other == name]
+            right, wrong = (claimed & ~off)[:, own].all(axis=1), (claimed & off)[:, own].any(axis=1)
+            here = touched[:, _place(room, name)]
+            counts += [
+                here.sum(), (here & right).sum(), (here & wrong).sum(), (~here).sum(), (~here & wrong).sum(),
+            ]  # fmt: skip
     return Tally(*counts.tolist())
+
+
+def _touched(room: Room, vectors: Float2D) -> NDArray[np.bool_]:
+    """Which of a room's bodies touch something, shape ``(n, bodies)``."""
+    relations = Extractor(room.schema).extract(room.layout, vectors)
+    touched: NDArray[np.bool_] = relations.relation("intersect").any(axis=2)
+    return touched
+
+
+def _place(room: Room, name: str) -> int:
+    """Where a body stands among all that are touched."""
+    return room.layout.bodies.index(room.layout.index(name))
 
 
 def _told_of(room: Room, said: ScenePrediction, transition: Transition) -> NDArray[np.int64]:
     """What `Tally` holds, of one prediction."""
-    relations = Extractor(room.schema).extract(room.layout, transition.before.vector[None])
-    touched = relations.relation("intersect")[0].any(axis=1)
-    names = [room.layout.names[i] for i in room.layout.bodies]
+    touched = _touched(room, transition.before.vector[None])[0]
     found = {part.object: [True, False] for part in said.parts}
     for part in said.parts:
         off = not abs(part.value - transition.after[part.object][part.property]) <= EXACT
@@ -234,7 +255,7 @@ def _told_of(room: Room, said: ScenePrediction, transition: Transition) -> NDArr
         found[part.object][1] |= part.ok and off
     counts = np.zeros(5, dtype=np.int64)
     for name, (right, wrong) in found.items():
-        if touched[names.index(name)]:
+        if touched[_place(room, name)]:
             counts += [1, right, wrong, 0, 0]
         else:
             counts += [0, 0, 0, 1, wrong]
