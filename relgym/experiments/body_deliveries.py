@@ -33,12 +33,15 @@ DELIVERY: Final = Course(
 spreads until he is, sequences of actions drawn about a mean often don't. In batches twice as large a branch costs half
 as much; and once a plan delivers, one batch in vain is enough."""
 
-CUT: Final = 250
-"""Steps after which an episode to learn from is cut short: other bodies show more than the same ones do."""
+CUT: Final = 100
+"""Steps after which an episode to learn from is cut short: other bodies elsewhere show more than the same ones."""
 
 HELD: Final = (1, 2, 4, 8, 16)
 """Decisions that a random action to learn from is held for. A pusher who changes his mind at every decision hardly ever
 touches a box: one seed of two saw none move in 5,000 steps."""
+
+BANG: Final = 0.5
+"""Share of those actions whose every component is at an end of its range, as `PlanningAgent` acts at random."""
 
 ARMS: Final = {
     "relgym": "plans in what relgym learned",
@@ -110,6 +113,7 @@ def _simulator(arm: str, seed: int) -> Simulator:
     for _ in range(REAL):
         if not left:
             action, left = env.action_space.sample(), DELIVERY.repeat * int(rng.choice(HELD))
+            action = np.sign(action) if rng.random() < BANG else action
         _, _, terminated, truncated, _ = env.step(action)
         left, lasted = left - 1, lasted + 1
         for real in env.take():
