@@ -236,8 +236,7 @@ def asked(model: WorldModel, rooms: Iterable[Room]) -> Tally:
 def _touched(room: Room, vectors: Float2D) -> NDArray[np.bool_]:
     """Which of a room's bodies touch something, shape ``(n, bodies)``."""
     relations = Extractor(room.schema).extract(room.layout, vectors)
-    touched: NDArray[np.bool_] = relations.relation("intersect").any(axis=2)
-    return touched
+    return np.asarray(relations.relation("intersect").any(axis=2))
 
 
 def _place(room: Room, name: str) -> int:
