@@ -45,6 +45,9 @@ FEW: Final = 2
 FEW_EPISODES: Final = 5
 """Episodes that a whole model learns from among other forces, and that it and such worlds are tested on."""
 
+TIMED: Final = 2
+"""Further episodes in which the time of learning is taken."""
+
 FEW_PARCELS: Final = 2
 """Episodes for each seed of the ensemble of nets, which takes long."""
 
@@ -296,7 +299,11 @@ STRANGE: Final = {
 
 
 def _models(extent: Extent, known: Known) -> Section:
-    setting = {"setting": asdict(Setting(friction=0.5)), "episodes": min(extent.episodes, PART // 2)}
+    setting = {
+        "setting": asdict(Setting(friction=0.5)),
+        "episodes": min(extent.episodes, PART // 2),
+        "timed": TIMED,
+    }
     found = known(
         "body_trials:model_trial",
         [{**setting, "seed": seed, "test_episodes": FEW_EPISODES} for seed in extent.seeds],

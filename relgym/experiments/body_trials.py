@@ -366,24 +366,33 @@ def _inertia_errors(book: LawBook, setting: Setting) -> tuple[float | None, floa
 
 
 def model_trial(
-    *, setting: Mapping[str, Any], seed: int, episodes: int, test_episodes: int
+    *, setting: Mapping[str, Any], seed: int, episodes: int, test_episodes: int, timed: int = 0
 ) -> dict[str, Any]:
     """The whole model, modes and all: what it claims while it learns and of fresh scenes, and what learning costs.
+
+    Parameters
+    ----------
+    setting, seed, episodes
+        Where it learns: so many episodes of 200 steps.
+    test_episodes
+        Fresh ones, of `TEST`.
+    timed
+        Further episodes that are learned from for the time that takes.
 
     Returns
     -------
     ``learning`` and ``fresh``, tallies as lists; ``scenes``, per cent of fresh scenes of which all is claimed and
-    right, and of those of which some claim is wrong; ``cost``, processor time of a transition in two further episodes,
-    in ms.
+    right, and of those of which some claim is wrong; ``cost``, processor time of a transition in the timed episodes, in
+    ms, or None.
     """
     there = setting_of(setting)
     model, told = watched(body_rooms(there, episodes, seed=seed))
-    later = body_rooms(there, 2, seed=seed + 1_000)
+    later = body_rooms(there, timed, seed=seed + 1_000)
     started = process_time()
     for room in later:
         for transition in room.transitions():
             model.learn_one(transition)
-    cost = 1e3 * (process_time() - started) / sum(map(len, later))
+    cost = 1e3 * (process_time() - started) / sum(map(len, later)) if later else None
     right, wrong, count = 0, 0, 0
     rooms = body_rooms(there, test_episodes, seed=TEST)
     for room in rooms:
