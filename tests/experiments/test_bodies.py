@@ -108,7 +108,8 @@ def test_a_models_claims_at_once_are_those_one_by_one() -> None:
     model, told = watched(body_rooms(SETTING, 1, seed=1, steps=60))
     assert told.contacts + told.free == 3 * 60
     (room,) = body_rooms(SETTING, 1, seed=2, steps=60)
-    touched = Extractor(room.schema).extract(room.layout, room.vectors[:-1]).relation("intersect").any(axis=2)
+    relations = Extractor(room.schema).extract(room.layout, room.vectors[:-1])
+    touched = np.asarray(relations.relation("intersect").any(axis=2))
     right, wrong = [0, 0], [0, 0]  # flying, touching
     for step, transition in enumerate(room.transitions()):
         said = model.predict_one(transition.before)
