@@ -46,8 +46,7 @@ FEW_EPISODES: Final = 5
 """Episodes that most whole models learn from among other forces, and that they and such worlds are tested on."""
 
 WHOLE: Final = {"conveyor": (FEW_EPISODES, 2 * FEW_EPISODES)}
-"""Other numbers of episodes for the whole model: in 1,000 transitions bodies may touch the one wall in four that runs so
-seldom that nothing speaks surely against its being like the others."""
+"""Other numbers of episodes for the whole model: in 1,000 transitions bodies may hardly touch the wall that runs."""
 
 TIMED: Final = 2
 """Further episodes in which the time of learning is taken."""
