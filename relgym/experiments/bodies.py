@@ -329,7 +329,7 @@ def _deliveries(extent: Extent, known: Known) -> Section:
     measures: list[Measure] = []
     notes: list[str] = []
     for arm, title in ARMS.items():
-        # Nets plan anew at every decision, and mostly until the time is up: a hundred times as long.
+        # Nets are planned in anew at every decision, mostly until time is up: that takes eight times as long.
         count = min(extent.parcels, FEW_PARCELS) if arm == "ensemble" else extent.parcels
         found = known(
             "body_deliveries:delivered",
