@@ -333,7 +333,7 @@ class LawLearner:
             error = np.abs(motion.velocity[:, 0] - after).max(axis=0)
             done = np.abs(after - self.book.free_motion(cast, vector[None])[1][:, 0]).max(axis=0)
             off = ~(error <= slack) & ~(error <= done / TOLD)
-            acts = ~(done <= slack)  # who is let go tells nothing of what a contact does
+            acts = off | ~(done <= slack)  # who is let go, as was said, tells nothing of what a contact does
         found: set[Kind] = set()
         for pair in touching.tolist():
             bodies = [
