@@ -84,17 +84,20 @@ class Examination:
         Where.
     episodes
         How many.
+    first
+        Number of the first one.
     arguments
         Of the env, where they differ from the course's.
     """
 
-    def __init__(self, course: Course, episodes: int = EPISODES, **arguments: Any) -> None:
+    def __init__(self, course: Course, episodes: int = EPISODES, *, first: int = 0, **arguments: Any) -> None:
         self._envs = [make_env(course, **arguments) for _ in range(episodes)]
+        self._seeds = [_FIRST_EPISODE + first + k for k in range(episodes)]
         self._horizon = course.horizon
 
     def successes(self, agent: Any) -> int:
         """How many episodes the agent's best actions end well; ``info["is_success"]`` at the end counts."""
-        firsts = [env.reset(seed=_FIRST_EPISODE + k)[0] for k, env in enumerate(self._envs)]
+        firsts = [env.reset(seed=seed)[0] for env, seed in zip(self._envs, self._seeds, strict=True)]
         seen, good = np.stack(firsts), 0
         going = np.arange(len(self._envs))
         for _ in range(self._horizon):

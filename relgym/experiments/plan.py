@@ -161,6 +161,8 @@ class Tests:
         Where.
     episodes
         How many, of `EPISODES`.
+    first
+        Number of the first one.
     failures
         Most episodes that may fail: one more ends a test. None: all episodes are played.
 
@@ -170,10 +172,12 @@ class Tests:
         Of all tests so far: decisions, and processor time to choose them.
     """
 
-    def __init__(self, course: Course, episodes: int = EPISODES, *, failures: int | None = None) -> None:
+    def __init__(
+        self, course: Course, episodes: int = EPISODES, *, first: int = 0, failures: int | None = None
+    ) -> None:
         env = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
         self._env: gym.Env[Any, Any] = ActionRepeat(env, course.repeat) if course.repeat > 1 else env
-        self._episodes = episodes
+        self._first, self._episodes = first, episodes
         self._failures = episodes if failures is None else failures
         self.decisions, self.seconds = 0, 0.0
 
@@ -181,7 +185,7 @@ class Tests:
         """How many episodes the agent ends well, and of how many; ``info["is_success"]`` at the end counts."""
         good = 0
         for k in range(self._episodes):
-            seen, _ = self._env.reset(seed=_FIRST_EPISODE + k)
+            seen, _ = self._env.reset(seed=_FIRST_EPISODE + self._first + k)
             state, over = None, False
             info: dict[str, Any] = {}
             while not over:

@@ -326,13 +326,14 @@ class LawLearner:
         Laws are learned from contacts in one point. How they do where bodies lie flat, or touch others, shows here. An
         engine that hasn't settled is off by little: laws are wrong that are off by a hundredth of what contacts did.
         """
+        if not len(touching):
+            return False
         slack = SPREAD * self.book.tolerance
         with np.errstate(invalid="ignore"):
             error = np.abs(motion.velocity[:, 0] - after).max(axis=0)
-            off = ~(error <= slack)
-            if off[list(cast.movers)].any():
-                done = np.abs(after - self.book.free_motion(cast, vector[None])[1][:, 0]).max(axis=0)
-                off &= ~(error <= done / TOLD)
+            done = np.abs(after - self.book.free_motion(cast, vector[None])[1][:, 0]).max(axis=0)
+            off = ~(error <= slack) & ~(error <= done / TOLD)
+            acts = off | ~(done <= slack)  # who is let go, as was said, tells nothing of what a contact does
         found: set[Kind] = set()
         for pair in touching.tolist():
             bodies = [
@@ -342,7 +343,7 @@ class LawLearner:
                 continue
             kind = cast.kinds[pair]
             counts = self._claims.setdefault(kind, [0, 0])
-            counts[0] += 1
+            counts[0] += any(acts[body] for body in bodies)
             counts[1] += any(off[body] for body in bodies)
             if kind not in self._doubted and doubtful(counts[1], counts[0], LEFT_OPEN):
                 found.add(kind)

@@ -127,8 +127,17 @@ class AxisLaw:
         return stated, self.signs, self.trusted(), self.doubted
 
     def trusted(self, kind: Kind | None = None) -> bool:
-        """Whether it explains nearly all of its own examples (of a kind): what it doesn't, it must not claim."""
-        return self.unexplained <= LEFT_OPEN * self.examples and kind not in self.doubted
+        """Whether it explains nearly all of its own examples (of a kind): what it doesn't, it must not claim.
+
+        A kind never seen is doubted where one of the bodies is known from doubted kinds alone: what a belt does to
+        boxes no law says, and it may do that to others.
+        """
+        if self.unexplained > LEFT_OPEN * self.examples or kind in self.doubted:
+            return False
+        if kind is None or kind in self.kinds or not self.doubted:
+            return True
+        fine = {name for each in self.kinds if each not in self.doubted for name in each}
+        return not any(name not in fine and any(name in each for each in self.doubted) for name in kind)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""

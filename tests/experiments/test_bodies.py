@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from relgym.experiments.bodies import FORCES, STRANGE, main
-from relgym.experiments.body_trials import Tally, rolled, setting_of, tally
+from relgym.experiments.bodies import FEW_PARCELS, FORCES, SECTIONS, STRANGE, Extent, Known, main
+from relgym.experiments.body_deliveries import ARMS, delivered
+from relgym.experiments.body_trials import EXACT, Tally, asked, rolled, setting_of, tally, watched
 from relgym.experiments.body_worlds import ROOM, Setting, body_masses, body_rooms, checked_rooms
 from relgym.laws.book import LawBook
 from relgym.laws.learner import LawLearner
+from relgym.scene.relations import Extractor
 
 SETTING = Setting(("box", "tee"), friction=0.5)
 
@@ -100,6 +102,48 @@ def test_rooms_keep_their_bodies_and_their_seed() -> None:
             # Velocity is the last displacement.
             moved = np.diff(room.vectors[:, start : start + 2], axis=0)
             assert moved == pytest.approx(room.vectors[1:, start + 9 : start + 11], abs=1e-12)
+
+
+def test_a_models_claims_at_once_are_those_one_by_one() -> None:
+    model, told = watched(body_rooms(SETTING, 1, seed=1, steps=60))
+    assert told.contacts + told.free == 3 * 60
+    (room,) = body_rooms(SETTING, 1, seed=2, steps=60)
+    relations = Extractor(room.schema).extract(room.layout, room.vectors[:-1])
+    touched = np.asarray(relations.relation("intersect").any(axis=2))
+    right, wrong = [0, 0], [0, 0]  # flying, touching
+    for step, transition in enumerate(room.transitions()):
+        said = model.predict_one(transition.before)
+        for body, name in enumerate(("disc", "body1", "body2")):
+            own = [part for part in said.parts if part.object == name]
+            off = [abs(part.value - transition.after[name][part.property]) > EXACT for part in own]
+            claimed = [part.ok for part in own]
+            right[int(touched[step, body])] += all(claimed) and not any(off)
+            wrong[int(touched[step, body])] += any(c and o for c, o in zip(claimed, off, strict=True))
+    contacts = int(touched[:, :3].sum())
+    assert right[0] > 0
+    assert asked(model, [room]) == Tally(contacts, right[1], wrong[1], 3 * 60 - contacts, wrong[0])
+
+
+def test_parcels_of_all_seeds_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twenty episodes of each seed make a hundred; of the ensemble's, which takes long, those that begin them."""
+    extent = Extent(seeds=(410, 411), episodes=1, tests=1, parcels=20)
+    wanted = Known(None)
+    SECTIONS["deliveries"](extent, wanted)
+    told = [task.arguments for task in wanted.missing]
+    assert [(each["arm"], each["first"], each["episodes"]) for each in told] == [
+        (arm, first, FEW_PARCELS if arm == "ensemble" else 20) for arm in ARMS for first in (0, 20)
+    ]
+    result = {"good": 1, "episodes": 2, "learning": 3.0, "testing": 8.0}
+    monkeypatch.setattr(Known, "__call__", lambda self, function, arguments: [result, {**result, "good": 2}])
+    _, measures, notes = SECTIONS["deliveries"](replace(extent, parcels=2), Known(None))
+    assert [(m.values, m.ok) for m in measures] == [((50.0, 100.0), False)]
+    assert f"{ARMS['sac']}: 3 of 4 episodes (1, 2 of 2)" in notes
+    assert f"{ARMS['sac']}: 3 s of processor time to learn, 4 s for an episode (median)" in notes
+
+
+@pytest.mark.slow
+def test_parcels_are_delivered_by_plans_in_what_was_learned() -> None:
+    assert delivered(arm="relgym", seed=7, episodes=2, first=1_000)["good"] == 2
 
 
 def test_unknown_benchmarks_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -56,6 +56,27 @@ def test_the_exact_engine_is_the_ceiling() -> None:
     assert found["successes"] in (0, 100) and found["decision"] > 0.0
 
 
+def test_tests_begin_with_the_episode_that_is_asked_for() -> None:
+    """The second and third of three are the three without the first."""
+
+    class Stub:
+        def __init__(self) -> None:
+            self.space = gym.make(TINY.env_id, **TINY.arguments).action_space
+            self.firsts: list[Any] = []
+
+        def predict(self, seen: Any, state: Any) -> tuple[Any, bool]:
+            if state is None:
+                self.firsts.append({name: values.tolist() for name, values in seen.items()})
+            self.space.seed(0)
+            return self.space.sample(), True
+
+    whole, rest = Stub(), Stub()
+    assert plan.Tests(TINY, 3).successes(whole)[1] == 3
+    assert plan.Tests(TINY, 2, first=1).successes(rest)[1] == 2
+    assert rest.firsts == whole.firsts[1:]
+    assert whole.firsts[0] != whole.firsts[1]
+
+
 def test_nets_are_planned_in_by_the_same_agent() -> None:
     pytest.importorskip("torch")
     from relgym.baselines.ensemble import MLPEnsemble

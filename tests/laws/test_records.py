@@ -187,3 +187,14 @@ def test_the_first_region_that_surely_holds_counts() -> None:
         "ball", law.components, regions=(Region((Bound("px", False, 0.0, 1.0),), (wind,)), regions[1])
     )
     assert below.says() != law.says()
+
+
+def test_who_is_known_from_doubted_kinds_alone_is_doubted_with_others_too() -> None:
+    kinds = (("box", "wall"), ("box", "belt"))
+    law = AxisLaw((FREE,), "max", kinds, examples=100, doubted=(("box", "belt"),))
+    assert law.trusted(("box", "wall")) and not law.trusted(("box", "belt"))
+    assert not law.trusted(("disc", "belt"))  # never seen: whatever the belt does to boxes
+    assert law.trusted(("disc", "wall"))
+    assert law.trusted(("box", "disc"))  # boxes are all right against walls
+    assert law.trusted(("disc", "tee"))  # of both nothing is known that would speak against it
+    assert AxisLaw((FREE,), "max", kinds, examples=100).trusted(("disc", "belt"))

@@ -232,7 +232,7 @@ def _doubt(part: PropertyModel) -> str:
         return "no mode learned yet"
     if part.doubtful:
         share = 100.0 * part.calibration.share(_PREDICTED)
-        return f"such predictions were right in {share:.2g} % of the latest cases, and none is claimed"
+        return f"such predictions were right in {share:.3g} % of the latest cases, and none is claimed"
     known = part.calibration.trials and part.config.abstain
     return "nothing tells yet which of these holds" if part.undecided and not known else ""
 
