@@ -45,7 +45,7 @@ FEW: Final = 2
 FEW_EPISODES: Final = 5
 """Episodes that most whole models learn from among other forces, and that they and such worlds are tested on."""
 
-WHOLE: Final = {"conveyor": (FEW_EPISODES, 2 * FEW_EPISODES)}
+WHOLE: Final = {"conveyor": (FEW_EPISODES, PART)}
 """Other numbers of episodes for the whole model: in 1,000 transitions bodies may hardly touch the wall that runs."""
 
 TIMED: Final = 2
