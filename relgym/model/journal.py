@@ -9,12 +9,15 @@ steps alone: to take them again leads to the same model, bit for bit.
 from __future__ import annotations
 
 import copy
+import io
 import pickle
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from relgym.config.constants import MORE_ROOM
 
 __all__ = ["Journal"]
 
@@ -28,7 +31,7 @@ NUMBERS = 1_000_000
 """... or after steps of so many numbers together: of large scenes fewer are kept."""
 
 LARGE = 1 << 14
-"""Arrays of so many bytes and more are copied beside what is serialised, into the room of the last checkpoint."""
+"""Arrays of so many bytes and more are copied beside what is serialised."""
 
 
 class Journal:
@@ -37,16 +40,16 @@ class Journal:
     Notes
     -----
     Costs one serialised copy of the object in memory, the steps kept, and the time to serialise it once in `STEPS`
-    steps: of a long history little more than what it takes to copy its bytes, some 0.25 ms a megabyte. For that the
-    copies take up the room of the last ones, since memory that is new to a process takes several times as long to write
-    to. What can't be serialised, such as a user's function that has no name of its own, is
-    copied, in some five times the time.
+    steps: of a long history little more than what it takes to copy its bytes, some 0.25 ms a megabyte. For that a copy
+    takes up the room of the last one: memory that is new to a process takes several times as long to write to, and what
+    is freed and asked for in ever other sizes leaves gaps that nobody fills. What can't be serialised, such as a user's
+    function that has no name of its own, is copied, in some five times the time.
     """
 
     def __init__(self) -> None:
         self._taken: tuple[Callable[[], Any], list[Entry]] | None = None
         self._numbers = 0
-        self._room: list[NDArray[np.uint8]] = []
+        self._text, self._room = io.BytesIO(), np.empty(0, dtype=np.uint8)
 
     def prepare(self, whole: Callable[[], Any]) -> int:
         """Make ready for a step; what `drop` is to be given.
@@ -87,24 +90,31 @@ class Journal:
 
     def _copied(self, whole: Any) -> Callable[[], Any]:
         """A function that gives the object as it is now."""
-        spare: dict[int, list[NDArray[np.uint8]]] = {}
-        for room in self._room:
-            spare.setdefault(room.nbytes, []).append(room)
-        self._room = []
+        large: list[NDArray[np.uint8]] = []
 
         def aside(buffer: pickle.PickleBuffer) -> bool:
             content = np.frombuffer(buffer.raw(), dtype=np.uint8)
             if content.nbytes < LARGE:
                 return True  # to be serialised with the rest
-            free = spare.get(content.nbytes)
-            self._room.append(free.pop() if free else np.empty(content.nbytes, dtype=np.uint8))
-            np.copyto(self._room[-1], content)
+            large.append(content)
             return False
 
+        self._text.seek(0)
         try:
-            kept = pickle.dumps(whole, protocol=5, buffer_callback=aside)
+            pickle.Pickler(self._text, protocol=5, buffer_callback=aside).dump(whole)
         except (AttributeError, TypeError, pickle.PicklingError):
-            self._room = []
             copied = copy.deepcopy(whole)
             return lambda: copy.deepcopy(copied)
-        return lambda: pickle.loads(kept, buffers=[bytearray(room) for room in self._room])
+        self._text.truncate()
+        ends = np.cumsum([content.nbytes for content in large], dtype=np.int64).tolist()
+        if ends and ends[-1] > len(self._room):
+            self._room = np.empty(int((1.0 + MORE_ROOM) * ends[-1]), dtype=np.uint8)
+        places = [slice(end - content.nbytes, end) for content, end in zip(large, ends, strict=True)]
+        for content, place in zip(large, places, strict=True):
+            np.copyto(self._room[place], content)
+
+        def again() -> Any:
+            self._text.seek(0)
+            return pickle.Unpickler(self._text, buffers=[bytearray(self._room[p]) for p in places]).load()
+
+        return again

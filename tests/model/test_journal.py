@@ -158,7 +158,8 @@ def test_a_checkpoint_takes_up_the_room_of_the_last_one() -> None:
     whole = {"history": np.arange(50_000.0), "few": np.arange(3.0), "name": "x"}
     kept = journal.Journal()
     kept.prepare(lambda: whole)
-    (room,) = kept._room
+    room = kept._room
+    assert 400_000 <= len(room) < 500_000
     whole["history"][0] = 7.0  # type: ignore[index]
     again = kept.replayed(lambda *_: None)
     assert again["history"][0] == 0.0
@@ -166,6 +167,16 @@ def test_a_checkpoint_takes_up_the_room_of_the_last_one() -> None:
     assert kept.replayed(lambda *_: None)["history"][1] == 1.0
     kept.forget()
     kept.prepare(lambda: whole)
-    assert kept._room[0] is room
+    assert kept._room is room
     found = kept.replayed(lambda *_: None)
     assert found["history"][0] == 7.0 and found["few"].tolist() == [0.0, 1.0, 2.0] and found["name"] == "x"
+    whole["name"] = "y" * 100_000
+    for name in ("history", "more"):  # smaller and larger than what was there
+        whole[name] = np.arange(60_000.0 if name == "more" else 40_000.0)
+        kept.forget()
+        kept.prepare(lambda: whole)
+        found = kept.replayed(lambda *_: None)
+        np.testing.assert_array_equal(found[name], whole[name])
+        assert found["name"] == whole["name"]
+        whole["name"] = "z"
+    assert len(kept._room) > len(room)
