@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.config.constants import FIRST_ROOM
-from relgym.numeric.growing import grown
+from relgym.numeric.growing import grown, thin
 
 __all__ = ["ExampleTable"]
 
@@ -90,8 +90,7 @@ class ExampleTable:
         n = int(rows.sum())
         names = ("_x", "_signature", "_stratum", "_bodies", "_serial")
         for name in names:
-            array = getattr(self, name)
-            array[:n] = array[: self._size][rows]
+            thin(getattr(self, name), rows)
         self._size = n
         used, numbers = np.unique(self.strata, return_inverse=True)
         self._stratum[:n] = numbers

@@ -1,4 +1,4 @@
-"""Arrays that rows are appended to."""
+"""Arrays that rows are appended to, and dropped from."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from relgym.config.constants import FIRST_ROOM, MORE_ROOM
 
-__all__ = ["grown"]
+__all__ = ["grown", "thin"]
 
 S = TypeVar("S", bound=np.generic)
 
@@ -31,3 +31,23 @@ def grown(array: NDArray[S], most: int | None = None) -> NDArray[S]:
     room = n + max(FIRST_ROOM, int(MORE_ROOM * n))
     room = room if most is None else min(room, most)
     return np.pad(array, ((0, room - n),) + ((0, 0),) * (array.ndim - 1))
+
+
+def thin(array: NDArray[S], kept: NDArray[np.bool_]) -> None:
+    """Move the rows that are kept to the front, in their order.
+
+    In place and a few at a time: a copy of them all would be the largest piece of memory that a learner ever asks for.
+
+    Parameters
+    ----------
+    array
+        Shape ``(m, ...)``; rows behind the first n stay.
+    kept
+        Which of the first n rows are, shape ``(n,)``.
+    """
+    rows, moved = array[: len(kept)], 0
+    for begin in range(0, len(kept), FIRST_ROOM):
+        piece = slice(begin, begin + FIRST_ROOM)
+        some = rows[piece][kept[piece]]
+        array[moved : moved + len(some)] = some
+        moved += len(some)

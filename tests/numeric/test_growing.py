@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relgym.config.constants import FIRST_ROOM
-from relgym.numeric.growing import grown
+from relgym.numeric.growing import grown, thin
 
 
 @pytest.mark.parametrize(
@@ -34,3 +34,15 @@ def test_appending_copies_few_rows() -> None:
     while len(rows) < 200_000:
         copied, rows = copied + len(rows), grown(rows)
     assert copied <= 10 * len(rows)
+
+
+@pytest.mark.parametrize("rows", [0, 1, FIRST_ROOM, 3 * FIRST_ROOM + 7])
+def test_thinned(rows: int) -> None:
+    kept = np.random.default_rng(rows).random(rows) < 0.6
+    for shape in ((rows + 2,), (rows + 2, 3)):
+        array = np.arange(float(np.prod(shape))).reshape(shape)
+        before = array.copy()
+        thin(array, kept)
+        n = int(kept.sum())
+        np.testing.assert_array_equal(array[:n], before[:rows][kept])
+        np.testing.assert_array_equal(array[rows:], before[rows:])
