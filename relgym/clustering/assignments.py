@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import FIRST_ROOM
-from relgym.numeric.growing import grown
+from relgym.numeric.growing import grown, thin
 
 __all__ = ["AssignmentLog"]
 
@@ -79,13 +79,11 @@ class AssignmentLog:
         """
         kept = rows[self.rows]
         self.forgotten.update(self.labels[~kept].tolist())
-        numbers = np.where(kept, np.cumsum(kept) - 1, -1)
-        n = int(kept.sum())
-        places = np.cumsum(rows) - 1
-        self._y[:n], self._label[:n] = self.y[kept], self.labels[kept]
-        self._row[:n] = places[self.rows[kept]]
-        self._size = n
-        return numbers
+        for array in (self._y, self._label, self._row):
+            thin(array, kept)
+        self._size = int(kept.sum())
+        self._row[: self._size] = _numbers(rows)[self.rows]
+        return _numbers(kept)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Arrays that `from_arrays` reads back."""
@@ -101,3 +99,11 @@ class AssignmentLog:
         log.forgotten = Counter(dict(arrays["forgotten"].tolist()))
         log.seen = log._size + log.forgotten.total()
         return log
+
+
+def _numbers(kept: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """New number of every row, -1 where it isn't kept."""
+    found = np.cumsum(kept, dtype=np.int64)
+    found -= 1
+    found[~kept] = -1
+    return found

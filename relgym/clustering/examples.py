@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -92,10 +93,9 @@ class ExampleTable:
         for name in names:
             thin(getattr(self, name), rows)
         self._size = n
-        used, numbers = np.unique(self.strata, return_inverse=True)
-        self._stratum[:n] = numbers
-        keys = list(self._strata)
-        self._strata = {keys[old]: new for new, old in enumerate(used.tolist())}
+        held = np.bincount(self.strata, minlength=len(self._strata)) > 0
+        self._stratum[:n] = (np.cumsum(held, dtype=np.int32) - 1)[self.strata]
+        self._strata = {key: k for k, key in enumerate(compress(self._strata, held.tolist()))}
 
     def signature_id(self, signature: SlotSignature) -> int:
         """Number of the signature; a new one is taken up."""
