@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import ctypes
 import resource
 import statistics
 import sys
@@ -17,7 +19,7 @@ from relgym.config import ModelConfig
 from relgym.model.forgetting import SLACK
 from relgym.wrappers import ModelLearner
 
-__all__ = ["WORLDS", "main", "soak", "summary"]
+__all__ = ["WORLDS", "give_back", "main", "soak", "summary"]
 
 WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "ball": ("relgym/BallBoxRamp-v0", {}),
@@ -25,6 +27,9 @@ WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "lander": ("LunarLander-v3", {}),
 }
 """Id and arguments of each world."""
+
+_MMAP_THRESHOLD, _LARGE = -3, 1 << 17
+"""Number of the parameter of `mallopt(3)`, and its default in bytes, which stays if it is set."""
 
 
 def soak(
@@ -121,6 +126,16 @@ def _memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
+def give_back() -> None:
+    """Have the C library give large pieces of memory back as soon as they are freed, where it is one that can.
+
+    By itself glibc raises the size from which on it does (`mallopt(3)`, M_MMAP_THRESHOLD), and keeps gaps for later:
+    LunarLander's memory then rises once by 1.4 to 2.1 % in 10^5 transitions, though no more is held.
+    """
+    with contextlib.suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, _LARGE)
+
+
 def main() -> None:
     """Soak the worlds that are named, one after the other."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -130,6 +145,7 @@ def main() -> None:
     parser.add_argument("--hours", type=float, default=float("inf"))
     parser.add_argument("--history", type=int, help="examples kept per type; default: the learner's")
     given = parser.parse_args()
+    give_back()
     for name in given.worlds:
         rows = soak(name, given.steps, every=given.every, hours=given.hours, history=given.history)
         history = ModelConfig().history if given.history is None else given.history
