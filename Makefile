@@ -70,7 +70,7 @@ bench: $(DEV)    ## the benchmarks
 
 soak: $(DEV)     ## a million transitions of BallBoxRamp and CartPole: memory, cost and worst step (hours)
 	$(BIN)/python -m relgym.experiments.soak ball cart --steps 1000000
-	$(BIN)/python -m relgym.experiments.soak lander --steps 100000 --history 20000
+	$(BIN)/python -m relgym.experiments.soak lander --steps 100000 --history 20000 --every 1000
 
 outliers: $(DEV) ## what wrong numbers in the stream cost: clean steps predicted with and without them
 	$(BIN)/python -m relgym.experiments.outliers

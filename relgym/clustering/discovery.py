@@ -276,7 +276,7 @@ def likeness(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
     scaled = x[pick][:, columns]
     scaled = scaled / scaled.std(axis=0)
     distance = np.diag(np.full(len(pick), np.inf))
-    for column in scaled.T:  # all at once are as many tables
+    for column in scaled.T:  # one by one: all at once are as many such matrices
         distance += np.square(column[:, None] - column)
     rest = left[pick] - left[pick].mean()
     variance = float(np.square(rest).mean())

@@ -93,7 +93,7 @@ FIRST_ROOM: Final = 256
 """Rows that a growing array has room for at first, and for at least so many more whenever it is full."""
 
 MORE_ROOM: Final = 0.125
-"""Share of its rows that a growing array has room for when it was full: a row is copied eight times on the average."""
+"""Share by which an array that is full grows, as CPython's lists do: a row is copied some eight times in all."""
 
 MOST_STEPS: Final = 10**9
 """Steps of a roll-out, whose predictions all lie in memory: no machine holds more."""

@@ -31,7 +31,7 @@ from relgym.experiments.law_score import Section
 __all__ = ["FORCES", "SECTIONS", "STRANGE", "main"]
 
 SEEDS: Final = (410, 411, 412, 413, 414)
-"""Training seeds; nothing was chosen on them, and nothing on the scenes to test on."""
+"""Training seeds; nothing was chosen on them, or on the scenes to test on, but for the conveyor (see the page)."""
 
 PART: Final = 20
 """Episodes to learn from at most in all worlds but those of pushing: laws are found within ten."""
@@ -45,7 +45,7 @@ FEW: Final = 2
 FEW_EPISODES: Final = 5
 """Episodes that most whole models learn from among other forces, and that they and such worlds are tested on."""
 
-WHOLE: Final = {"conveyor": (FEW_EPISODES, PART)}
+WHOLE: Final = {"conveyor": (FEW_EPISODES, 2 * FEW_EPISODES, PART)}
 """Other numbers of episodes for the whole model: in 1,000 transitions bodies may hardly touch the wall that runs."""
 
 TIMED: Final = 2
@@ -61,8 +61,9 @@ pushes boxes in a room, or boxes fall and topple; relgym reads the laws of conta
 a time, and is then asked of scenes that it never saw. A *contact step* is one transition of one body that touches
 something; it is right if both components of the velocity and the turning rate are, and every one counts. Of what is
 neither right nor wrong relgym says that it doesn't know. *worst* and *median* are over training seeds (410 to 414; *of*
-says how many: where it is fewer than five, no more were run), on which nothing was chosen; all are tested on the same
-scenes. An episode has 200 steps.
+says how many: where it is fewer than five, no more were run); all are tested on the same scenes. Nothing was chosen on
+them but for the conveyor: two rules of when laws are doubted were made after a look at what was wrong there. An episode
+has 200 steps.
 
 Where boxes lie on each other the engine itself (pymunk, 10,000 sweeps a step) doesn't always come to an end. Its own
 residual is the change of a velocity when the same step is solved with twice as many sweeps: steps at which that is

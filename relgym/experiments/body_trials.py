@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 TEST: Final = 510
-"""Seed of the scenes to test on; nothing was chosen on it."""
+"""Seed of the scenes to test on; nothing was chosen on it but for the conveyor (`relgym.experiments.bodies`)."""
 
 EXACT, CLOSE = 1e-9, 1e-6
 

@@ -18,7 +18,7 @@ def grown(array: NDArray[S], most: int | None = None) -> NDArray[S]:
     """An array that is full, with room for more rows, which are zeros.
 
     It grows by the share `MORE_ROOM`, and by `FIRST_ROOM` rows at least: appending a row costs amortised O(width), and
-    a learner that runs for days holds no twice as much as it keeps.
+    a learner that runs for days doesn't hold twice as much as it keeps.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def grown(array: NDArray[S], most: int | None = None) -> NDArray[S]:
 def thin(array: NDArray[S], kept: NDArray[np.bool_]) -> None:
     """Move the rows that are kept to the front, in their order.
 
-    In place and a few at a time: a copy of them all would be the largest piece of memory that a learner ever asks for.
+    In place and a few at a time: a copy of all rows of a long history takes many megabytes at once.
 
     Parameters
     ----------
