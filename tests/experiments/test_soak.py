@@ -18,12 +18,14 @@ def test_a_soak_tells_memory_cost_and_worst_step(capsys: pytest.CaptureFixture[s
 
 
 def test_a_summary_compares_quarters_after_the_bound() -> None:
-    rows = [[10.0 * k, 0.0, 50.0 + k, 1.0 + k, 9.0] for k in range(1, 13)]
+    rows = [[10_000 * k, 0.0, 50.0 + k, 1.0 + k, 9.0] for k in range(1, 13)]
     rows[8][2] = 99.0  # a moment
-    said = summary(rows, 50)
+    said = summary(rows, 50_000)
     assert "55.5 MB in the first quarter, 61.5 in the last (+10.8 %), 99.0 at most" in said
-    assert "3.000 ms at 20.0, 12.500 in the last quarter (4.17 times)" in said
-    assert summary(rows, 100).startswith("too short")
+    assert "3.000 ms up to 20,000, 12.500 in the last quarter (4.17 times)" in said
+    assert summary(rows, 100_000).startswith("too short")
+    finer = [[5_000 * k, 0.0, 50.0, 2.0 if k in (3, 4) else 9.0, 9.0] for k in range(1, 13)]
+    assert "2.000 ms up to 20,000, 9.000 in the last quarter (4.50 times)" in summary(finer, 40_000)
 
 
 def test_wrong_numbers_cost_nothing() -> None:
