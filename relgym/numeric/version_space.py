@@ -78,19 +78,22 @@ class VersionSpace:
         drawn = rng.choice(len(sets), size=count, p=weights / weights.sum())
         width = max(sizes[drawn])
         # A column that is asked twice doesn't matter: short rules are filled up with their first one.
+        # The first columns of all rules, the second ones, …: shape (width, count).
         self._columns = np.array(
             [(*sets[k], *[sets[k][0]] * (width - sizes[k])) for k in drawn], dtype=np.intp
-        )
+        ).T.copy()
         bounds = [self._box(negative[:, list(sets[k])], list(sets[k]), rng) for k in drawn]
-        self._low = np.array([(*low, *[low[0]] * (width - len(low))) for low, _ in bounds])
-        self._high = np.array([(*high, *[high[0]] * (width - len(high))) for _, high in bounds])
+        self._low = np.array([(*low, *[low[0]] * (width - len(low))) for low, _ in bounds]).T.copy()
+        self._high = np.array([(*high, *[high[0]] * (width - len(high))) for _, high in bounds]).T.copy()
 
     def share(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Share of the rules that hold of n points, shape ``(n,)``."""
-        asked = points[:, self._columns]
-        inside: NDArray[np.bool_] = (asked >= self._low) & (asked <= self._high)
-        held = np.asarray(inside.all(axis=2), dtype=np.bool_)
-        share: NDArray[np.float64] = held.mean(axis=1)
+        held = np.ones((len(points), self._columns.shape[1]), dtype=np.bool_)
+        for columns, low, high in zip(self._columns, self._low, self._high, strict=True):
+            asked = points.take(columns, axis=1)
+            held &= asked >= low
+            held &= asked <= high
+        share: NDArray[np.float64] = np.count_nonzero(held, axis=1) / held.shape[1]
         return share
 
     def _sets(self, negative: NDArray[np.float64], longest: int) -> list[tuple[int, ...]]:

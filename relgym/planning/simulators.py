@@ -239,9 +239,10 @@ class ModelSimulator:
         once = np.zeros(count, dtype=np.int64)
         acts = _actions(actions, count, self.action_space)
         for k in range(self.repeat):
-            going = np.flatnonzero(known & ~ended)
-            if not len(going):
+            left = np.flatnonzero(known & ~ended)
+            if not len(left):
                 break
+            going = left if len(left) < count else slice(None)  # which copies nothing
             follow = self._last if k == self.repeat - 1 else self._within
             stepped = follow(found[going], once[going], acts[going])
             found[going] = stepped.vectors

@@ -339,8 +339,7 @@ class LearnedRewardModel(RewardFunctions):
         found = self.model.predict_batch(small, self.unsaid(vectors))
         known = found.ok & self._ever_together(found)
         reward, ended = (found.vectors[:, column] for column in self._told_columns())
-        modes = np.array(_pairs(found), dtype=np.int64).reshape(len(vectors), 2)
-        return np.where(known, reward, np.nan), (ended > 0.5) & known, modes
+        return np.where(known, reward, np.nan), (ended > 0.5) & known, _pairs(found)
 
     def claims(self, vectors: Float2D, ended: NDArray[np.bool_]) -> tuple[tuple[Mode, ...], Float2D]:
         """What each mode of the reward says of n steps, whether it holds there or not.
@@ -402,10 +401,16 @@ class LearnedRewardModel(RewardFunctions):
     def _ever_together(self, found: BatchPrediction) -> NDArray[np.bool_]:
         """Where reward and termination come from modes that were right of one and the same real step."""
         seen, modes = self._reviewed
-        now = tuple(mode.id for prop in _TOLD for mode in self.model.modes(TASK, prop))
+        # Their ids alone: how many examples each has would be counted anew for every batch.
+        learners = [self.model.property_model(TASK, prop).clusterer for prop in _TOLD]
+        now = tuple(number for learner in learners for number in sorted(learner.clusters))
         if self.model.seen >= seen + _REVIEW or now != modes:
             self._reviewed, self._together = (self.model.seen, now), self._right_together()
-        return np.array([pair in self._together for pair in _pairs(found)], dtype=bool)
+        pairs = _pairs(found)
+        together = np.zeros(len(pairs), dtype=np.bool_)
+        for reward, ended in self._together:
+            together |= (pairs[:, 0] == reward) & (pairs[:, 1] == ended)
+        return together
 
     def _right_together(self) -> set[tuple[int, int]]:
         """Modes of reward and termination that are right of some remembered step."""
@@ -415,7 +420,7 @@ class LearnedRewardModel(RewardFunctions):
         columns = self._told_columns()
         found = self.model.predict_batch(self.model.schema.layout(), self.unsaid(said))
         right = found.ok & (np.abs(found.vectors - said)[:, columns] <= _RIGHT).all(axis=1)
-        return {pair for pair, good in zip(_pairs(found), right.tolist(), strict=True) if good}
+        return set(map(tuple, _pairs(found)[right].tolist()))
 
     def _part(
         self, name: str, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
@@ -442,10 +447,9 @@ class LearnedRewardModel(RewardFunctions):
         return self._places[1]
 
 
-def _pairs(found: BatchPrediction) -> list[tuple[int, int]]:
-    """The modes of reward and termination, scene by scene."""
-    reward, ended = (found.parts.index((TASK, prop)) for prop in _TOLD)
-    return list(zip(found.modes[:, reward].tolist(), found.modes[:, ended].tolist(), strict=True))
+def _pairs(found: BatchPrediction) -> NDArray[np.int64]:
+    """The modes of reward and termination, scene by scene, shape ``(n, 2)``."""
+    return found.modes[:, [found.parts.index((TASK, prop)) for prop in _TOLD]]
 
 
 class NeuralModel(Protocol):
