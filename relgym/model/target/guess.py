@@ -22,7 +22,7 @@ from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
-from relgym.config.constants import SEARCHED_CELLS
+from relgym.config.constants import SEARCHED_CELLS, SUMMABLE
 from relgym.model.target.scope import Scope, alike, alike_to, spread_out
 from relgym.numeric.stepwise import LinearFit, fitting_cells, forward_order, least_squares
 from relgym.scene.objects import Target
@@ -114,7 +114,8 @@ class Guesses:
 
     def compare(self, modes: float, own: float) -> None:
         """Take in by how much the modes' prediction and the guess, made before the outcome was learned, were off."""
-        off = np.abs([modes, own])
+        # A guess may lead anywhere: what it is off by is to be summed with what comes later, whatever it is.
+        off = np.minimum(np.nan_to_num(np.abs([modes, own]), nan=np.inf), SUMMABLE)
         self.errors += (np.column_stack([np.square(off), np.sqrt(off)]) - self.errors) / MEMORY
 
     def stale(self, seen: int) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from points import formulas, learned, schema_of, transitions
 
 from relgym.model.prediction import Outcome
-from relgym.model.target.guess import Guesses, _terms
+from relgym.model.target.guess import MEMORY, Guesses, _terms
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Target, Transition
 
@@ -191,3 +192,13 @@ def test_a_guess_replaces_modes_that_err_more(
     again = Guesses.from_json(V, guesses.to_json())
     assert again.superior is better
     assert again.to_json() == guesses.to_json()
+
+
+@pytest.mark.parametrize("off", [1e300, math.inf, math.nan])
+def test_a_guess_that_leads_anywhere_can_be_held_against_what_comes_later(off: float) -> None:
+    guesses = Guesses()
+    for own in (off, 1e-3, off):
+        guesses.compare(1e-3, own)
+    assert np.isfinite(guesses.errors).all() and guesses.errors[1, 0] > 1e280
+    assert guesses.errors[0, 0] == pytest.approx(1e-6 * (1.0 - (1.0 - 1.0 / MEMORY) ** 3))
+    assert not guesses.superior
