@@ -11,6 +11,7 @@ import argparse
 import json
 import math
 import sys
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import date
@@ -269,6 +270,8 @@ def _forces(extent: Extent, known: Known) -> Section:
             )
             notes.append(f"{what}: right, % of contact steps, seed by seed: {right}")
             notes.append(f"{what}, while it learned: claimed and wrong, %: {early}")
+            said = Counter(sentence for each in models for sentence in each["forces"])
+            notes += [f"{what}, {said[each]} of {len(models)} seeds: {each}" for each in sorted(said)]
     whole = f"The whole model: tested on {200 * FEW_EPISODES:,} transitions."
     return "other forces", measures, [f"Laws: {_sizes(extent, PART)}", whole, *notes]
 
