@@ -180,12 +180,10 @@ def state_keys(table: NDArray[np.bool_], layout: SceneLayout, body: int, order: 
     return [prefix + row.tobytes() for row in bits]
 
 
-def relations_of(key: bytes, count: int) -> NDArray[np.bool_]:
-    """Inverse of `state_keys`: which of so many relations hold for which pair of slots, shape ``(R, K, K)``."""
-    kinds, _, bits = key.partition(b":")
-    slots_ = kinds.count(b",") + 1
-    table = np.unpackbits(np.frombuffer(bits, dtype=np.uint8), count=count * slots_**2)
-    return table.astype(np.bool_).reshape(count, slots_, slots_)
+def relations_of(key: bytes, count: int, bodies: int) -> NDArray[np.bool_]:
+    """Inverse of `state_keys`: which of R relations hold for which pair of K bodies, shape ``(R, K, K)``."""
+    bits = np.frombuffer(key.partition(b":")[2], dtype=np.uint8)
+    return np.unpackbits(bits, count=count * bodies**2).astype(np.bool_).reshape(count, bodies, bodies)
 
 
 def _codes(there: NDArray[np.bool_], back: NDArray[np.bool_]) -> NDArray[np.uint64]:

@@ -110,7 +110,7 @@ def test_equal_keys_mean_equal_tables_in_canonical_order() -> None:
         line = [0, *row]
         seen = table[:, line][:, :, line].tobytes()
         assert tables.setdefault(key, seen) == seen
-        np.testing.assert_array_equal(relations_of(key, len(found.names)), table[:, line][:, :, line])
+        np.testing.assert_array_equal(relations_of(key, len(found.names), 3), table[:, line][:, :, line])
     assert len(tables) == len(set(tables.values())) > 20
 
 

@@ -37,8 +37,12 @@ ROWS = 1000
 MOST_TERMS = 6
 """Of a linear law for one component."""
 
-DRAWS = 256
-"""Random samples among which a law is sought."""
+DRAWS, FEW_DRAWS = 256, 16
+"""Random samples among which a law is sought; and one that must hold of nearly all examples: of some twenty three in
+four hold no other ones."""
+
+LEAST = 1e-300
+"""A tolerance is no less: nothing is divided by 0."""
 
 _Array = NDArray[np.float64]
 
@@ -108,13 +112,14 @@ def distant_forces(parts: Parts, unexplained: Sequence[Target]) -> dict[str, tup
             np.stack([log.y[-ROWS:] for log in logs], axis=1),
             parts.perception.extractor.names,
             parts.schema.layout(),
-            STDS * max(log.floor for log in logs),
+            max(book.tolerance, LEAST),
         )
-        told = _together(examples.forces())
-        if not told and book.tolerance > examples.tolerance:  # what can't be exact may be noisy
-            told = _together(replace(examples, tolerance=book.tolerance).forces())
-        if told:
-            found[name] = told
+        # The noise that laws suppose may be what isn't explained; it is more than rounding, then.
+        exact = min(examples.tolerance, max(LEAST, STDS * max(log.floor for log in logs)))
+        for tolerance in dict.fromkeys((exact, examples.tolerance)):
+            if told := _together(replace(examples, tolerance=tolerance).forces()):
+                found[name] = told
+                break
     return found
 
 
@@ -147,17 +152,24 @@ class _Examples:
 
     def forces(self) -> Iterator[DistantForce]:
         """What acts on each of the objects."""
-        touching = self.names.index("intersect")
-        states = [relations_of(key, len(self.names)) for key in self.table.stratum_keys]
-        touched = np.array([state[touching, 0].any() for state in states], dtype=bool)
-        free = ~touched[self.table.strata[self.rows]]
         kinds, own = self.table.signature_ids[self.rows], self.table.bodies[self.rows, 0]
-        for kind, body in sorted(set(zip(kinds[free].tolist(), own[free].tolist(), strict=True))):
-            part = np.flatnonzero(free & (kinds == kind) & (own == body))
-            yield from self._on(self.table.signatures[kind], body, part)
+        for kind in np.unique(kinds).tolist():
+            signature = self.table.signatures[kind]
+            free = (kinds == kind) & ~self._touched(sum(t.has_body for t in signature.types))
+            for body in np.unique(own[free]).tolist():
+                yield from self._on(signature, body, np.flatnonzero(free & (own == body)))
+
+    def _touched(self, bodies: int) -> NDArray[np.bool_]:
+        """Whether the object touches something, where there are so many bodies, shape ``(n,)``."""
+        relation, keys = self.names.index("intersect"), self.table.stratum_keys
+        states, which = np.unique(self.table.strata[self.rows], return_inverse=True)
+        tables = (relations_of(keys[state], len(self.names), bodies) for state in states.tolist())
+        return np.array([table[relation, 0].any() for table in tables], dtype=np.bool_)[which]
 
     def _on(self, signature: SlotSignature, body: int, part: NDArray[np.intp]) -> Iterator[DistantForce]:
         """What acts on one object, in examples of one signature in which it touches nothing."""
+        if self.after[part].size < EVIDENCE:
+            return
         rows = self.rows[part]
         x, y = self.table.x[rows], self.after[part]
         velocity = x[:, [signature.column(0, name) for name in self.sources.velocity]]
@@ -180,15 +192,14 @@ class _Examples:
             return
         apart = np.sqrt((lines[best] ** 2).sum(axis=1))
         moved = np.abs(pull) > self.tolerance
+        # From one example to the next: masses may be others in the next episode.
         farther, stronger = np.diff(apart[moved]), np.diff(np.abs(pull[moved]))
         changed = np.abs(stronger) > self.tolerance
         yield DistantForce(
             (self._name(signature, 0, body),),
             self._name(signature, slots[best], best),
             _sense(pull[moved]),
-            _sense(
-                (farther * stronger)[changed]
-            ),  # from one example to the next, for masses may be others later
+            _sense((farther * stronger)[changed]),
         )
 
     def _columns(self, signature: SlotSignature, x: _Array, velocity: _Array) -> _Array:
@@ -245,11 +256,8 @@ class _Examples:
         weights = np.zeros(features.shape[1])
         weights[list(fit.columns)] = fit.weights
         pull = ((y - columns @ weights.reshape(d, -1).T) * unit).sum(axis=1)
-        return (
-            bits + _exceptions(np.abs(pull) > self.tolerance, price),
-            pull,
-            wrong <= LEFT_OPEN * len(features),
-        )
+        bits += _exceptions(np.abs(pull) > self.tolerance, price)
+        return bits, pull, wrong <= LEFT_OPEN * len(features)
 
     def _law(self, x: _Array, y: _Array, price: float, components: int = 1) -> tuple[LinearFit, float, int]:
         """A linear law, the bits of the examples with it, and how many it leaves unexplained at so many bits each.
@@ -262,7 +270,8 @@ class _Examples:
         if wrong.any():
             # A few examples in which something else happened must not spoil it.
             found = consensus(
-                x, y, sigma=sigma, tolerance=self.tolerance, terms=terms, size=terms + 3, draws=DRAWS,
+                x, y, sigma=sigma, tolerance=self.tolerance, terms=terms, size=terms + 3,
+                draws=DRAWS if components == 1 else FEW_DRAWS,
                 rng=np.random.default_rng(0),
             )  # fmt: skip
             if found is not None and found.size > len(y) - wrong.sum():
@@ -288,11 +297,10 @@ def _exceptions(wrong: NDArray[np.bool_], price: float) -> float:
 
 
 def _sense(values: _Array) -> int:
-    """1 if nearly all are positive, -1 if nearly all are negative, else 0; also of few."""
+    """1 if nearly all are positive, -1 if nearly all are negative, else 0; 0 of few."""
     up, down = int((values > 0.0).sum()), int((values < 0.0).sum())
-    return (
-        0 if max(up, down) < EVIDENCE or min(up, down) > LEFT_OPEN * len(values) else int(np.sign(up - down))
-    )
+    nearly = max(up, down) >= EVIDENCE and min(up, down) <= LEFT_OPEN * len(values)
+    return int(np.sign(up - down)) if nearly else 0
 
 
 def _together(forces: Iterable[DistantForce]) -> tuple[DistantForce, ...]:
