@@ -383,7 +383,7 @@ def model_trial(
     -------
     ``learning`` and ``fresh``, tallies as lists; ``scenes``, per cent of fresh scenes of which all is claimed and
     right, and of those of which some claim is wrong; ``cost``, processor time of a transition in the timed episodes, in
-    ms, or None.
+    ms, or None; ``forces``, what is said of those that act from afar.
     """
     there = setting_of(setting)
     model, told = watched(body_rooms(there, episodes, seed=seed))
@@ -408,6 +408,7 @@ def model_trial(
         "fresh": _listed(asked(model, rooms)),
         "scenes": [100.0 * right / count, 100.0 * wrong / count],
         "cost": cost,
+        "forces": sorted({str(force) for advice in model.advice() for force in advice.forces}),
     }
 
 

@@ -6,18 +6,22 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from relgym.config.constants import EVIDENCE, LEFT_OPEN
+from relgym.config.constants import LEFT_OPEN
 
 __all__ = ["SETTLED", "Ledger", "doubtful"]
 
 
 def doubtful(wrong: int, count: int, share: float) -> bool:
-    """Whether so many of them are wrong that `EVIDENCE` bits speak against a share of at most so much."""
+    """Whether so many wrong ones speak for any share of them whatever rather than for one of `share` at most.
+
+    The likelier of the two: a single wrong one of seven makes the rest doubtful where 2 % may be, one of eight doesn't.
+    """
     if wrong <= share * count:
         return False
-    missed = wrong / count
-    right = 0.0 if wrong == count else (1.0 - missed) * math.log2((1.0 - missed) / (1.0 - share))
-    return count * (missed * math.log2(missed / share) + right) >= EVIDENCE
+    # Of all shares alike: the integral of p^wrong (1 - p)^right, which is wrong! right! / (count + 1)!.
+    right = count - wrong
+    anyhow = math.lgamma(wrong + 1) + math.lgamma(right + 1) - math.lgamma(count + 2)
+    return anyhow > wrong * math.log(share) + right * math.log1p(-share)
 
 
 SETTLED = 500

@@ -881,9 +881,7 @@ class WorldModel:
 
     def _restore_report(self, data: Mapping[str, Any]) -> None:
         if data:
-            advice = tuple(
-                Advice(**each | {"features": tuple(each["features"])}) for each in data.get("advice", ())
-            )
+            advice = tuple(map(Advice.from_json, data.get("advice", ())))
             rules = of_laws(self, parse_rules(data.get("rules", "")))
             told, spoken = (
                 [part.target for part in rules.properties],

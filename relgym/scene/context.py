@@ -180,6 +180,12 @@ def state_keys(table: NDArray[np.bool_], layout: SceneLayout, body: int, order: 
     return [prefix + row.tobytes() for row in bits]
 
 
+def relations_of(key: bytes, count: int, bodies: int) -> NDArray[np.bool_]:
+    """Inverse of `state_keys`: which of R relations hold for which pair of K bodies, shape ``(R, K, K)``."""
+    bits = np.frombuffer(key.partition(b":")[2], dtype=np.uint8)
+    return np.unpackbits(bits, count=count * bodies**2).astype(np.bool_).reshape(count, bodies, bodies)
+
+
 def _codes(there: NDArray[np.bool_], back: NDArray[np.bool_]) -> NDArray[np.uint64]:
     """Which relations (second axis) hold either way round, as bits; the first relation's are the highest."""
     codes = np.zeros((len(there), *there.shape[2:]), dtype=np.uint64)

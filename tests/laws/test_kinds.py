@@ -19,9 +19,24 @@ def test_a_rare_kind_that_a_law_has_wrong_is_doubted(rng: np.random.Generator) -
     assert law.trusted() and law.trusted(("box", "wall")) and not law.trusted(("box", "belt"))
     assert law.doubted == (("box", "belt"),)
     assert AxisLaw.from_json(law.to_json()) == law
-    y[201:] = x[201:, 0]  # one exception alone tells nothing of its kind
+    y[201:] = x[201:, 0]  # those that let go tell nothing of what a contact does where it acts
+    (law,) = fit_together(examples, kinds, [("box", "wall"), ("box", "belt")], rng=rng).laws
+    assert law.doubted == (("box", "belt"),)
+    y[200] = x[200, 0]
     (law,) = fit_together(examples, kinds, [("box", "wall"), ("box", "belt")], rng=rng).laws
     assert law.doubted == ()
+
+
+def test_an_exception_among_many_contacts_that_act_is_none_of_the_kind(rng: np.random.Generator) -> None:
+    u = np.concatenate([rng.uniform(-1.0, 1.0, 200), rng.uniform(-1.0, -0.5, 8)])
+    y = np.maximum(u, 0.0)
+    y[200] = 0.3
+    examples = AxisExamples(("u_n", "1"), np.stack([u, np.ones(208)], axis=1), y, "u_n", 1e-9)
+    names = [("box", "wall"), ("box", "shelf")]
+    for count, doubted in ((7, (("box", "shelf"),)), (8, ())):
+        some = examples.rows(np.arange(208) < 200 + count)
+        (law,) = fit_together(some, np.repeat([0, 1], [200, count]), names, rng=rng).laws
+        assert law.doubted == doubted
 
 
 def test_where_materials_differ_a_kind_shows_its_number_before_it_is_claimed(

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from relgym.laws.ledger import SETTLED, Ledger, doubtful
 
 
@@ -35,10 +38,21 @@ def test_saved_and_restored() -> None:
     assert other.to_json() == ledger.to_json() == [["thing", 1, 1, 1, 1]]
 
 
-def test_doubt_takes_evidence() -> None:
+def test_doubt_goes_by_what_is_likelier() -> None:
     assert not doubtful(0, 0, 0.02)
-    assert not doubtful(1, 1, 0.02)  # 5.6 bits
-    assert doubtful(2, 2, 0.02)  # 11.3 bits
-    assert not doubtful(2, 4, 0.02)
-    assert not doubtful(2, 100, 0.02)
+    assert not doubtful(0, 1_000, 0.02)
+    # 1 / (8 * 7) of all shares alike, 0.02 * 0.98^6 of 2 %.
+    assert doubtful(1, 7, 0.02)
+    assert not doubtful(1, 8, 0.02)
+    assert doubtful(2, 19, 0.02)
+    assert not doubtful(2, 20, 0.02)
+    assert not doubtful(34, 1_000, 0.02)
+    assert doubtful(35, 1_000, 0.02)
     assert doubtful(300, 1_000, 0.1)
+
+
+@given(st.integers(0, 2_000), st.integers(0, 2_000), st.floats(0.01, 0.5))
+def test_more_right_ones_never_make_doubtful(wrong: int, right: int, share: float) -> None:
+    count = wrong + right
+    assert doubtful(wrong + 1, count + 1, share) or not doubtful(wrong, count, share)
+    assert doubtful(wrong, count, share) or not doubtful(wrong, count + 1, share)

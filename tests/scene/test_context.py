@@ -7,7 +7,7 @@ import pytest
 from scenes import random_vectors, schema_of
 
 from relgym.scene import Extractor, canonical_order, signature
-from relgym.scene.context import close_set
+from relgym.scene.context import close_set, relations_of
 from relgym.scene.objects import poses
 from relgym.scene.relations import Relations
 from relgym.scene.schema import SceneSchema
@@ -110,6 +110,7 @@ def test_equal_keys_mean_equal_tables_in_canonical_order() -> None:
         line = [0, *row]
         seen = table[:, line][:, :, line].tobytes()
         assert tables.setdefault(key, seen) == seen
+        np.testing.assert_array_equal(relations_of(key, len(found.names), 3), table[:, line][:, :, line])
     assert len(tables) == len(set(tables.values())) > 20
 
 

@@ -623,6 +623,15 @@ class LawsRecord(Record):
 
 
 # ---------------------------------------------------------------------- the whole
+class ForceRecord(Record):
+    """What moves objects without touching them (`relgym.model.reports.distant`)."""
+
+    objects: Annotated[tuple[str, ...], Meta(min_length=1)]
+    other: str
+    sense: Literal[-1, 0, 1]
+    trend: Literal[-1, 0, 1]
+
+
 class AdviceRecord(Record):
     """What a target lacks (`relgym.model.reports.advice`)."""
 
@@ -634,6 +643,7 @@ class AdviceRecord(Record):
     remains: float
     wrong: int = 0
     spoken: int = 0
+    forces: tuple[ForceRecord, ...] = ()
 
 
 class ReportRecord(Record):

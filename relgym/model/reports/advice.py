@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.features import MOST_FEATURES, library_of, offered, switched_on
 from relgym.clustering.mode import NOISE, sum_text
 from relgym.model.parts import Parts
+from relgym.model.reports.distant import DistantForce, distant_forces
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import ACTION, TASK
 
@@ -67,6 +69,8 @@ class Advice:
     wrong, spoken
         How many of the latest predictions were wrong, of how many, where too many were for anybody to say that the
         modes explain it (`relgym.model.target.hindsight`); else 0.
+    forces
+        What moves objects of the type without touching them, if the target is a component of their velocity.
     """
 
     target: str
@@ -77,16 +81,25 @@ class Advice:
     remains: float
     wrong: int = 0
     spoken: int = 0
+    forces: tuple[DistantForce, ...] = ()
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Advice:
+        """Read what `dataclasses.asdict` wrote."""
+        forces = (
+            DistantForce(**each | {"objects": tuple(each["objects"])}) for each in data.get("forces", ())
+        )
+        return cls(**{**data, "features": tuple(data["features"]), "forces": tuple(forces)})
 
     def __str__(self) -> str:
         return self.told(f"ModelConfig(features={self.features})")
 
     def told(self, remedy: str) -> str:
         """What is lacking, as text, with `remedy` for what switches the features on."""
-        now = self._now()
+        now = "; ".join([self._now(), *map(str, self.forces)])
         if math.isnan(self.remains):
             return now
-        if not self.features:
+        if not self.features or (self.forces and self.remains > GOOD):
             return f"{now}; no library of features that was tried explains it"
         close = f"comes closest, and leaves {_percent(self.remains)}"
         if self.remains <= GOOD:
@@ -185,9 +198,14 @@ def _remains(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) 
 
 
 def advices(parts: Parts) -> tuple[Advice, ...]:
-    """`advise` for all targets that modes predict."""
-    found = [advise(parts.models[t], parts.tables[t.type]) for t in parts.targets if not parts.governs(t)]
-    return tuple(each for each in found if each is not None)
+    """`advise` for all targets that modes predict, with the forces that objects exert from afar."""
+    found = {t: advise(parts.models[t], parts.tables[t.type]) for t in parts.targets if not parts.governs(t)}
+    lacking = {target: each for target, each in found.items() if each is not None}
+    forces = distant_forces(parts, tuple(lacking))
+    for target, each in lacking.items():
+        if target.type in forces and target.property in parts.schema.type(target.type).velocity:
+            lacking[target] = replace(each, forces=forces[target.type])
+    return tuple(lacking.values())
 
 
 def _choose(trials: Iterable[_Trial], left: float) -> _Trial | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -102,6 +102,8 @@ class Explanation:
         What would have been predicted otherwise.
     laws
         What laws of motion predicted it, a line each, where they and no branch did.
+    lacks
+        What moves the object and isn't explained, a sentence each, where nothing is predicted.
     """
 
     prediction: Prediction
@@ -115,6 +117,7 @@ class Explanation:
     bounds: tuple[Bound, ...] = ()
     runner_up: RunnerUp | None = None
     laws: tuple[str, ...] = ()
+    lacks: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -130,6 +133,7 @@ class Explanation:
             said = f"-> {p.value:.{d}g}, a guess" if p.informed else "keeps its value: no prediction"
             yield f"{name}: {self.now:.{d}g} {said}"
             yield f"  outcome   {p.outcome.value}"
+            yield from _labelled("lacks", self.lacks)
         else:
             yield f"{name}: {self.now:.{d}g} -> {p.value:.{d}g}"
         if self.function:
@@ -185,6 +189,7 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
         following = told[1].following
     scenes = SceneBatch(scene.schema, scene.layout, vectors, following)
     parts = iter(prediction.parts)
+    forces = {advice.target: advice.forces for advice in model.advice() if advice.forces}
     found = []
     for target in model.targets:
         for index in scene.layout.of_type(target.type):
@@ -200,7 +205,10 @@ def explanations(model: WorldModel, scene: Scene, *, digits: int = 7) -> tuple[E
                     found.append(Explanation(one, now, digits, laws=(law,)))
                     continue
                 seen = _Seen(model, told, part, scenes, prediction.scene, index, digits)
-                found.append(seen.explained(one, now))
+                each = seen.explained(one, now)
+                named = {one.object, target.type}
+                lacks = tuple(str(f) for f in forces.get(str(target), ()) if named.intersection(f.objects))
+                found.append(each if one.ok else replace(each, lacks=lacks))
     return tuple(found)
 
 
