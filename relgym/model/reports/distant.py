@@ -32,7 +32,7 @@ from relgym.scene.objects import SceneLayout, Target
 __all__ = ["DistantForce", "distant_forces"]
 
 ROWS = 1000
-"""The newest so many examples of a type are looked at."""
+"""The newest so many examples of an object that touches nothing are looked at."""
 
 MOST_TERMS = 6
 """Of a linear law for one component."""
@@ -90,7 +90,7 @@ def distant_forces(parts: Parts, unexplained: Sequence[Target]) -> dict[str, tup
 
     Notes
     -----
-    Cost: a regression on the type's newest examples for each pair of bodies of which one is of the type.
+    Cost: some 5 ms for each pair of bodies of which one is of the type, and moved by what isn't explained.
     """
     found: dict[str, tuple[DistantForce, ...]] = {}
     if parts.laws is None:
@@ -99,17 +99,18 @@ def distant_forces(parts: Parts, unexplained: Sequence[Target]) -> dict[str, tup
     models = {(t.type, t.property): model for t, model in parts.models.items()}
     for name, sources in book.sources.items():
         logs = [models[name, v].clusterer for v in sources.velocity if (name, v) in models]
-        rows = logs[0].rows[-ROWS:] if logs else np.empty(0, dtype=np.int64)
         wanted = any(t.type == name and t.property in sources.velocity for t in unexplained)
         # What came before a target was found isn't among its examples.
-        if not wanted or not len(rows) or not all(np.array_equal(log.rows[-ROWS:], rows) for log in logs):
+        first = [len(log.rows) - min(len(other.rows) for other in logs) for log in logs]
+        shared = [log.rows[k:] for log, k in zip(logs, first, strict=True)]
+        if not wanted or not logs or not len(shared[0]) or (np.stack(shared) != shared[0]).any():
             continue
         examples = _Examples(
             parts.tables[name],
             sources,
             Axes.of(parts.schema),
-            rows,
-            np.stack([log.y[-ROWS:] for log in logs], axis=1),
+            shared[0],
+            np.stack([log.y[k:] for log, k in zip(logs, first, strict=True)], axis=1),
             parts.perception.extractor.names,
             parts.schema.layout(),
             max(book.tolerance, LEAST),
@@ -157,7 +158,7 @@ class _Examples:
             signature = self.table.signatures[kind]
             free = (kinds == kind) & ~self._touched(sum(t.has_body for t in signature.types))
             for body in np.unique(own[free]).tolist():
-                yield from self._on(signature, body, np.flatnonzero(free & (own == body)))
+                yield from self._on(signature, body, np.flatnonzero(free & (own == body))[-ROWS:])
 
     def _touched(self, bodies: int) -> NDArray[np.bool_]:
         """Whether the object touches something, where there are so many bodies, shape ``(n,)``."""
