@@ -180,7 +180,7 @@ def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) ->
         )
         _require(all(len(x) == d and len(y) <= count for x, y in regression.waiting), where, "another width")
         for (_, _, weights), width in zip(regression.ridges, (d, d + d * (d + 1) // 2), strict=False):
-            _require(len(weights) <= count, where, "more weights than targets")
+            _require(0 < len(weights) <= count, where, "expected weights of some of the targets")
             _require(
                 all(len(row) == width + 1 for row in weights), where, "expected a weight for each column"
             )
@@ -757,7 +757,6 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
     names: set[str] = set()
     for k, (_, regression) in enumerate(sorted(body.regressions.items())):
         for number, (_, _, weights) in enumerate(regression.ridges):
-            _require(weights, f"regression{k}", "expected weights")
             width = len(weights[0])
             shapes = {f"gram{number}": (width, width), f"moments{number}": (len(weights), width)}
             for part, shape in shapes.items():
@@ -857,6 +856,8 @@ def _check_examples(
     dropped = arrays[f"{at}.forgotten"]
     _require(_within(dropped, 0, 2**53), f"history: {at}.forgotten", "expected modes and numbers of examples")
     _distinct(dropped[:, 0].tolist(), f"history: {at}.forgotten")
+    within = _within(dropped[:, 0], 0, model.clusterer.next_id)
+    _require(within, f"history: {at}.forgotten", "examples of a mode that never was")
     _require(len(y) or not ids, f"history: {at}.y", "there are modes, but no examples")
     exemplars = model.classifier.exemplars
     if exemplars is not None:

@@ -228,6 +228,9 @@ DAMAGES: dict[str, tuple[str, Change, str]] = {
         lambda b, a: np.copyto(a["table0.bodies"], 0, where=a["table0.bodies"] > 0),
         "every body once",
     ),
+    "forgotten examples of no mode": (
+        "truck-history", lambda b, a: a.update({"target0.forgotten": np.array([[99, 1]])}), "a mode that never was"
+    ),
     "an infinite value": (
         "truck-history", lambda b, a: a["target0.y"].__setitem__(0, np.inf), "expected finite numbers"
     ),
@@ -253,6 +256,15 @@ def test_what_does_not_fit_is_named(name: str, tmp_path: Path) -> None:
     path = tmp_path / "model"
     with pytest.raises(ModelFileError, match=match):
         WorldModel.load(changed(file, change, path))
+
+
+@pytest.mark.parametrize("name", ["mountain-car-calibrated", "cart-pole-calibrated-history"])
+def test_a_regression_without_weights_is_refused(name: str, tmp_path: Path) -> None:
+    body, arrays = read_model(LATER.parent / f"{name}.relgym")
+    body["regressions"]["self"]["ridges"][-1][2] = []
+    write_model(tmp_path / "model", body, arrays)
+    with pytest.raises(ModelFileError, match="expected weights of some of the targets"):
+        WorldModel.load(tmp_path / "model")
 
 
 @pytest.mark.parametrize(
