@@ -260,6 +260,7 @@ class _TargetCheck:
             offered = set(types[role.type].properties)
             offered |= {p + PRIME for t, p in self.target.given if t == role.type}
             names = [name for name, _ in role.terms]
+            _require(names or k == 0, where, "a role of which no property counts")
             _distinct(names, where)
             # Features are worked out of what a row holds; where they aren't offered the mode says nothing.
             features = bool(self.parts.config.features) and k == 0

@@ -228,6 +228,11 @@ DAMAGES: dict[str, tuple[str, Change, str]] = {
         lambda b, a: np.copyto(a["table0.bodies"], 0, where=a["table0.bodies"] > 0),
         "every body once",
     ),
+    "a role without properties": (
+        "truck-history",
+        lambda b, a: _target(b)["clusterer"]["modes"][0]["roles"].append({"type": "truck", "terms": []}),
+        "no property counts",
+    ),
     "forgotten examples of no mode": (
         "truck-history", lambda b, a: a.update({"target0.forgotten": np.array([[99, 1]])}), "a mode that never was"
     ),
