@@ -41,6 +41,9 @@ DRAWS, FEW_DRAWS = 256, 16
 """Random samples among which a law is sought; and one that must hold of nearly all examples: of some twenty three in
 four hold no other ones."""
 
+PAIRS = 600
+"""Of many bodies that something unexplained moves the first ones are looked at: so many pairs take some 3 s."""
+
 LEAST = 1e-300
 """A tolerance is no less: nothing is divided by 0."""
 
@@ -90,7 +93,8 @@ def distant_forces(parts: Parts, unexplained: Sequence[Target]) -> dict[str, tup
 
     Notes
     -----
-    Cost: some 5 ms for each pair of bodies of which one is of the type, and moved by what isn't explained.
+    Cost: some 5 ms for each pair of bodies of which one is of the type, and moved by what isn't explained; at most
+    `PAIRS` of them are looked at.
     """
     found: dict[str, tuple[DistantForce, ...]] = {}
     if parts.laws is None:
@@ -154,11 +158,18 @@ class _Examples:
     def forces(self) -> Iterator[DistantForce]:
         """What acts on each of the objects."""
         kinds, own = self.table.signature_ids[self.rows], self.table.bodies[self.rows, 0]
+        left = PAIRS
         for kind in np.unique(kinds).tolist():
             signature = self.table.signatures[kind]
-            free = (kinds == kind) & ~self._touched(sum(t.has_body for t in signature.types))
+            bodies = sum(t.has_body for t in signature.types)
+            free = (kinds == kind) & ~self._touched(bodies)
             for body in np.unique(own[free]).tolist():
-                yield from self._on(signature, body, np.flatnonzero(free & (own == body))[-ROWS:])
+                if left < bodies - 1:
+                    return
+                found = self._on(signature, body, np.flatnonzero(free & (own == body))[-ROWS:])
+                if found is not None:
+                    left -= bodies - 1
+                    yield from found
 
     def _touched(self, bodies: int) -> NDArray[np.bool_]:
         """Whether the object touches something, where there are so many bodies, shape ``(n,)``."""
@@ -167,10 +178,12 @@ class _Examples:
         tables = (relations_of(keys[state], len(self.names), bodies) for state in states.tolist())
         return np.array([table[relation, 0].any() for table in tables], dtype=np.bool_)[which]
 
-    def _on(self, signature: SlotSignature, body: int, part: NDArray[np.intp]) -> Iterator[DistantForce]:
-        """What acts on one object, in examples of one signature in which it touches nothing."""
+    def _on(
+        self, signature: SlotSignature, body: int, part: NDArray[np.intp]
+    ) -> tuple[DistantForce, ...] | None:
+        """What acts on one object, in examples of one signature in which it touches nothing; None: all is explained."""
         if self.after[part].size < EVIDENCE:
-            return
+            return None
         rows = self.rows[part]
         x, y = self.table.x[rows], self.after[part]
         velocity = x[:, [signature.column(0, name) for name in self.sources.velocity]]
@@ -181,7 +194,7 @@ class _Examples:
         price = min(EXCEPTION_BITS, math.log2(max(change, 1.0)))
         plain = [self._law(columns, component, price) for component in y.T]
         if not lines or sum(wrong for _, _, wrong in plain) < EVIDENCE:
-            return
+            return None
         along = self._across(velocity, columns, y, price)[0]
         told = {other: self._across(line, columns, y, price) for other, line in lines.items()}
         best = min(told, key=lambda other: told[other][0])
@@ -190,18 +203,19 @@ class _Examples:
         least = min(sum(bits for _, bits, _ in plain), along, *others)
         bits, pull, holds = told[best]
         if not holds or bits + math.log2(len(lines)) + EVIDENCE > least:
-            return
+            return ()
         apart = np.sqrt((lines[best] ** 2).sum(axis=1))
         moved = np.abs(pull) > self.tolerance
         # From one example to the next: masses may be others in the next episode.
         farther, stronger = np.diff(apart[moved]), np.diff(np.abs(pull[moved]))
         changed = np.abs(stronger) > self.tolerance
-        yield DistantForce(
+        force = DistantForce(
             (self._name(signature, 0, body),),
             self._name(signature, slots[best], best),
             _sense(pull[moved]),
             _sense((farther * stronger)[changed]),
         )
+        return (force,)
 
     def _columns(self, signature: SlotSignature, x: _Array, velocity: _Array) -> _Array:
         """What a linear law may read: what free laws read, and a constant."""

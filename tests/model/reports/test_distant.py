@@ -13,6 +13,7 @@ from relgym.config import ModelConfig
 from relgym.experiments.bodies import FORCES
 from relgym.experiments.body_trials import watched
 from relgym.experiments.body_worlds import body_rooms
+from relgym.model.reports import distant
 from relgym.model.reports.advice import Advice
 from relgym.model.reports.distant import DistantForce, distant_forces
 from relgym.model.world_model import WorldModel
@@ -123,6 +124,14 @@ def test_those_of_whom_the_same_holds_are_told_together() -> None:
     assert str(told) == (
         "what moves b1 and b2 and isn't explained is a pull towards a0, the weaker the farther apart"
     )
+
+
+def test_of_many_objects_the_first_ones_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    fixed = lambda one, other, apart: attraction(one, other, apart) * (other == "a0")  # noqa: E731
+    monkeypatch.setattr(distant, "PAIRS", 3)  # of four pairs: either of two objects has two
+    assert forces("abb", fixed) == (DistantForce(("b1",), "a0", 1, -1),)
+    monkeypatch.setattr(distant, "PAIRS", 1)
+    assert forces("abb", fixed) == ()
 
 
 def test_where_objects_come_and_go_types_are_named() -> None:
