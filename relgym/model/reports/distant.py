@@ -94,7 +94,7 @@ def distant_forces(parts: Parts, unexplained: Sequence[Target]) -> dict[str, tup
     Notes
     -----
     Cost: some 5 ms for each pair of bodies of which one is of the type, and moved by what isn't explained; at most
-    `PAIRS` of them are looked at.
+    `PAIRS` of them are looked at for each type, twice where laws suppose noise. Where one body alone has more, none.
     """
     found: dict[str, tuple[DistantForce, ...]] = {}
     if parts.laws is None:
