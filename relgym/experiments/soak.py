@@ -15,13 +15,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import gymnasium as gym
+import numpy as np
 
 import relgym  # noqa: F401 - registers the envs
 from relgym.config import ModelConfig
 from relgym.model.forgetting import SLACK
 from relgym.wrappers import ModelLearner
 
-__all__ = ["WORLDS", "give_back", "main", "soak", "summary"]
+__all__ = ["WORLDS", "fill_cache", "give_back", "main", "soak", "summary"]
 
 WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "ball": ("relgym/BallBoxRamp-v0", {}),
@@ -81,6 +82,9 @@ def _serve(name: str, pipe: Connection) -> None:
 
 _MMAP_THRESHOLD, _LARGE = -3, 1 << 17
 """Number of the parameter of `mallopt(3)`, and its default in bytes, which stays if it is set."""
+
+_CACHED, _PER_SIZE = 1024, 7
+"""Sizes in bytes below which numpy keeps freed blocks, and how many of each."""
 
 
 def soak(
@@ -190,6 +194,17 @@ def give_back() -> None:
         ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, _LARGE)
 
 
+def fill_cache() -> None:
+    """Have numpy's cache of small arrays full from the beginning.
+
+    Numpy keeps up to seven freed blocks of each size below 1,024 bytes, for the next array that asks for as many, and
+    gives none back (`numpy/_core/src/multiarray/alloc.c`). As rows of ever other numbers are looked at that cache fills,
+    for hundreds of thousands of steps: .6 MB from 30,000 to 90,000 transitions of LunarLander, 3.6 MB at most.
+    """
+    for size in range(1, _CACHED):
+        _ = [np.empty(size, dtype=np.uint8) for _ in range(_PER_SIZE)]
+
+
 def main() -> None:
     """Soak the worlds that are named, one after the other."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -200,6 +215,7 @@ def main() -> None:
     parser.add_argument("--history", type=int, help="examples kept per type; default: the learner's")
     given = parser.parse_args()
     give_back()
+    fill_cache()
     for name in given.worlds:
         rows = soak(name, given.steps, every=given.every, hours=given.hours, history=given.history)
         history = ModelConfig().history if given.history is None else given.history
