@@ -21,12 +21,12 @@ from relgym.model.world_model import WorldModel
 from relgym.planning.doubts import DoubtedTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
-from relgym.planning.review import learned_again, length, missed, mixed, right
+from relgym.planning.review import changed_at, learned_again, length, missed, mixed, right
 from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
 from relgym.planning.simulators import ModelSimulator, Simulator
 from relgym.planning.tree import TreeSearch
-from relgym.scene.objects import Float1D, Scene
+from relgym.scene.objects import Float1D, Scene, Transition
 from relgym.wrappers.action_repeat import ActionRepeat
 from relgym.wrappers.dyna.acceptance import Spread
 from relgym.wrappers.dyna.config import DynaConfig
@@ -51,7 +51,7 @@ _TASK_ORDERS: Final = 3
 """The same for reward and end, which are compared by a count of mistakes alone: two counts may agree by chance."""
 
 _FIRST_REVIEW: Final = 100
-"""Real steps before the first review."""
+"""Real steps before the first review, and after a change of the world before one by what came since."""
 
 _REMEMBERED: Final = 5_000
 """Latest real steps that a review looks at."""
@@ -172,9 +172,10 @@ class PlanningAgent:
         if model is None:
             model = WorldModel(self._recorder.view.schema, config)
         check_model(model, Lens(self._recorder))
-        self.trainer = ModelTrainer(
-            model, _task(task, env), DynaConfig(shuffle=0, seed=checked_count("seed", seed, 0, 2**31))
-        )
+        options = DynaConfig(shuffle=0, seed=checked_count("seed", seed, 0, 2**31))
+        if isinstance(model, WorldModel):  # reviews replace it
+            options = replace(options, renew=0)
+        self.trainer = ModelTrainer(model, _task(task, env), options)
         adopt = getattr(self.trainer.reward_model, "adopt", None)
         if adopt is not None:  # it is asked about actions as the env understands them
             adopt(Lens(self._recorder).acting)
@@ -190,10 +191,10 @@ class PlanningAgent:
         self._history: deque[Experience] = deque(maxlen=_REMEMBERED)
         self._episodes: deque[int] = deque(maxlen=_REMEMBERED)
         self._begun = 0
-        self._wrong: deque[bool] = deque(maxlen=_LATEST)
+        self._wrong: deque[bool] = deque(maxlen=_REMEMBERED)  # since the model took over
         self._task_wrong: deque[bool] = deque(maxlen=_LATEST)
         self._at_random = True
-        self._next_review = _FIRST_REVIEW
+        self._next_review = self._next_after_change = _FIRST_REVIEW
         self._size = Spread()
         spec = env.spec
         self._limit: int | None = None
@@ -221,7 +222,8 @@ class PlanningAgent:
 
         So many episodes are spent on random actions: a plan in a model that is wrong is no better, and teaches less.
         """
-        return sum(self._wrong) / len(self._wrong) if self._wrong else 1.0
+        latest = list(self._wrong)[-_LATEST:]
+        return sum(latest) / len(latest) if latest else 1.0
 
     def planner(self, *, explores: bool = False) -> Planner:
         """A planner in what has been learned; it follows the model as that learns on.
@@ -387,6 +389,8 @@ class PlanningAgent:
             )
         if self.steps >= self._next_review:
             self._review()
+        if self._wrong[-1] and self._reviewed and self.steps >= self._next_after_change:
+            self._review_change()
 
     def _surprised(self) -> bool:
         """Whether the last step was not as predicted, its reward and end included."""
@@ -397,43 +401,81 @@ class PlanningAgent:
             for key, off in verdict.residuals.items()
         )
 
+    @property
+    def _reviewed(self) -> bool:
+        return isinstance(self.model, WorldModel) and not self.model.frozen
+
     def _review(self) -> None:
-        """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often.
+        """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often."""
+        known = min(self.model.seen, self.steps) if self._reviewed else self.steps
+        self._next_review = self.steps + int(known * _GROWTH) - known + 1
+        if self._reviewed and any(list(self._wrong)[-_LATEST:]):
+            seen, episodes = self._learned_from()
+            own = missed(self.model, seen, episodes) + length(self.model)
+            if (best := self._learned_again(seen, episodes, own)[0]) is not None:
+                self._adopt(best, seen, episodes)
+        if isinstance(self.trainer.reward_model, LearnedRewardModel) and any(self._task_wrong):
+            self._review_task(self.trainer.reward_model)
+
+    def _review_change(self) -> None:
+        """If the model has been wrong more often since some step, see if another one is due from there on.
+
+        The world may have changed: old examples still count then, and nothing in a scene tells old from new. Or it
+        went where it had never been, and what it learns there holds of what it saw before, too. So three are compared:
+        the model at work, one that learns everything again, and two, each for its part. A new one for the second part
+        begins as the first one did, after as many steps.
+        """
+        began = changed_at(self._wrong)
+        if began is None:
+            return
+        since = len(self._wrong) - began
+        self._next_after_change = self.steps + max(_FIRST_REVIEW - since, int(since * _GROWTH) - since + 1)
+        if since < _FIRST_REVIEW:
+            return
+        seen, episodes = self._learned_from()
+        old, new = seen[:-since], seen[-since:]
+        fresh, least = self._learned_again(new, episodes[-since:], missed(self.model, new, episodes[-since:]))
+        if fresh is None:
+            return
+        apart = missed(self.model, old, episodes[:-since]) + length(self.model) + least
+        if (whole := self._learned_again(seen, episodes, apart)[0]) is not None:
+            self._adopt(whole, seen, episodes)
+        else:
+            self._adopt(fresh, new, episodes[-since:])
+
+    def _learned_from(self) -> tuple[list[Transition], NDArray[np.intp]]:
+        """What the model at work has learned from: one that took over after a change knows nothing from before."""
+        seen = [real.transition for real in self._history][-self.model.seen :]
+        return seen, np.array(self._episodes)[-len(seen) :]
+
+    def _learned_again(
+        self, seen: Sequence[Transition], episodes: NDArray[np.intp], least: float
+    ) -> tuple[WorldModel | None, float]:
+        """The best of some models that learned the same steps in other orders, if it costs less than so much.
 
         What they are compared by is how many values it takes to state the model, and what it misses of all that was
         seen (`length`, `missed`). New models have learned from that, and many numbers fit a few episodes exactly; but
         laws are short.
         """
-        self._next_review = int(self.steps * _GROWTH) + 1
-        if isinstance(self.model, WorldModel) and not self.model.frozen and any(self._wrong):
-            self._review_model()
-        if isinstance(self.trainer.reward_model, LearnedRewardModel) and any(self._task_wrong):
-            self._review_task(self.trainer.reward_model)
-
-    def _review_model(self) -> None:
-        # What the model at work has learned from: one that took over in a changed world knows nothing of the old one.
-        seen = [real.transition for real in self._history][-self.model.seen :]
-        episodes = np.array(self._episodes)[-len(seen) :]
-
-        def cost(model: WorldModel) -> float:
-            return missed(model, seen, episodes) + length(model)
-
-        best, least = None, cost(self.model)
+        best = None
         for _ in range(_ORDERS):
             fresh = learned_again(self.model, seen, rng=self._rng, episodes=episodes)
-            found = cost(fresh) if fresh.targets else np.inf
+            found = missed(fresh, seen, episodes) + length(fresh) if fresh.targets else np.inf
             if found == least:
                 break
             if found < least:
                 best, least = fresh, found
-        if best is not None:
-            self.trainer.adopt(best)
-            # It knows what it has learned from, and more than one does that hasn't learned the latest of it: what it
-            # makes of the next steps lies in between.
-            count = min(_LATEST, len(seen) // 2) // 2
-            tested = learned_again(self.model, seen[:-count], rng=self._rng, episodes=episodes[:-count])
-            parts = right(best, seen[-2 * count : -count]), right(tested, seen[-count:])
-            self._wrong = deque((~np.concatenate(parts)).tolist(), maxlen=_LATEST)
+        return best, least
+
+    def _adopt(self, best: WorldModel, seen: Sequence[Transition], episodes: NDArray[np.intp]) -> None:
+        """Go on with a model that learned so many steps."""
+        self.trainer.adopt(best)
+        # It knows what it has learned from, and more than one does that hasn't learned the latest of it: what it
+        # makes of the next steps lies in between.
+        count = min(_LATEST, len(seen) // 2) // 2
+        tested = learned_again(self.model, seen[:-count], rng=self._rng, episodes=episodes[:-count])
+        parts = right(best, seen[-2 * count : -count]), right(tested, seen[-count:])
+        self._wrong = deque((~np.concatenate(parts)).tolist(), maxlen=_REMEMBERED)
 
     def _review_task(self, own: LearnedRewardModel) -> None:
         """The same for reward and end."""

@@ -141,8 +141,47 @@ def test_orders_are_tried_until_two_come_to_the_same(
     monkeypatch.setattr(planning_agent, "learned_again", counted)
     monkeypatch.setattr(planning_agent, "missed", lambda *_: 0)
     monkeypatch.setattr(planning_agent, "length", lambda _: next(told))
-    made._review_model()
+    made._next_review = 10**9
+    made._wrong.append(True)
+    made._task_wrong.clear()
+    made._review()
     assert called == lessons and next(told, None) is None
+
+
+class Sledge(gym.Env[Any, Any]):
+    """A position and a push that moves it; after so many steps of all episodes it moves it by a third as much."""
+
+    observation_space = gym.spaces.Box(-1e3, 1e3, (1,))
+    action_space = gym.spaces.Box(-1.0, 1.0, (1,))
+
+    def __init__(self, changes: int) -> None:
+        self.left, self.at, self.age = changes, 0.0, 0
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        self.at, self.age = float(self.np_random.uniform(-1.0, 1.0)), 0
+        return np.array([self.at]), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        self.left, self.age = self.left - 1, self.age + 1
+        self.at += float(action[0]) * (0.9 if self.left >= 0 else 0.3)
+        return np.array([self.at]), -abs(self.at), False, self.age == 16, {}
+
+
+def test_in_a_changed_world_it_goes_on_with_what_it_learned_since() -> None:
+    made = PlanningAgent(Sledge(150), search=SEARCH, task="learned", random_steps=60, seed=1).learn(150)
+    assert made.doubt == 0.0 and made.model.seen == 150
+    made.learn(270)
+    assert 100 <= made.model.seen <= 120  # of the world as it is now
+    assert made.doubt == 0.0
+
+
+def test_where_it_has_never_been_is_no_other_world() -> None:
+    made = PlanningAgent(Sledge(10**6), search=SEARCH, task="learned", random_steps=60, seed=1).learn(200)
+    learned = made.model
+    made._wrong.extend([False] * 100 + [True] * 100)
+    made._review_change()
+    assert made.model is learned  # which explains all that was seen
 
 
 def test_an_agent_is_pickled_in_mid_life() -> None:
