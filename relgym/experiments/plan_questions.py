@@ -19,11 +19,8 @@ __all__ = ["QUESTIONS", "Question"]
 
 _PLAN: Final = "relgym.experiments.plan"
 
-_EXPLORATION: Final[Mapping[str, int]] = {"truck": 1_500, "ball": 400}
-"""Real decisions in which agents get to know a world."""
-
-_EVERY: Final = 25
-"""Real decisions between two tests of what they know."""
+_EXPLORATION: Final[Mapping[str, tuple[int, int]]] = {"truck": (1_500, 25), "ball": (60, 1)}
+"""Real decisions in which agents get to know a world, and from one test of what they know to the next."""
 
 _MORE: Final = 2.0
 """How many times as many decisions random play is to take, and in what share of the seeds."""
@@ -77,11 +74,11 @@ def _exploration_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
     return [
         Task(
             f"{_PLAN}:knowing",
-            {"course": course, "explores": explores, "seed": seed, "steps": steps, "every": _EVERY},
+            {"course": course, "explores": explores, "seed": seed, "steps": steps, "every": every},
             f"plan exploration {course}",
         )
         for seed in seeds
-        for course, steps in _EXPLORATION.items()
+        for course, (steps, every) in _EXPLORATION.items()
         for explores in (True, False)
     ]
 
@@ -93,13 +90,13 @@ def _exploration_told(found: Sequence[tuple[Task, Any]]) -> tuple[list[Measure],
     }
     measures: list[Measure] = []
     rows: list[list[Cell]] = []
-    for course, steps in _EXPLORATION.items():
+    for course, (steps, every) in _EXPLORATION.items():
         ratios = []
         for seed in sorted({seed for name, seed, _ in known if name == course}):
             if not {(course, seed, True), (course, seed, False)} <= known.keys():
                 continue
             both = known[course, seed, True], known[course, seed, False]
-            own, other = (steps + _EVERY if at is None else at for at in both)
+            own, other = (steps + every if at is None else at for at in both)
             ratios.append(other / own)
             told = [f"> {steps:,}" if at is None else f"{at:,}" for at in both]
             rows.append([COURSES[course].title, str(seed), *told, f"{ratios[-1]:.1f}"])
