@@ -84,7 +84,7 @@ _MMAP_THRESHOLD, _LARGE = -3, 1 << 17
 """Number of the parameter of `mallopt(3)`, and its default in bytes, which stays if it is set."""
 
 _CACHED, _PER_SIZE = 1024, 7
-"""Sizes in bytes below which numpy keeps freed blocks, and how many of each."""
+"""Sizes in bytes below which numpy keeps memory that was freed, and how many pieces of each."""
 
 
 def soak(
@@ -197,8 +197,8 @@ def give_back() -> None:
 def fill_cache() -> None:
     """Have numpy's cache of small arrays full from the beginning.
 
-    Numpy keeps up to seven freed blocks of each size below 1,024 bytes, for the next array that asks for as many, and
-    gives none back (`numpy/_core/src/multiarray/alloc.c`). As rows of ever other numbers are looked at that cache fills,
+    Numpy keeps up to seven freed pieces of each size below 1,024 bytes for the next array that asks for as many, and
+    gives none back (`numpy/_core/src/multiarray/alloc.c`). As rows of ever other numbers are looked at the cache fills,
     for hundreds of thousands of steps: .6 MB from 30,000 to 90,000 transitions of LunarLander, 3.6 MB at most.
     """
     for size in range(1, _CACHED):
