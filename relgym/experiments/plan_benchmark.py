@@ -231,7 +231,7 @@ def _at(curve: Sequence[Sequence[int]], at: int) -> int:
 
 
 def page(target: Path, sections: Mapping[str, tuple[str, str]]) -> None:
-    """Write the page of results; other sections stay, and so does what was written by hand below the tables.
+    """Write the page of results; other sections stay, and so does what was written by hand below the tables and after.
 
     Parameters
     ----------
@@ -251,10 +251,9 @@ def page(target: Path, sections: Mapping[str, tuple[str, str]]) -> None:
         command = f"`relgym benchmark plan {course}`, {date.today().isoformat()}."
         body = f"## {course}: {title}\n\n{command}\n\n{shown}```text\n{text.strip()}\n```\n"
         old[course] = f"{body}\n{remark}".strip()
-    write_atomically(
-        target,
-        "\n\n".join([_HEAD, *(old[name] for name in [*COURSES, *QUESTIONS] if name in old)]).encode() + b"\n",
-    )
+    known = [name for name in [*COURSES, *QUESTIONS] if name in old]
+    by_hand = [name for name in old if name not in known]
+    write_atomically(target, "\n\n".join([_HEAD, *(old[name] for name in known + by_hand)]).encode() + b"\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -125,9 +125,12 @@ def test_finished_runs_are_not_run_again_and_make_the_page(
     plan_benchmark.main(["truck", *options, "--page", str(page)])
     assert "2 of 2" in capsys.readouterr().out
     assert (tmp_path / "plan-truck.png").is_file()
-    page.write_text(page.read_text(encoding="utf-8") + "\nA remark by hand.\n", encoding="utf-8")
+    page.write_text(
+        page.read_text(encoding="utf-8") + "\nA remark by hand.\n\n## Not run\n\nMuch.\n", encoding="utf-8"
+    )
     plan_benchmark.main(["truck", *options, "--page", str(page), "--report"])
     text = page.read_text(encoding="utf-8")
+    assert text.endswith("A remark by hand.\n\n## Not run\n\nMuch.\n")
     assert text.startswith("# What planning is worth") and text.count("A remark by hand.") == 1
     assert text.count("## truck") == 1
 
