@@ -389,7 +389,7 @@ class PlanningAgent:
             )
         if self.steps >= self._next_review:
             self._review()
-        if self._wrong[-1] and self._reviewed and self.steps >= self._next_after_change:
+        if self._wrong[-1] and self._replaceable and self.steps >= self._next_after_change:
             self._review_change()
 
     def _surprised(self) -> bool:
@@ -402,14 +402,15 @@ class PlanningAgent:
         )
 
     @property
-    def _reviewed(self) -> bool:
+    def _replaceable(self) -> bool:
+        """Whether another model may take over after a review."""
         return isinstance(self.model, WorldModel) and not self.model.frozen
 
     def _review(self) -> None:
         """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often."""
-        known = min(self.model.seen, self.steps) if self._reviewed else self.steps
+        known = min(self.model.seen, self.steps) if self._replaceable else self.steps
         self._next_review = self.steps + int(known * _GROWTH) - known + 1
-        if self._reviewed and any(list(self._wrong)[-_LATEST:]):
+        if self._replaceable and self.doubt:
             seen, episodes = self._learned_from()
             own = missed(self.model, seen, episodes) + length(self.model)
             if (best := self._learned_again(seen, episodes, own)[0]) is not None:
