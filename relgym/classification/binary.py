@@ -147,9 +147,9 @@ class BinaryClassifier:
         """Whether each row is taken for mode `i`."""
         return np.array(self.for_i)[self.decide_batch(view, rows)]
 
-    def count(self, outcome: int, is_i: bool) -> None:
-        """Count one more example that took an outcome."""
-        self.counts[outcome][not is_i] += 1.0
+    def count(self, outcome: int, is_i: bool, weight: float = 1.0) -> None:
+        """Count one more example that took an outcome, and stands for so many."""
+        self.counts[outcome][not is_i] += weight
         if not self.definition.clauses:
             self.__dict__.pop("for_i", None)  # a majority may have changed sides
 

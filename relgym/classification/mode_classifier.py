@@ -77,6 +77,11 @@ class ModeClassifier:
         return tuple(p.modes for p in sorted(self._pairs.values(), key=lambda p: p.urgency) if p.stale)
 
     @property
+    def waits(self) -> bool:
+        """Whether there are pairs that wait to be learned anew."""
+        return any(pair.stale for pair in self._pairs.values())
+
+    @property
     def relations(self) -> frozenset[str]:
         """Names of the binary relations that clauses ask for: `rank_batch` needs no others."""
         used = self._familiarity().used
@@ -135,6 +140,7 @@ class ModeClassifier:
         *,
         roles: Sequence[int] = (),
         hard: bool = False,
+        weight: float = 1.0,
     ) -> int:
         """Take in one classified example; the number of pairs that it contradicts.
 
@@ -152,6 +158,8 @@ class ModeClassifier:
             Object playing each role of the assigned mode.
         hard
             Whether to prefer the example in memory even if it contradicts no pair (say, a role classifier).
+        weight
+            How many seen examples it stands for.
 
         Notes
         -----
@@ -159,9 +167,11 @@ class ModeClassifier:
         """
         wrong, seen = 0, self._familiarity()  # before anything changes: must not depend on who asked when
         if assigned != NOISE:
-            self.counts[assigned] = self.counts.get(assigned, 0.0) + 1.0
-            wrong = self._count(example, self._owner(example, assigned, fits), fits, values)
-        self.exemplars.add(example, assigned, fits, values, hard=hard or wrong > 0, roles=roles)
+            self.counts[assigned] = self.counts.get(assigned, 0.0) + weight
+            wrong = self._count(example, self._owner(example, assigned, fits, weight), fits, values, weight)
+        self.exemplars.add(
+            example, assigned, fits, values, hard=hard or wrong > 0, roles=roles, weight=weight
+        )
         seen.add(example, self._voting.key(example))
         return wrong
 
@@ -233,6 +243,8 @@ class ModeClassifier:
         overdraw the budget, and a pair may be finished by a later call.
         """
         spent, changed = 0, False
+        if not self.waits:
+            return 0
         for pair in sorted((p for p in self._pairs.values() if p.stale), key=lambda p: p.urgency):
             while pair.stale and spent < budget:
                 lesson = self._lessons([pair.modes])[pair.modes]
@@ -287,7 +299,7 @@ class ModeClassifier:
 
     # ----- inside -----
 
-    def _count(self, example: Example, owner: int, fits: Bools, values: Floats) -> int:
+    def _count(self, example: Example, owner: int, fits: Bools, values: Floats, weight: float) -> int:
         outcomes = self._voting.outcomes(example, np.asarray(values).tolist())
         wrong = 0
         explained = dict(zip(self.modes, np.asarray(fits).tolist(), strict=True))
@@ -296,7 +308,7 @@ class ModeClassifier:
             other = j if for_i else i
             if for_i == for_j or explained[other]:
                 continue
-            wrong += pair.observe(outcomes[at], for_i, self.config.relearn_growth)
+            wrong += pair.observe(outcomes[at], for_i, self.config.relearn_growth, weight)
             self._voting.recount(at)
         return wrong
 
@@ -304,10 +316,10 @@ class ModeClassifier:
         """Whether a mode explains an example that belongs to one it covers, see `pair_labels`."""
         return explained[mode] and (owner, mode) in self._owners.covered
 
-    def _owner(self, example: Example, assigned: int, fits: Bools) -> int:
+    def _owner(self, example: Example, assigned: int, fits: Bools, weight: float) -> int:
         """The mode that a new example belongs to."""
         explaining = [m for m, ok in zip(self.modes, np.asarray(fits).tolist(), strict=True) if ok]
-        self._owners.count(assigned, example.key, explaining)
+        self._owners.count(assigned, example.key, explaining, weight)
         return self._owners.owner(assigned, example.key, explaining)
 
     def _familiarity(self) -> Familiarity:

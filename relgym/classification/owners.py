@@ -66,12 +66,12 @@ class Owners:
             found[own] = fits[own][:, alternatives].any(axis=1)
         return found
 
-    def count(self, assigned: int, key: bytes, explaining: Iterable[int]) -> None:
-        """Take note of one more example."""
+    def count(self, assigned: int, key: bytes, explaining: Iterable[int], weight: float = 1.0) -> None:
+        """Take note of one more example, which stands for so many."""
         doubtful = any(m != assigned and (assigned, m) not in self.covered for m in explaining)
         if assigned != NOISE and not doubtful:
             there = self._certain.setdefault(key, {})
-            there[assigned] = there.get(assigned, 0.0) + 1.0
+            there[assigned] = there.get(assigned, 0.0) + weight
 
     def owner(self, assigned: int, key: bytes, explaining: Iterable[int]) -> int:
         """Mode that an example belongs to."""

@@ -73,12 +73,12 @@ class PairState:
         """Sorting key: those begun, the most contradicted, those with most examples of their rarer mode."""
         return self.draft is None, -self.contradictions, -min(self.seen), self.modes
 
-    def observe(self, outcome: int, is_i: bool, growth: float) -> bool:
-        """Count one more example; whether it contradicts the classifier."""
-        self.seen[not is_i] += 1.0
+    def observe(self, outcome: int, is_i: bool, growth: float, weight: float = 1.0) -> bool:
+        """Count one more example, which stands for so many; whether it contradicts the classifier."""
+        self.seen[not is_i] += weight
         wrong = self.classifier.for_i[outcome] != is_i
-        self.classifier.count(outcome, is_i)
-        self.contradictions += wrong
+        self.classifier.count(outcome, is_i, weight)
+        self.contradictions += weight * wrong
         # A short faultless definition learned whole is only confirmed by agreeing examples, however many.
         imperfect = self.errors > 0 or self.mended or self.classifier.definition.size > SHORT
         grown = imperfect and min(self.seen) >= growth * max(min(self.learned), 1.0)

@@ -65,6 +65,11 @@ class AssignmentLog:
         self.seen += 1
         return self._size - 1
 
+    def pass_over(self, label: int) -> None:
+        """Count an example of a mode that isn't kept."""
+        self.seen += 1
+        self.forgotten[label] += 1
+
     def keep(self, rows: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Forget the examples of dropped rows of the example table, and follow the others' new numbers.
 

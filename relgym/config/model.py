@@ -79,6 +79,14 @@ class ModelConfig:
         Share of a property's predictions that may be expected to be claimed and off. The surest kinds of predictions
         are claimed first, as many as that allows. Default 0.0075, range (0, 1]: less than a per cent, with a margin for
         what is learned of the kinds meanwhile. Raising it claims more, and more of that is off.
+    downsampling
+        Predictions that come true teach little, so some of them are left out, and those that are learned from count for
+        them, too: after r in a row of one kind one of ``2 * downsampling * r`` is learned from, if that is 2 or more
+        (rounded down to a power of two). Half of one in r is what is then expected to fail, so that an exception is no
+        larger a share of what was learned from since the one before than this, unless it came sooner. Default 0.0075,
+        as large a share as claims may be off in: all of the first 133 are learned from, then one of 2, from the 267th
+        on one of 4. Range [0, 0.5]; 0: nothing is left out. Raising it learns in less time, and from fewer examples
+        near a condition's border.
     regression_columns
         Regressions on all that a target may depend on are made on at most so many columns, squares and products
         included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.
@@ -100,6 +108,7 @@ class ModelConfig:
     claim_error: float = 0.05
     claim_probability: float = 0.5
     claim_slips: float = 0.0075
+    downsampling: float = 0.0075
     regression_columns: int = 320
 
     def __post_init__(self) -> None:
@@ -117,6 +126,8 @@ class ModelConfig:
         for name in ("claim_error", "claim_probability", "claim_slips"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise ConfigError(f"{name} must lie in (0, 1], got {getattr(self, name)}")
+        if not 0.0 <= self.downsampling <= 0.5:
+            raise ConfigError(f"downsampling must lie in [0, 0.5], got {self.downsampling}")
         features: object = self.features
         if not isinstance(features, (tuple, list)) or not all(isinstance(entry, str) for entry in features):
             raise ConfigError(f"features must be a tuple of names, such as ('trig',), got {features!r}")

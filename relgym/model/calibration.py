@@ -165,29 +165,35 @@ class _Record:
     )  # over: trials in those of misses, of hits; how many
     _even: tuple[float, float, float] | None = field(default=None, repr=False, compare=False)
 
-    def count(self, error: float, within: float) -> bool:
+    def count(self, error: float, within: float, times: int = 1) -> bool:
         """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
-        self.errors = _counted(self.errors, _place(error))
+        self.errors = _counted(self.errors, _place(error), times)
         hit = error <= within
+        if hit and self.run > 0 and self.run >= self.trials:  # of what was always right nothing ends
+            self.run += times
+            self.trials, self.hits = self.trials + times, self.hits + times
+            if self.trials > MEMORY:
+                self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+            return False
         if hit != (self.run > 0):
             if self.run:
                 was = self.run > 0
                 self.runs[was] += abs(self.run)
                 self.runs[2 + was] += 1.0
             self.run = 0
-        self.run += 1 if hit else -1
+        self.run += times if hit else -times
         # The run under way isn't part of the record that it is held against.
         length = abs(self.run)
-        before = max(self.trials - (length - 1), 0.0)
-        share = (max(self.hits - max(self.run - 1, 0), 0.0) + 0.5) / (before + 1.0)
+        before = max(self.trials - (length - times), 0.0)
+        share = (max(self.hits - max(self.run - times, 0), 0.0) + 0.5) / (before + 1.0)
         one = share if hit else max(1.0 - share, 1e-300)
         # Where hits, or misses, mostly come in long runs, another one is no news.
         trials, ends = self.runs[hit], self.runs[2 + hit]
         again = max(one, (trials - ends + one) / (trials + 1.0))
         # It may have begun at any of the trials, which takes the logarithm of their number to say.
         bits = -math.log2(one) - (length - 1) * math.log2(again) - math.log2(before + 1.0)
-        self.trials += 1.0
-        self.hits += hit
+        self.trials += times
+        self.hits += times * hit
         # Hits come in runs where little happens: what was doubted is believed after more of them.
         ended = before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= FEW)
         if ended:  # a run of hits begins with the miss that it follows: what failed once isn't right always
@@ -236,6 +242,8 @@ class _Cell:
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials
     heard: float = 0.0  # predictions, those of long ago counting less
+    steady: int = 0  # predictions in a row, up to now, that came true
+    passed: int = 0  # of those that came true, how many the next one that is learned from stands for, too
     _sure: tuple[float, float] | None = field(
         default=None, repr=False, compare=False
     )  # by bits, since the last trial
@@ -244,28 +252,30 @@ class _Cell:
     def new(cls, speaker: int, experts: int) -> _Cell:
         return cls(speaker, {}, [[0.0, 0.0, 0.0] for _ in range(experts)])
 
-    def note(self, speaker: int, errors: Sequence[float], within: float) -> None:
-        """Take in whether the winner and the speaker were right, no more."""
+    def note(self, speaker: int, errors: Sequence[float], within: float, times: int = 1) -> None:
+        """Take in whether the winner and the speaker were right, no more; so many times."""
         self._sure = None
         for expert in {OWN, speaker}:
             if errors[expert] == errors[expert]:
-                self.records.setdefault(expert, _Record()).count(errors[expert], within)
+                self.records.setdefault(expert, _Record()).count(errors[expert], within, times)
 
-    def count(self, errors: Sequence[float], within: float) -> None:
-        """Take in what each expert was off by; the best one speaks, if it leads by enough."""
+    def count(self, errors: Sequence[float], within: float, times: int = 1) -> None:
+        """Take in what each expert was off by, so many times; the best one speaks, if it leads by enough."""
         self._sure = None
-        for expert in sorted({OWN, self.speaker}):
+        for expert in (OWN,) if self.speaker == OWN else (OWN, self.speaker):
             if errors[expert] == errors[expert]:
-                if self.records.setdefault(expert, _Record()).count(errors[expert], within):
+                if self.records.setdefault(expert, _Record()).count(errors[expert], within, times):
                     self.squares[expert] = [0.0, 0.0, 0.0]
         base = errors[PERSISTENCE] ** 2
         for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
                 if sums[0] >= MEMORY:
                     sums[:] = [0.5 * s for s in sums]
-                sums[0] += 1.0
-                sums[1] += error * error
-                sums[2] += base
+                sums[0] += times
+                sums[1] += times * error * error
+                sums[2] += times * base
+        if errors[self.speaker] == 0.0 and self.squares[self.speaker][1] == 0.0:
+            return  # nobody is better than who was never off
         best = min((k for k, error in enumerate(errors) if error == error), key=self.left)
         if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
             self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
@@ -359,6 +369,7 @@ class Calibration:
         self._changes: dict[int, float] = {}  # changes by bin of their size
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
         self._least: dict[int, float] = {}  # probability that claims need, by who makes them
+        self._kinds: dict[int, list[_Cell]] = {}  # cells of kinds of predictions, by who makes them
         self._vouched = (
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
@@ -366,13 +377,15 @@ class Calibration:
         self._united: _Cell | None = None  # see `_whole`
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_assessed": {}, "_least": {}, "_united": None}
+        return self.__dict__ | {"_assessed": {}, "_least": {}, "_kinds": {}, "_united": None}
 
-    def _changed(self) -> None:
-        """What was worked out from the cells is out of date."""
+    def _changed(self, *, cells: bool = True) -> None:
+        """What was worked out from the cells is out of date; of which kinds there are, too, if cells came or went."""
         self._assessed.clear()
         self._least.clear()
         self._united = None
+        if cells:
+            self._kinds.clear()
 
     @property
     def change(self) -> float:
@@ -492,10 +505,13 @@ class Calibration:
 
     def _needed(self, who: int) -> float:
         """The least probability that is claimed."""
-        kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
-        left = 1.0 + 0.5 * PRIOR + self.allowed * sum(c.heard for c in kinds)
+        kinds = self._kinds.get(who)
+        if kinds is None:
+            kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
+            self._kinds[who] = kinds
+        left = 1.0 + 0.5 * PRIOR + self.allowed * sum([c.heard for c in kinds])
         claims, bits = (self.probability, self.allowed), self._bits(who)
-        for share, heard in sorted(((c.sure(claims, bits), c.heard) for c in kinds), reverse=True):
+        for share, heard in sorted([(c.sure(claims, bits), c.heard) for c in kinds], reverse=True):
             if share <= self.probability:
                 break
             left -= (1.0 - share) * heard
@@ -521,6 +537,7 @@ class Calibration:
         rounding: float,
         error: float,
         turn: float = 0.0,
+        times: int = 0,
     ) -> None:
         """Take in how a prediction came out.
 
@@ -538,27 +555,53 @@ class Calibration:
             Largest error of a hit, as a share of what mostly changes (`ModelConfig.claim_error`).
         turn
             Length of a full turn, of an angle; 0 of anything else.
+        times
+            For how many predictions that came true it stands (`confirm`); 0: it didn't.
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
-        self.trials += 1
-        self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
+        self.trials += not times
+        many = max(times, 1)
+        self._changes = _counted(self._changes, _place(errors[PERSISTENCE]), many)
         within = max(rounding, error * self.change)
-        self._slips[0] += 1.0
+        self._slips[0] += many
         self._slips[1] += claimed and errors[audit.speaker] > within
         if self._slips[0] > MEMORY:
             self._slips = [0.5 * each for each in self._slips]
             for cell in self._cells.values():
                 cell.heard *= 0.5
+        known = len(self._cells)
         for key in _levels(audit.key) if audit.key.winner else (audit.key,):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker, self.experts)
+            cell = self._cells[key]
             if key.lead == OF_FAMILY:
-                self._cells[key].note(audit.speaker, errors, within)
+                cell.note(audit.speaker, errors, within, many)
             else:
-                self._cells[key].count(errors, within)
-        self._cells[audit.key].heard += 1.0
-        self._changed()
+                cell.count(errors, within, many)
+        cell = self._cells[audit.key]
+        cell.heard += many
+        cell.steady *= times > 0
+        self._changed(cells=len(self._cells) > known)
+
+    def confirm(self, key: Key, share: float) -> int:
+        """Take note that a prediction came true; how many such ones it stands for, 0 if another one will for it.
+
+        What comes true teaches little, and the less the longer all of its kind did. After r of them in a row half of
+        one in r is expected to fail (Jeffreys' prior). Where that is so many times less than `share`
+        (`ModelConfig.downsampling`), one of as many will do.
+        """
+        self.trials += 1
+        cell = self._cells.get(key)
+        if cell is None:
+            return 1
+        cell.steady += 1
+        times = int(2.0 * share * cell.steady)
+        if times > 1 and cell.steady % (1 << (times.bit_length() - 1)):
+            cell.passed += 1
+            return 0
+        weight, cell.passed = cell.passed + 1, 0
+        return weight
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
@@ -638,6 +681,8 @@ class Calibration:
                     "key": list(key),
                     "speaker": cell.speaker,
                     "heard": cell.heard,
+                    "steady": cell.steady,
+                    "passed": cell.passed,
                     "records": [
                         [
                             who,
@@ -678,7 +723,12 @@ class Calibration:
             }
             squares = [[float(s) for s in sums] for sums in each["squares"]]
             found._cells[Key(*map(int, each["key"]))] = _Cell(
-                int(each["speaker"]), records, squares, float(each["heard"])
+                int(each["speaker"]),
+                records,
+                squares,
+                float(each["heard"]),
+                int(each["steady"]),
+                int(each["passed"]),
             )
         return found
 
@@ -725,9 +775,9 @@ def _place(error: float) -> int:
     return math.ceil(OCTAVE * math.log2(min(error, SUMMABLE)))
 
 
-def _counted(bins: dict[int, float], place: int) -> dict[int, float]:
-    """Bins with one more in one of them; of many the older ones count less."""
-    bins[place] = bins.get(place, 0.0) + 1.0
+def _counted(bins: dict[int, float], place: int, times: int = 1) -> dict[int, float]:
+    """Bins with so many more in one of them; of many the older ones count less."""
+    bins[place] = bins.get(place, 0.0) + times
     if sum(bins.values()) <= MEMORY:
         return bins
     return {k: 0.5 * v for k, v in bins.items() if v > 2.0**-10}

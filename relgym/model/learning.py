@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +14,12 @@ from relgym.clustering.clusterer import ClusterReport
 from relgym.html import html_table
 from relgym.logic.search import LITERAL
 from relgym.model.chaining import CHECK_AT, due, inquire, revise
-from relgym.model.forgetting import forget
+from relgym.model.forgetting import SLACK, forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import ScenePrediction
 from relgym.model.scenes import next_values, passage, unwrapped
+from relgym.model.target.hindsight import Confirmed
 from relgym.model.target.property_model import bodies_of
 from relgym.scene.objects import TASK, Target, Transition
 from relgym.scheduling.agenda import Budget
@@ -26,6 +30,8 @@ __all__ = ["LearnReport", "finish", "learn"]
 SEARCHES = 0.6
 """Searches for modes, which may go on for ever, get this share of a step's budget; others get the rest."""
 
+NOTHING: Final[Mapping[tuple[str, str], Confirmed]] = MappingProxyType({})
+
 
 @dataclass(frozen=True, slots=True)
 class LearnReport:
@@ -34,16 +40,20 @@ class LearnReport:
     Attributes
     ----------
     parts
-        Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice.
+        Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice, nor for
+        what came as predicted and is learned from as one of many (`Calibration.look_back`).
     work
         Deterministic units of work spent on re-learning classifiers.
     set_aside
         Whether the transition held a gross error and wasn't learned from (`relgym.model.screening`).
+    counted
+        Whether it was counted and no more: modes, laws and what tells when they hold are what they were.
     """
 
     parts: dict[tuple[str, str], ClusterReport]
     work: int
     set_aside: bool = False
+    counted: bool = False
 
     @property
     def changed(self) -> bool:
@@ -69,13 +79,24 @@ def learn(
     transition: Transition,
     only: frozenset[int] | None = None,
     told: ScenePrediction | None = None,
+    confirmed: Mapping[tuple[str, str], Confirmed] = NOTHING,
 ) -> LearnReport:
     """Take up one transition, whose first scene has been perceived and whose numbers are finite.
 
-    With `only`, of the objects with these indices; all others are there to be seen. What was predicted of it, if
-    somebody asked, saves looking at what came as it was told.
+    Parameters
+    ----------
+    parts, percept, transition
+        Who learns, the first scene, and what happened.
+    only
+        Indices of the objects to be learned from; all others are there to be seen. Default: all.
+    told
+        What was predicted, if somebody asked: it saves looking at what came as it was told.
+    confirmed
+        What of it came true, by (object, property), if somebody looked back
+        (`relgym.model.target.hindsight.look_back`).
     """
     before, after = transition.before, transition.after
+    known = len(parts.targets)
     if parts.open:
         parts.discover_targets(before, after)
     stays = passage(before.layout, after.layout).stays
@@ -84,31 +105,35 @@ def learn(
     budget = parts.agenda.open()
     _go_on(parts, budget)
     searches = budget.part(SEARCHES)
-    for type_name in dict.fromkeys(t.type for t in parts.targets):
+    rows = {name: table.seen for name, table in parts.tables.items()}
+    for type_name in parts.by_type:
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
             if (only is None or index in only) and stays[index]:
-                _learn_object(parts, percept, index, following, reports, searches)
+                _learn_object(parts, percept, index, following, reports, searches, confirmed)
     for type_name, table in parts.tables.items():
-        if parts.open and table.seen in CHECK_AT:
+        if parts.open and any(rows[type_name] < at <= table.seen for at in CHECK_AT):
             parts.looks += due(parts, type_name)
-        forget(table, [m for t, m in parts.models.items() if t.type == type_name], parts.config.history)
+        if len(table) >= SLACK * parts.config.history:
+            forget(table, [model for _, model in parts.by_type[type_name]], parts.config.history)
     _inquire(parts, budget)
-    if parts.laws is not None:
-        parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models, told)
+    heard = parts.laws is not None and parts.laws.learn_one(
+        percept, following, _there(parts, transition, only), parts.models, told
+    )
     work = _refresh(parts, budget)
     parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
-    return LearnReport(reports, work)
+    counted = not (reports or heard or budget.spent) and len(parts.targets) == known
+    return LearnReport(reports, work, counted=counted)
 
 
 def _go_on(parts: Parts, budget: Budget) -> None:
     """Go on with what is under way: what is sure to end soon, then searches for modes, the oldest first."""
     for target in parts.targets:
-        table = parts.tables[target.type]
-        parts.models[target].approximate(table, budget)
-        if parts.models[target].fallback.guesses.underway or parts.models[target].candidates.under_way:
-            parts.models[target].reconsider(table, budget)
+        table, model = parts.tables[target.type], parts.models[target]
+        model.approximate(table, budget)
+        if model.fallback.guesses.underway or model.candidates.under_way:
+            model.reconsider(table, budget)
     searches = budget.part(SEARCHES)
     for waiting in parts.agenda.waiting:
         if isinstance(waiting, Target) and waiting in parts.models:
@@ -158,9 +183,18 @@ def _learn_object(
     following: NDArray[np.float64],
     reports: dict[tuple[str, str], ClusterReport],
     budget: Budget,
+    confirmed: Mapping[tuple[str, str], Confirmed],
 ) -> None:
     layout = percept.layout
+    name = layout.names[index]
     type_name = layout.types[index].name
+    weights: dict[str, int] = {}
+    for target, model in parts.by_type[type_name]:
+        one = confirmed.get((name, target.property))
+        if one is None or one.weight or not model.take_for_known(one.mode):
+            weights[target.property] = 1 if one is None else max(one.weight, 1)
+    if not weights:
+        return
     situation = percept.situation(index)
     table = parts.tables[type_name]
     x = percept.rows(index, following[None])[0]
@@ -169,14 +203,14 @@ def _learn_object(
     example = situation.examples.at(0, situation.keys[0])
     changes: dict[str, float] = {}
     rough = False
-    for target in parts.targets:
-        if target.type == type_name:
-            column = layout.column(index, target.property)
-            y = float(following[column])
-            rough |= parts.models[target].rough
-            changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
-            report = parts.models[target].learn_one(table, row, y, situation, example, budget)
-            reports[layout.names[index], target.property] = report
+    for target, model in parts.by_type[type_name]:
+        column = layout.column(index, target.property)
+        y = float(following[column])
+        rough |= model.rough
+        changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
+        if target.property in weights:
+            report = model.learn_one(table, row, y, situation, example, budget, weights[target.property])
+            reports[name, target.property] = report
     if rough:
         parts.regressions[type_name].learn_one(situation.signature, x, changes)
 
@@ -189,8 +223,9 @@ def _refresh(parts: Parts, budget: Budget) -> int:
         if allowed <= 0:
             break
         if not parts.governs(target):  # no clause is asked where laws predict
-            work = parts.models[target].refresh(allowed)
+            model = parts.models[target]
+            work = model.refresh(allowed)
             budget.spend(LITERAL * work)
             spent += work
-            parts.models[target].reconsider(parts.tables[target.type], budget)
+            model.reconsider(parts.tables[target.type], budget)
     return spent

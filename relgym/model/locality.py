@@ -8,7 +8,7 @@ small scenes have the same layout, whoever the neighbours are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
-from relgym.model.learning import LearnReport, learn
+from relgym.model.learning import NOTHING, LearnReport, learn
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Prediction, ScenePrediction
 from relgym.model.querying import derive, predict, predict_many
 from relgym.model.scenes import next_values, stays, wrap
+from relgym.model.target.hindsight import Confirmed
 from relgym.scene.axes import Axes
 from relgym.scene.objects import ACTION, Scene, SceneLayout, Transition, pose_columns
 
@@ -213,6 +214,7 @@ def learn_locally(
     transition: Transition,
     seen: int,
     told: ScenePrediction | None = None,
+    confirmed: Mapping[tuple[str, str], Confirmed] = NOTHING,
 ) -> LearnReport:
     """Take up one transition of a large scene: of the objects that changed, or of one that didn't in its turn."""
     before, after = transition.before, transition.after
@@ -223,7 +225,9 @@ def learn_locally(
         later = Scene(before.schema, window.scene.layout, following[window.columns])
         step = Transition(window.scene, later)
         said = None if told is None else _told_of(told, window, layout)
-        report = learn(parts, near.percept(focus), step, only=frozenset({window.place}), told=said)
+        own, name = layout.names[focus], window.scene.layout.names[window.place]
+        came = {(name, prop): one for (which, prop), one in confirmed.items() if which == own}
+        report = learn(parts, near.percept(focus), step, frozenset({window.place}), said, came)
         named = {(layout.names[focus], prop): part for (_, prop), part in report.parts.items()}
         known = {} if whole is None else whole.parts
         whole = LearnReport(known | named, report.work + (0 if whole is None else whole.work))

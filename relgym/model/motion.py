@@ -15,7 +15,7 @@ from relgym.laws.book import Motion
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.learner import LawLearner
 from relgym.laws.records import PairLaw
-from relgym.laws.touching import Contacts
+from relgym.laws.touching import Cast, Contacts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
 from relgym.model.target.property_model import PropertyModel, Verdict
@@ -68,10 +68,11 @@ class Laws:
             None,
             set(),
         )
+        self._wanted: tuple[Cast, tuple[Any, ...], dict[int, tuple[str, ...]]] | None = None
         self._last: tuple[Percept, Contacts, Motion] | None = None  # predicted last, and often learned next
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_last": None, "_governs": (None, None, set())}
+        return self.__dict__ | {"_last": None, "_wanted": None, "_governs": (None, None, set())}
 
     def governs(self, target: Target) -> bool:
         """Whether the laws predict a target."""
@@ -92,10 +93,13 @@ class Laws:
         meets = self.learner.book.turning and self.learner.contacts_seen > 0
         return meets and own is not None and target.property in own.moving and not self.governs(target)
 
-    def mark(self, models: Mapping[Target, PropertyModel]) -> None:
-        """Say which models' predictions are not to be claimed (`beyond_modes`)."""
+    def mark(self, models: Mapping[Target, PropertyModel]) -> bool:
+        """Say which models' predictions are not to be claimed (`beyond_modes`); whether they are others than before."""
+        changed = False
         for target, part in models.items():
-            part.surmise = self.beyond_modes(target)
+            before, part.surmise = part.surmise, self.beyond_modes(target)
+            changed |= part.surmise != before
+        return changed
 
     def suffice(self, type_name: str, targets: Sequence[Target]) -> bool:
         """Whether the laws predict all targets of a type and have long been right: its modes may rest.
@@ -113,22 +117,23 @@ class Laws:
         stays: Mapping[int, bool],
         models: Mapping[Target, PropertyModel],
         told: ScenePrediction | None = None,
-    ) -> None:
-        """Take up one transition, then weigh laws against modes if that is due.
+    ) -> bool:
+        """Take up one transition, then weigh laws against modes if that is due; whether laws may say something else.
 
         What was predicted of it may be told: what came as predicted is only counted, and offered to what is kept.
         """
         if not self.learner.sources:
-            return
+            return False
         self._seen += 1
-        changed = False
-        if told is None or not self._confirmed(percept, following, stays, told):
+        changed, tolerance = False, self.learner.book.tolerance
+        known = told is not None and self._confirmed(percept, following, stays, told)
+        if not known:
             motion = self._last[2] if self._last is not None and self._last[0] is percept else None
             contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
             changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
         self._last = None  # what the laws say may have changed
-        if changed or self._seen % WEIGH_EVERY == 0:
-            self._weigh(models)
+        weighed = (changed or self._seen % WEIGH_EVERY == 0) and self._weigh(models)
+        return changed or weighed or not known or self.learner.book.tolerance != tolerance
 
     def _confirmed(
         self,
@@ -142,11 +147,7 @@ class Laws:
         if told.scene.layout is not layout or not all(stays.values()):
             return False
         cast = self.learner.book.cast(layout)
-        bodies = cast.bodies
-        wanted = {
-            body: self.learner.book.components(source.type.name) if source.type.name in self.governed else ()
-            for body, (source, _) in cast.sources.items()
-        }
+        bodies, wanted = cast.bodies, self._predicted(cast)
         said: dict[int, int] = {}
         off: dict[int, float] = {}
         touched: dict[int, list[int]] = {}
@@ -172,7 +173,19 @@ class Laws:
             lambda vectors: self._contacts(perception.percept(layout, vectors)),
         )
 
-    def _weigh(self, models: Mapping[Target, PropertyModel]) -> None:
+    def _predicted(self, cast: Cast) -> dict[int, tuple[str, ...]]:
+        """What the laws in force predict of each body of a cast; worked out once."""
+        book, known = self.learner.book, self._wanted
+        grounds = self.governed, book.pair, book.turning
+        if known is None or known[0] is not cast or known[1] != grounds:
+            found = {
+                body: book.components(source.type.name) if source.type.name in self.governed else ()
+                for body, (source, _) in cast.sources.items()
+            }
+            known = self._wanted = cast, grounds, found
+        return known[2]
+
+    def _weigh(self, models: Mapping[Target, PropertyModel]) -> bool:
         """Laws that describe what came in fewer bits than modes come in force, and are believed accordingly.
 
         What modes would say is not known while they rest: laws that have long been right stay in force.
@@ -184,8 +197,8 @@ class Laws:
         for target, part in models.items():
             if target.type in governed - self.governed:
                 part.calibration.vouch(leads[target.type])
-        self.governed = governed
-        self.mark(models)
+        before, self.governed = self.governed, governed
+        return self.mark(models) or governed != before
 
     def _lead(self, type_name: str, models: Mapping[Target, PropertyModel]) -> float:
         """Bits by which laws describe a type's motion better than modes of every component; 0 without laws."""

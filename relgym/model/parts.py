@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from relgym.model.chaining import Inquiry, Look, in_order
 from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Percept, Perception
 from relgym.model.regression import Regression
-from relgym.model.scenes import mismatch, next_values, passage
+from relgym.model.scenes import MOST_LAYOUTS, TURN, mismatch, next_values, passage
 from relgym.model.screening import Screen
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
@@ -25,10 +25,30 @@ from relgym.scene.schema import SceneSchema
 from relgym.scene.sizes import check_sizes
 from relgym.scheduling.agenda import Agenda
 
-__all__ = ["MOST_TARGETS", "Parts"]
+__all__ = ["MOST_TARGETS", "Answer", "Parts"]
 
 MOST_TARGETS = 256
 """More properties than this aren't learned by one model: a step would take seconds."""
+
+
+class Answer(NamedTuple):
+    """One property of one object that is predicted.
+
+    Attributes
+    ----------
+    target, model
+        Which property of which type it is, and the model of that.
+    number, column
+        Which object, and where the property stands in a state vector.
+    turn
+        Length of a full turn, of an angle; 0 of anything else.
+    """
+
+    target: Target
+    model: PropertyModel
+    number: int
+    column: int
+    turn: float
 
 
 class Parts:
@@ -51,6 +71,8 @@ class Parts:
         Targets so far, in causal order.
     models
         The property model of each target.
+    by_type
+        Targets of each type, in causal order, and their models.
     tables
         Regression rows by type name, shared by all targets of a type.
     regressions
@@ -75,6 +97,7 @@ class Parts:
         self.config = config
         self.open = targets is None
         self.targets: tuple[Target, ...] = ()
+        self.by_type: dict[str, tuple[tuple[Target, PropertyModel], ...]] = {}
         given = tuple(dict.fromkeys(pair for t in targets or () for pair in t.given))
         chained = tuple((t.type, t.property) for t in possible_targets(schema)) if self.open else ()
         self.perception = Perception(
@@ -97,11 +120,12 @@ class Parts:
             self.laws = Laws(schema, None if targets is None else tuple(targets), config)
         self._kin: dict[int, SceneSchema] = {}
         self._known: dict[int, SceneLayout] = {}
+        self._answers: dict[int, tuple[SceneLayout, dict[tuple[str, str], Answer]]] = {}
         for target in targets or ():
             self.add_target(target)
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_kin": {}, "_known": {}}  # keyed by identity, which a copy doesn't share
+        return self.__dict__ | {"_kin": {}, "_known": {}, "_answers": {}}  # keyed by identity, no copy's
 
     def admits(self, scene: object) -> bool:
         """Whether a scene is known to follow the schema and holds finite numbers; sizes aren't asked."""
@@ -234,8 +258,28 @@ class Parts:
         self.models[other] = model
         self._set_targets(in_order(other if t == target else t for t in self.targets))
 
+    def answers(self, layout: SceneLayout) -> dict[tuple[str, str], Answer]:
+        """What is predicted in a layout, in the order of prediction, by (object, property); cached."""
+        known = self._answers.get(id(layout))
+        if known is not None and known[0] is layout:
+            return known[1]
+        found: dict[tuple[str, str], Answer] = {}
+        for target in self.targets:
+            for index in layout.of_type(target.type):
+                column = layout.column(index, target.property)
+                turn = TURN if target.property in layout.types[index].angles else 0.0
+                key = layout.names[index], target.property
+                found[key] = Answer(target, self.models[target], index, column, turn)
+        if len(self._answers) >= MOST_LAYOUTS:
+            self._answers.clear()
+        self._answers[id(layout)] = layout, found
+        return found
+
     def _set_targets(self, targets: tuple[Target, ...]) -> None:
         self.targets = targets
+        types = dict.fromkeys(t.type for t in targets)
+        self.by_type = {name: tuple((t, self.models[t]) for t in targets if t.type == name) for name in types}
+        self._answers.clear()
         read = {pair for t in targets if t.type != TASK for pair in t.given}
         for target, model in self.models.items():
             model.leaned_on = (target.type, target.property) in read

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.html import html_table
-from relgym.model.calibration import Audit
+from relgym.model.calibration import Audit, Key
 from relgym.scene.objects import Scene, SceneLayout
 
 __all__ = ["BatchPrediction", "LateAudit", "Outcome", "Prediction", "ScenePrediction"]
@@ -55,13 +55,16 @@ class LateAudit:
     ----------
     work
         Works it out.
+    key, speaker
+        What kind of prediction it is of, and who spoke.
     """
 
-    __slots__ = ("_found", "_work")
+    __slots__ = ("_found", "_work", "key", "speaker")
 
-    def __init__(self, work: Callable[[], Audit | None]) -> None:
+    def __init__(self, work: Callable[[], Audit | None], key: Key, speaker: int) -> None:
         self._work: Callable[[], Audit | None] | None = work
         self._found: Audit | None = None
+        self.key, self.speaker = key, speaker
 
     def __call__(self) -> Audit | None:
         """The audit; worked out once."""
@@ -69,12 +72,12 @@ class LateAudit:
             self._found, self._work = self._work(), None
         return self._found
 
-    def __reduce__(self) -> tuple[Callable[[Audit | None], LateAudit], tuple[Audit | None]]:
-        return _audited, (self(),)
+    def __reduce__(self) -> tuple[Callable[..., LateAudit], tuple[Audit | None, Key, int]]:
+        return _audited, (self(), self.key, self.speaker)
 
 
-def _audited(audit: Audit | None) -> LateAudit:
-    return LateAudit(lambda: audit)
+def _audited(audit: Audit | None, key: Key, speaker: int) -> LateAudit:
+    return LateAudit(lambda: audit, key, speaker)
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,7 +51,7 @@ PATIENCE = 8
 """Scenes that arrays answer after each change of what a model says before a program is lowered: that takes about as
 long."""
 
-SETTLING = 64
+SETTLING = 128
 """Scenes asked one by one, since the model last changed, before the program is told how right its predictions were:
 to write that down takes about as long as to settle so many predictions without it. Nor does a program that couldn't
 tell scenes rest for more."""
@@ -87,6 +87,13 @@ class Programs:
     def changed(self) -> None:
         """The model isn't what it was: programs may be out of date."""
         self.changes += 1
+
+    def counted(self) -> None:
+        """All that the latest change did was to count: programs that were up to date still are."""
+        if self._looked == self.changes - 1:
+            self._looked = self.changes
+            for known in self._known.values():
+                known.changes += known.changes == self.changes - 1
 
     def one(self, parts: Parts, scene: Scene, percept: Callable[[Scene], Percept]) -> ScenePrediction | None:
         """What the program says of one scene, whose numbers are finite; None: arrays must, or can say why not.
@@ -191,6 +198,7 @@ class Runner:
         self._settled = False  # whether that is what is known now
         self._asked = 0  # scenes one by one, since then
         self._believing = False  # whether of all answers it is known how right they were
+        self._kinds: dict[int, Key] = {}  # of predictions, by number
         self._turn = Lock()
         tape = encoded(program)
         self._space, count = tape.space(), len(program.answers)
@@ -331,6 +339,7 @@ class Runner:
             return None
         after, rows = told.following, zip(self._tellers, *told[1:], strict=True)
         found: list[Prediction] = []
+        kinds = self._kinds
         for k, (teller, outcome, mode, margin, noted, players, sure, believed) in enumerate(rows):
             probability, interval = sure
             speaker, spread = teller.spoken[believed[1]]
@@ -342,7 +351,10 @@ class Runner:
                 roles = roles[:1]
             if speaker != OWN:
                 own = math.nan if speaker == PERSISTENCE else spread
-            audit = LateAudit(partial(_audit, self._parts, scene, k, believed[0], speaker, value))
+            key = kinds.get(believed[0])
+            if key is None:
+                key = kinds[believed[0]] = Key(*kind_of(believed[0]))
+            audit = LateAudit(partial(_audit, self._parts, scene, k, key, speaker, value), key, speaker)
             found.append(
                 Prediction(
                     teller.answer.object,
@@ -420,7 +432,7 @@ class _Teller:
     """
 
     __slots__ = (
-        *("_body_names", "_frame", "_modes", "_spreads", "_turns"),
+        *("_body_names", "_fixed", "_frame", "_modes", "_spreads", "_turns"),
         *("answer", "index", "model", "spoken", "target"),
     )
 
@@ -429,6 +441,11 @@ class _Teller:
         self.spoken: list[tuple[int, float]] = []
         self._body_names = tuple(layout.names[i] for i in layout.bodies)
         self._modes = {mode.id: mode for mode in answer.modes}
+        self._fixed = {  # roles that are bound to the same objects in every scene
+            mode.id: tuple(name for name in mode.players if name is not None)
+            for mode in answer.modes
+            if not mode.roles
+        }
         index = self.index = layout.index(answer.object)
         model = self.model = parts.property_model(layout.types[index].name, answer.property)
         self.target = model.target
@@ -488,26 +505,26 @@ class _Teller:
         return self._roles(mode, players) if mode else (), spread, "world"
 
     def _roles(self, mode: int, players: _Bits) -> tuple[str, ...]:
+        if (fixed := self._fixed.get(mode)) is not None:
+            return fixed
         known = self._modes.get(mode)
         if known is None:  # a limit, or a stop
             return (self.answer.object,)
-        if not known.roles:
-            return tuple(name for name in known.players if name is not None)
         names = list(known.players)
         for role in known.roles:
             names[role.number + 1] = self._body_names[int(players[role.number])]
         return tuple(name for name in names if name is not None)
 
 
-def _audit(parts: Parts, scene: Scene, part: int, kind: int, speaker: int, value: float) -> Audit | None:
+def _audit(parts: Parts, scene: Scene, part: int, key: Key, speaker: int, value: float) -> Audit | None:
     """What looking back needs of a prediction that a program settled: what the other experts said, too.
 
     Parameters
     ----------
     parts, scene, part
         The model, what it was asked, and the number of the answer.
-    kind
-        Number of the kind of prediction.
+    key
+        Kind of prediction.
     speaker, value
         Who spoke, and what was said.
     """
@@ -517,7 +534,7 @@ def _audit(parts: Parts, scene: Scene, part: int, kind: int, speaker: int, value
     if known is None:
         return None
     values = tuple(value if k == speaker else each for k, each in enumerate(known.values))
-    return Audit(Key(*kind_of(kind)), values, speaker)
+    return Audit(key, values, speaker)
 
 
 def _spreads(

@@ -29,8 +29,8 @@ __all__ = [
 TURN = 2.0 * math.pi
 """A full turn, in radians."""
 
-MOST_PASSAGES = 256
-"""Of so many other layouts is known what a layout has in common with them."""
+MOST_LAYOUTS = 256
+"""Of so many layouts it is kept in mind what they have in common with another one, or what is predicted in them."""
 
 
 @refusing(ObservationError)
@@ -78,7 +78,7 @@ def passage(before: SceneLayout, after: SceneLayout) -> Passage:
             if stays:
                 columns += range(before.width)[before.slice(i)]
                 sources += range(after.width)[after.slice(k)]
-        if len(known) >= MOST_PASSAGES:
+        if len(known) >= MOST_LAYOUTS:
             known.clear()
         found = known[id(after)] = Passage(
             after, stay, np.array(columns, dtype=np.intp), np.array(sources, dtype=np.intp)

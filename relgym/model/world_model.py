@@ -27,7 +27,7 @@ from relgym.model.files.archive import parts_from_json, parts_to_arrays, parts_t
 from relgym.model.files.storage import read_model, write_model
 from relgym.model.fitting import Progress, as_transitions, progressive, transitions_of
 from relgym.model.journal import Journal
-from relgym.model.learning import LearnReport, finish, learn
+from relgym.model.learning import NOTHING, LearnReport, finish, learn
 from relgym.model.locality import (
     Neighbourhoods,
     check_size,
@@ -49,6 +49,8 @@ from relgym.model.running import Programs
 from relgym.model.scenes import next_values, with_action
 from relgym.model.score import Score, scored
 from relgym.model.target.hindsight import (
+    Confirmed,
+    Retrospect,
     calibration_to_json,
     hindsight_to_json,
     look_back,
@@ -279,8 +281,11 @@ class WorldModel:
         residuals: Mapping[tuple[str, str], float],
         precision: float,
     ) -> LearnReport:
-        self._look_back(prediction, residuals, precision)
-        return self._learn(transition, prediction)
+        looked = self._look_back(prediction, residuals, precision)
+        report = self._learn(transition, prediction, looked.confirmed)
+        if looked.counted and report.counted:
+            self._programs.counted()
+        return report
 
     def _told(self, prediction: Any, residuals: Any, precision: Any) -> float:
         """The precision, once it is known that all three are what they should be: else nothing is begun."""
@@ -302,15 +307,20 @@ class WorldModel:
             )
         check_size(self._parts, transition.before.layout)
 
-    def _learn(self, transition: Transition, told: ScenePrediction | None = None) -> LearnReport:
+    def _learn(
+        self,
+        transition: Transition,
+        told: ScenePrediction | None = None,
+        confirmed: Mapping[tuple[str, str], Confirmed] = NOTHING,
+    ) -> LearnReport:
         before = transition.before
         following = next_values(before, transition.after)
         if not self._parts.screen.admits(before.layout, before.vector, following):
             return LearnReport({}, 0, set_aside=True)
         if large(before.layout):
-            report = learn_locally(self._parts, self._near(before), transition, self.seen, told)
+            report = learn_locally(self._parts, self._near(before), transition, self.seen, told, confirmed)
         else:
-            report = learn(self._parts, self._perceive(before), transition, None, told)
+            report = learn(self._parts, self._perceive(before), transition, None, told, confirmed)
         self.seen += 1
         return report
 
@@ -477,7 +487,7 @@ class WorldModel:
 
     def _look_back(
         self, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
-    ) -> None:
+    ) -> Retrospect:
         layout, expected = prediction.scene.layout, prediction.scene.vector
         observed = expected.copy()
         for part in prediction.parts:
@@ -485,8 +495,9 @@ class WorldModel:
             if key in residuals:
                 observed[layout.places[key]] = part.value + residuals[key]
         largest = np.maximum(np.abs(expected), np.abs(observed))
-        if self._parts.screen.plausible(layout, largest):
-            look_back(self._parts, prediction, residuals, precision)
+        if not self._parts.screen.plausible(layout, largest):
+            return Retrospect({}, counted=False)
+        return look_back(self._parts, prediction, residuals, precision)
 
     @refusing(ConfigError)
     def merge(self, other: WorldModel) -> None:

@@ -1017,3 +1017,60 @@ def test_bins_of_leads_are_the_same_in_arrays(margins: list[float]) -> None:
         assert place == (7 if math.isinf(margin) else 0 if margin == 0.0 else place)
         if 1 < place < 6:  # octaves of the log-odds, from an eighth
             assert 2.0 ** (place - 3) <= margin < 2.0 ** (place - 2)
+
+
+def test_of_predictions_that_come_true_ever_fewer_are_learned_from() -> None:
+    # 1/8: after r of them one in r/4; until eight came true in a row that is less than one in two.
+    known = right(1)
+    weights = [known.confirm(KEY, 0.125) for _ in range(33)]
+    assert weights[:7] == [1] * 7
+    assert weights[7:15] == [1, 0, 2, 0, 2, 0, 2, 0]
+    assert weights[15:] == [2, 0, 0, 0, 4, 0, 0, 0, 4, 0, 0, 0, 4, 0, 0, 0, 4, 0]
+    assert sum(weights) == 32  # each that is learned from stands for those before it, too
+
+
+def test_after_one_that_failed_all_are_learned_from_again() -> None:
+    known = right(1)
+    first = [known.confirm(KEY, 0.125) for _ in range(30)]
+    seen(known, values(own=1.0), 2.0)
+    again = [known.confirm(KEY, 0.125) for _ in range(7)]
+    assert sum(first) == 28
+    assert again == [3, 1, 1, 1, 1, 1, 1]  # the first one for two that were left out before
+
+
+def test_of_a_kind_that_nobody_looked_back_at_all_are_learned_from() -> None:
+    assert [Calibration().confirm(KEY, 0.5) for _ in range(9)] == [1] * 9
+
+
+def test_without_downsampling_all_are_learned_from() -> None:
+    known = right(1)
+    assert [known.confirm(KEY, 0.0) for _ in range(1_000)] == [1] * 1_000
+
+
+@given(st.integers(0, 3_000), st.sampled_from([0.0075, 0.03, 0.125]))
+@settings(max_examples=60, deadline=None)
+def test_an_exception_is_rare_among_what_is_learned_from(length: int, share: float) -> None:
+    """A run of what comes true, ended by an exception."""
+    known = right(1)
+    learned = sum(known.confirm(KEY, share) > 0 for _ in range(length)) + 1
+    assert 1.0 / learned <= max(share, 1.0 / (length + 1))
+
+
+def test_what_a_prediction_stands_for_counts_as_often() -> None:
+    one, many = right(40), right(40)
+    audit = Audit(KEY, values(own=1.0), OWN)
+    for _ in range(4):
+        seen(one, values(own=1.0), 1.0)
+    many.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, times=4)
+    assert many.assess(KEY, values(own=1.0)) == one.assess(KEY, values(own=1.0))
+    kept, counted = one.to_json(), many.to_json()
+    assert kept["cells"] == counted["cells"]
+    assert kept["changes"] == counted["changes"]
+
+
+def test_how_many_came_true_in_a_row_is_kept() -> None:
+    known = right(1)
+    for _ in range(30):
+        known.confirm(KEY, 0.125)
+    again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
+    assert [again.confirm(KEY, 0.125) for _ in range(50)] == [known.confirm(KEY, 0.125) for _ in range(50)]

@@ -1,19 +1,25 @@
-"""What came as predicted is counted and offered to what is kept: the model is as if it had been studied."""
+"""What came as predicted is counted, and offered to what is kept or learned from as one of many."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
+from pathlib import Path
 
 import gymnasium as gym
+import numpy as np
 import pytest
 
 from relgym.experiments.body_worlds import Setting, body_rooms
 from relgym.model.files.archive import parts_to_arrays, parts_to_json
 from relgym.model.fitting import compare_and_learn
+from relgym.model.grounds import Grounds
 from relgym.model.motion import Laws
-from relgym.model.prequential import compared
+from relgym.model.prequential import StepReport, compared
+from relgym.model.querying import predict
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Scene, Transition
+from relgym.scene.objects import ObjectType, Scene, Target, Transition
+from relgym.scene.schema import SceneSchema
 from relgym.wrappers import ModelLearner
 
 
@@ -61,7 +67,7 @@ def test_taking_up_is_looking_back_and_learning(
 
     monkeypatch.setattr(Laws, "_confirmed", counted)
     schema = stream[0].before.schema
-    quick, slow = WorldModel(schema), WorldModel(schema)
+    quick, slow = (WorldModel(schema, {"downsampling": 0.0}) for _ in range(2))
     for transition in stream:
         said, studied = (model.predict_one(transition.before) for model in (quick, slow))
         compare_and_learn(quick, transition, said)
@@ -69,3 +75,90 @@ def test_taking_up_is_looking_back_and_learning(
         slow.learn_one(transition)
     assert confirmed > share * len(stream)
     assert written(quick) == written(slow)
+
+
+BOX = SceneSchema(
+    (ObjectType("cart", ("x", "v")), ObjectType("action", ("force",))), (("a", "cart"), ("action", "action"))
+)
+
+
+def steps(count: int, *, wind: int = -1, seed: int = 0) -> Iterator[Transition]:
+    """A cart that is pushed and goes half as fast beyond a mark; from some step on a wind blows."""
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        x, v = rng.integers(-160, 161, size=2) / 8.0
+        force = float(rng.integers(-4, 5))
+        later = (0.5 * v if x > 8.0 else v) + 0.25 * force + (1.0 if 0 <= wind <= k else 0.0)
+        yield Transition(
+            BOX.scene({"a": [x, v], "action": [force]}), BOX.scene({"a": [x, later], "action": [0.0]})
+        )
+
+
+def learned(model: WorldModel, some: Iterable[Transition]) -> list[StepReport]:
+    return [compare_and_learn(model, step, model.predict_one(step.before)) for step in some]
+
+
+SPEED = Target("cart", "v")
+
+
+def test_what_comes_true_is_learned_from_as_one_of_many_and_counts_for_all() -> None:
+    model = WorldModel(BOX, targets=[SPEED])
+    whole = WorldModel(BOX, {"downsampling": 0.0}, targets=[SPEED])
+    some = list(steps(3_000))
+    reports = learned(model, some)
+    learned(whole, some)
+    kept = len(model.property_model("cart", "v").clusterer.rows)
+    assert kept < 0.5 * len(some) < len(whole.property_model("cart", "v").clusterer.rows)
+    assert kept == sum(("a", "v") in r.learned.parts for r in reports if r.learned is not None)
+    assert model.property_model("cart", "v").clusterer.seen == len(some)
+    for one, other in zip(model.modes("cart", "v"), whole.modes("cart", "v"), strict=True):
+        assert one.same_function(other)
+    found = sum(mode.examples for mode in model.modes("cart", "v"))
+    assert found + model.property_model("cart", "v").clusterer.noise_examples == len(some)
+    told = [float(m) for m in model.property_model("cart", "v").classifier.counts.values()]
+    assert 0.97 * len(some) <= sum(told) <= len(some)
+
+
+def test_the_model_predicts_what_one_that_learned_from_all_does() -> None:
+    model = WorldModel(BOX, targets=[SPEED])
+    learned(model, steps(3_000))
+    fresh = list(steps(1_000, seed=1))
+    wrong = [k for k, step in enumerate(fresh) if compared(model.predict_one(step.before), step.after)[1]]
+    assert len(wrong) <= 0.02 * len(fresh)
+
+
+def test_another_law_is_learned_whole_as_soon_as_it_comes() -> None:
+    model = WorldModel(BOX, targets=[SPEED])
+    reports = learned(model, steps(2_200, wind=2_000))
+    late = [("a", "v") in r.learned.parts for r in reports[2_000:2_100] if r.learned is not None]
+    assert all(late[:5])
+    assert np.mean(late) > 0.9
+    assert np.mean([("a", "v") in r.learned.parts for r in reports[1_800:2_000] if r.learned]) < 0.6
+
+
+def test_what_was_only_counted_leaves_programs_as_they_are() -> None:
+    model = WorldModel(BOX, targets=[SPEED])
+    reports = learned(model, steps(3_000))
+    counted = [r for r in reports if r.learned is not None and r.learned.counted]
+    assert len(counted) > 500
+    for step in steps(400, seed=2):
+        before = Grounds.of(model._parts)
+        report = compare_and_learn(model, step, model.predict_one(step.before))
+        if report.learned is not None and report.learned.counted:
+            assert before.same(Grounds.of(model._parts))
+            percept = model._parts.perception.percept(step.before.layout, step.before.vector[None])
+            said = predict(model._parts, percept, step.before)
+            assert [p.value for p in model.predict_one(step.before).parts] == [p.value for p in said.parts]
+
+
+def test_a_model_that_was_saved_leaves_out_the_same(tmp_path: Path) -> None:
+    model, some = WorldModel(BOX, targets=[SPEED]), list(steps(1_500))
+    learned(model, some[:1_000])
+    model.save(tmp_path / "model", history=True)
+    again = WorldModel.load(tmp_path / "model")
+    learned(model, some[1_000:])
+    learned(
+        again,
+        [Transition(*(again.schema.scene(s.values()) for s in (t.before, t.after))) for t in some[1_000:]],
+    )
+    assert written(model) == written(again)

@@ -452,12 +452,15 @@ class CellRecord(Record):
 
     A record is an expert, trials, hits, the run under way, bins of errors, and of runs that are over the trials in
     those of misses and of hits, and how many there were; squares are trials, the expert's own and those of saying that
-    nothing changes.
+    nothing changes. Steady are predictions in a row, up to now, that came true, passed those of them for which the next
+    one that is learned from stands.
     """
 
     key: Kind
     speaker: Expert
     heard: Weight
+    steady: Count
+    passed: Count
     records: list[tuple[Expert, Weight, Weight, Whole, Bins, tuple[Weight, Weight, Weight, Weight]]]
     squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=6)]
 

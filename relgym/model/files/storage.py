@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 FORMAT: Final = "relgym-model"
-VERSION: Final = 3
+VERSION: Final = 4
 """Files of all versions are read: `relgym.model.files.upgrade` says what has changed. Version 1 had no checksum of the
 history."""
 

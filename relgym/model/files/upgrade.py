@@ -47,13 +47,14 @@ def upgraded(body: dict[str, Any], version: int) -> dict[str, Any]:
     UserWarning
         The model was learned with a setting that is gone, and with another value of it than the present rules have.
     """
-    if version >= 3:
+    if version >= 4:
         return body
     found = dict(body)
-    if isinstance(body.get("config"), dict):
+    if version < 3 and isinstance(body.get("config"), dict):
         found["config"] = _without_retired(body["config"])
     if isinstance(body.get("calibration"), dict):
-        found["calibration"] = {name: _with_runs(each) for name, each in body["calibration"].items()}
+        complete = _with_runs if version < 3 else _steady
+        found["calibration"] = {name: complete(each) for name, each in body["calibration"].items()}
     return found
 
 
@@ -90,7 +91,18 @@ def _with_runs(calibration: Any) -> Any:
         return calibration
     cells = calibration.get("cells")
     completed = [_cell(each) for each in cells] if isinstance(cells, list) else cells
-    return {"vouched": 0.0, **calibration, "cells": completed}
+    return _steady({"vouched": 0.0, **calibration, "cells": completed})
+
+
+def _steady(calibration: Any) -> Any:
+    """A calibration with the fields that version 4 brought: how many predictions of a kind came true in a row.
+
+    Where they are missing none did, so that what comes next is learned from whole.
+    """
+    if not isinstance(calibration, dict) or not isinstance(calibration.get("cells"), list):
+        return calibration
+    cells = [{"steady": 0, "passed": 0, **c} if isinstance(c, dict) else c for c in calibration["cells"]]
+    return {**calibration, "cells": cells}
 
 
 def _cell(cell: Any) -> Any:

@@ -12,21 +12,24 @@ import math
 from collections import deque
 from collections.abc import Iterable, Mapping
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from relgym.config.constants import STDS
 from relgym.model.calibration import OWN, Calibration
-from relgym.model.prediction import ScenePrediction
+from relgym.model.prediction import Prediction, ScenePrediction
 
 if TYPE_CHECKING:
-    from relgym.model.parts import Parts
+    from relgym.model.parts import Answer, Parts
+    from relgym.scene.objects import Target
 
 __all__ = [
     "LEAST",
     "SHARE",
     "WINDOW",
     "WRONG",
+    "Confirmed",
     "Hindsight",
+    "Retrospect",
     "calibration_to_json",
     "look_back",
     "restore_calibration",
@@ -42,6 +45,36 @@ SHARE, RECOVERED = 0.15, 0.075
 """With a larger share of the predictions wrong than the first, the clauses don't tell which mode holds; with a
 smaller one than the second they do again. In between it stays as it was: within one of Taxi's episodes a tenth is
 wrong, from one to the next a quarter."""
+
+
+class Confirmed(NamedTuple):
+    """A prediction that came true.
+
+    Attributes
+    ----------
+    mode
+        Which mode made it.
+    weight
+        How many such examples it stands for when it is learned from; 0: others stand for it (`Calibration.look_back`).
+    """
+
+    mode: int
+    weight: int
+
+
+class Retrospect(NamedTuple):
+    """How the predictions of one step came out.
+
+    Attributes
+    ----------
+    confirmed
+        What modes predicted and came true, by (object, property).
+    counted
+        Whether all were counted and no more: how right such predictions are is known as it was.
+    """
+
+    confirmed: Mapping[tuple[str, str], Confirmed]
+    counted: bool
 
 
 class Hindsight:
@@ -111,49 +144,90 @@ class Hindsight:
 
 def look_back(
     parts: Parts, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
-) -> None:
+) -> Retrospect:
     """Report to each target how its predictions of a step came out; arguments as of `WorldModel.look_back`.
 
     Only predictions of modes count: neither fallback values nor laws of motion, which abstain where they don't hold.
     What rests on another property's next value that was off isn't evaluated, since the fault is that one's.
     """
-    layout = prediction.scene.layout
-    types = dict(zip(layout.names, layout.types, strict=True))
-    targets = {(t.type, t.property): t for t in parts.targets}
-    error, noise = parts.config.claim_error, parts.config.clustering.noise_std
-    counts: dict[tuple[str, str], list[int]] = {}
-    off: set[tuple[str, str]] = set()
+    answers, look = parts.answers(prediction.scene.layout), _Look(parts, precision)
     for part in prediction.parts:
         residual = residuals.get((part.object, part.property))
-        pair = (types[part.object].name, part.property)
-        target = targets.get(pair)
-        if residual is None or target is None:
-            continue
-        came = part.value + residual
-        rounding = max(WRONG, precision * max(1.0, abs(came)))
-        turn = 2.0 * math.pi if part.property in types[part.object].angles else 0.0
-        model = parts.models[target]
-        if part.audit is not None:
-            if not isinstance(noise, str):  # who says how large the noise is takes it for granted
-                rounding = max(rounding, parts.config.clustering.inlier_stds * noise)
+        answer = answers.get((part.object, part.property))
+        if residual is not None and answer is not None and not look.repeats(part, residual, answer):
+            look.compare(part, residual, answer)
+    for target, (spoken, wrong) in look.counts.items():
+        parts.models[target].hindsight.add(spoken, wrong)
+    return Retrospect(look.confirmed, look.counted)
+
+
+class _Look:
+    """What is found out as one looks back at the predictions of a step, in their order."""
+
+    def __init__(self, parts: Parts, precision: float) -> None:
+        self._parts, self._precision = parts, precision
+        config = parts.config
+        noise = config.clustering.noise_std
+        # Who says how large the noise is takes it for granted.
+        self._least = WRONG if isinstance(noise, str) else max(WRONG, config.clustering.inlier_stds * noise)
+        self._off: set[tuple[str, str]] = set()
+        self._times = 0  # that the present prediction counts for, as one of many that came true
+        self.counts: dict[Target, list[int]] = {}
+        self.confirmed: dict[tuple[str, str], Confirmed] = {}
+        self.counted = True
+
+    def _rounding(self, came: float) -> float:
+        return max(WRONG, self._precision * max(1.0, abs(came)))
+
+    def repeats(self, part: Prediction, residual: float, answer: Answer) -> bool:
+        """Whether a prediction came true and another one of its kind stands for it: then it is counted, no more."""
+        self._times, record = 0, part.record
+        if record is None or not part.ok or not part.mode or record.speaker != OWN:
+            return False
+        target, model = answer.target, answer.model
+        lawful = self._parts.governs(target)
+        within = self._rounding(part.value + residual) if lawful else model.clusterer.scale.tolerance
+        if not abs(residual) <= within or not (lawful or model.settled):
+            return False
+        self._times = model.calibration.confirm(record.key, self._parts.config.downsampling)
+        if not lawful:
+            self.confirmed[part.object, part.property] = Confirmed(part.mode, self._times)
+        if self._times:
+            return False
+        if not lawful:
+            self.counts.setdefault(target, [0, 0])[0] += 1
+        return True
+
+    def compare(self, part: Prediction, residual: float, answer: Answer) -> None:
+        """Take in how far a prediction was off, and who would have known better."""
+        self.counted = False
+        target, model, _, _, turn = answer
+        came, audit = part.value + residual, part.audit
+        rounding = self._rounding(came)
+        if audit is not None:
+            rounding = max(rounding, self._least)
+            error = self._parts.config.claim_error
             model.calibration.look_back(
-                part.audit, came, claimed=part.ok, rounding=rounding, error=error, turn=turn
+                audit, came, claimed=part.ok, rounding=rounding, error=error, turn=turn, times=self._times
             )
         if not abs(residual) <= rounding:
-            off.add(pair)
-        if not part.mode or parts.governs(target):
-            continue
-        if not off.isdisjoint(target.given) and not off.isdisjoint(model.needs):
-            continue
+            self._off.add((target.type, target.property))
+        if not part.mode or self._parts.governs(target) or self._misled(answer):
+            return
         spread = STDS * part.spread if part.spread == part.spread else 0.0
-        if part.audit is not None and part.audit.speaker != OWN:  # another one gave the value, and the spread
-            residual, spread = came - part.audit.values[OWN], 0.0
+        if audit is not None and audit.speaker != OWN:  # another one gave the value, and the spread
+            residual, spread = came - audit.values[OWN], 0.0
             residual = math.remainder(residual, turn) if turn else residual
-        count = counts.setdefault(pair, [0, 0])
+        count = self.counts.setdefault(target, [0, 0])
         count[0] += 1
         count[1] += not abs(residual) <= max(rounding, model.clusterer.scale.tolerance, spread)
-    for pair, (spoken, wrong) in counts.items():
-        parts.models[targets[pair]].hindsight.add(spoken, wrong)
+
+    def _misled(self, answer: Answer) -> bool:
+        """Whether a prediction rests on another one that was off."""
+        off = self._off
+        return (
+            bool(off) and not off.isdisjoint(answer.target.given) and not off.isdisjoint(answer.model.needs)
+        )
 
 
 def hindsight_to_json(parts: Parts) -> dict[str, Any]:

@@ -153,6 +153,7 @@ class PropertyModel:
         situation: Situation,
         example: Example,
         budget: Budget | None = None,
+        weight: int = 1,
     ) -> ClusterReport:
         """Take up one example: cluster it, then let the classifiers see where it belongs.
 
@@ -166,6 +167,8 @@ class PropertyModel:
             How the target object is situated, in a single scene.
         budget
             What may be spent on searches; default: as much as they take.
+        weight
+            How many examples this one stands for.
         """
         x = table.x[row : row + 1]
         seen = self._with_next(example, situation.signature, x, len(self.clusterer.y))
@@ -189,10 +192,24 @@ class PropertyModel:
         )
         assigned = UNKNOWN if report.mode == NOISE or self.bounds(report.mode) else report.mode
         played = self.functions.played_one(table, seen.row, report.mode)
-        self.classifier.observe(seen, assigned, fits, values, roles=played)
+        self.classifier.observe(seen, assigned, fits, values, roles=played, weight=weight)
         if played:
             self.casting.observe(self.mode(report.mode), seen, played)
         return report
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is being looked for, and modes are laws: what comes as predicted teaches nothing new."""
+        c = self.clusterer
+        searching = c.searching or c.due or bool(self.candidates) or self.classifier.waits
+        return not (searching or c.approximate or c.population.chancy or self.rough or self.undecided)
+
+    def take_for_known(self, mode: int) -> bool:
+        """Count an example that came as a mode predicted, and for which others stand; false if the mode is gone."""
+        if mode not in self.clusterer.clusters:
+            return False
+        self.clusterer.population.log.pass_over(mode)
+        return True
 
     def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
         """Let the guess and the modes predict an example before it is learned from."""

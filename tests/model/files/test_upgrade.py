@@ -22,7 +22,9 @@ from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
 FOLDER = Path(__file__).parent
-FILES = {path.stem: path for folder in ("v1", "v2") for path in sorted((FOLDER / folder).glob("*.relgym"))}
+FILES = {
+    path.stem: path for folder in ("v1", "v2", "v3") for path in sorted((FOLDER / folder).glob("*.relgym"))
+}
 
 
 def raw(name: str) -> dict[str, Any]:
