@@ -86,6 +86,19 @@ class SlotSignature:
         return tuple(sorted(found, key=lambda c: (c.rank, c.slot)))
 
     @cached_property
+    def _places(self) -> NDArray[np.intp]:
+        """Slot, place among that object's numbers, and whether it is a next value, of each column, ``(3, columns)``."""
+        found = [
+            (
+                c.slot,
+                self.types[c.slot].properties.index(c.property.rstrip(PRIME)),
+                c.property.endswith(PRIME),
+            )
+            for c in self.columns
+        ]
+        return np.array(found, dtype=np.intp).reshape(-1, 3).T
+
+    @cached_property
     def features(self) -> tuple[Feature, ...]:
         """Non-linear features, columns behind those that a row holds; `ConfigError` if there would be too many."""
         offered, names, own = self._factors
@@ -242,12 +255,10 @@ class SlotSignature:
         order
             Index of the object in each slot.
         """
-        places = []
-        for column in self.columns:
-            primed = column.property.endswith(PRIME)
-            place = layout.column(order[column.slot], column.property.rstrip(PRIME))
-            places.append(place + layout.width * primed)
-        return np.array(places, dtype=np.intp)
+        slots, places, primed = self._places
+        starts = np.array([layout.offsets[index] for index in order], dtype=np.intp)
+        found: NDArray[np.intp] = starts[slots] + places + layout.width * primed
+        return found
 
 
 def slot_order(layout: SceneLayout, target: int, bodies: tuple[int, ...]) -> tuple[int, ...]:

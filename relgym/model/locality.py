@@ -8,7 +8,7 @@ small scenes have the same layout, whoever the neighbours are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -22,7 +22,7 @@ from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import OUTCOMES, BatchPrediction, Prediction, ScenePrediction
 from relgym.model.querying import derive, predict, predict_many
-from relgym.model.scenes import next_values, stays, wrap
+from relgym.model.scenes import next_values, passage, wrap
 from relgym.model.target.hindsight import Confirmed
 from relgym.scene.axes import Axes
 from relgym.scene.objects import ACTION, Scene, SceneLayout, Transition, pose_columns
@@ -100,6 +100,9 @@ class _Plan:
         str, tuple[NDArray[np.intp], int]
     ]  # numbers of each type's bodies, and how many are looked at
     bodiless: dict[str, list[int]]
+    offsets: NDArray[np.intp]  # where each object's numbers begin
+    widths: NDArray[np.intp]  # how many numbers each object of the small scene has
+    within: NDArray[np.intp]  # for each number of the small scene, the how-manieth of its object it is
 
     @classmethod
     def of(cls, scene: Scene) -> _Plan:
@@ -130,8 +133,12 @@ class _Plan:
             layout.names[layout.bodies[n]] for members, count in groups.values() for n in members[:count]
         ]
         axes = Axes.of(scene.schema)
-        bodies = np.array(layout.bodies, dtype=np.intp)
-        return cls(scene.schema.layout(names), pose_columns(layout)[0], axes.used, bodies, groups, bodiless)
+        bodies, offsets = (np.array(each, dtype=np.intp) for each in (layout.bodies, layout.offsets))
+        small = scene.schema.layout(names)
+        widths = np.array([len(t.properties) for t in small.types], dtype=np.intp)
+        within = np.arange(small.width) - np.repeat(small.offsets, widths)
+        poses = pose_columns(layout)[0]
+        return cls(small, poses, axes.used, bodies, groups, bodiless, offsets, widths, within)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +197,7 @@ class Neighbourhoods:
         return scene.schema.scene({name: part for name, part in scene.values().items() if name in names})
 
     def _make(self, focus: int) -> _Window:
-        plan, layout = self._plan, self._scene.layout
+        plan = self._plan
         number = int(np.searchsorted(plan.bodies, focus))
         chosen = {name: list(each) for name, each in plan.bodiless.items()}
         there = number < len(plan.bodies) and plan.bodies[number] == focus
@@ -203,7 +210,7 @@ class Neighbourhoods:
             nearest = np.argsort(away[members], kind="stable")[:count]
             chosen[name] = sorted(plan.bodies[members[nearest]].tolist())
         objects = [chosen[t.name].pop(0) for t in plan.small.types]
-        columns = np.concatenate([np.r_[layout.slice(k)] for k in objects])
+        columns = np.repeat(plan.offsets[objects], plan.widths) + plan.within
         small = Scene(self._scene.schema, plan.small, self._scene.vector[columns])
         return _Window(objects, objects.index(focus), small, columns)
 
@@ -251,14 +258,19 @@ def _told_of(told: ScenePrediction, window: _Window, layout: SceneLayout) -> Sce
 def _learned(
     parts: Parts, before: Scene, after: Scene, following: NDArray[np.float64], seen: int
 ) -> list[int]:
-    types = {t.type for t in parts.targets}
-    layout = before.layout
-    changes = np.add.reduceat(following != before.vector, np.array(layout.offsets))
-    able = [k for k, t in enumerate(layout.types) if t.name in types or (parts.open and t.name != ACTION)]
-    able = [k for k in able if stays(before, after, k)]
-    moved = [k for k in able if changes[k]]
+    layout, there = before.layout, passage(before.layout, after.layout).stays
+
+    def able(some: Iterable[int]) -> list[int]:
+        """Those of some objects that are learned of."""
+        types = [layout.types[k].name for k in some]
+        known = [t in parts.by_type or (parts.open and t != ACTION) for t in types]
+        return [k for k, ok in zip(some, known, strict=True) if ok and there[k]]
+
+    changes = np.logical_or.reduceat(following != before.vector, _Plan.of(before).offsets)
+    moved = able(np.flatnonzero(changes).tolist())
     if not moved:
-        return able[seen % len(able) :][:1] if able else []
+        every = able(range(len(layout.types)))
+        return every[seen % len(every) :][:1] if every else []
     return [moved[k] for k in np.unique(np.linspace(0, len(moved) - 1, LEARNED).astype(int)).tolist()]
 
 

@@ -54,7 +54,8 @@ LinedUp: TypeAlias = tuple[NDArray[np.intp], list[bytes]]
 """The other bodies of each scene in canonical order, shape ``(n, K - 1)``, and each scene's relational state."""
 
 MOST_STATES = 4096
-"""Of so many single scenes the relational state is remembered."""
+"""Of so many single scenes the relational state is remembered, and where their numbers lie of so many orders of
+objects."""
 
 MOST_SIGHTS = 32
 """For so many layouts the kernel has a work space to look at scenes in, of at most 2 MB."""
@@ -299,6 +300,8 @@ class Perception:
         """Columns of a regression row in the concatenation of a state vector and its next one; cached."""
         key = (id(layout), order)
         if (known := self._gathers.get(key)) is None:
+            if len(self._gathers) >= MOST_STATES:
+                self._gathers.clear()
             known = self._gathers[key] = sig.gather(layout, order)
         return known
 
