@@ -96,7 +96,7 @@ class SlotSignature:
             )
             for c in self.columns
         ]
-        return np.array(found, dtype=np.intp).reshape(-1, 3).T
+        return np.array(found, dtype=np.intp).T
 
     @cached_property
     def features(self) -> tuple[Feature, ...]:

@@ -23,7 +23,7 @@ _ROUNDING: Final = 1e-10
 """Values that differ by less, relative to the greatest of them, are the same number, computed in two ways."""
 
 _CLEAR: Final = 0.01
-"""Zero counts as inside a gap if it keeps this share of the gap's width from either end."""
+"""A number counts as inside a gap if it keeps this share of the gap's width from either end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,16 +122,22 @@ def merit(low: Float, high: Float) -> Float:
 
 
 def simplest_between(low: float, high: float) -> float:
-    """Return zero if it lies well inside a gap, else the number with the fewest digits in its middle half.
+    """Return zero if it lies well inside a gap, else the number with the fewest digits that does.
+
+    Of several with as few the one next to the middle. Where a world's own threshold is such a number, as people choose
+    them, it is this one: that it lies in a narrow gap is no chance. Where it isn't, it may lie anywhere in the gap, and
+    a number off the middle divides hardly worse.
 
     >>> simplest_between(-0.0231, 0.0107)
     0.0
     >>> simplest_between(0.0107, 0.0231)
     0.02
+    >>> simplest_between(-1.001, -0.9615)
+    -1.0
     """
     if signs_differ(low, high):
         return 0.0
-    middle, margin = low + (high - low) / 2, (high - low) / 4
+    middle, margin = low + (high - low) / 2, _CLEAR * (high - low)
     for digits in range(1, 18):
         number = float(f"{middle:.{digits}g}")
         if low + margin <= number <= high - margin and low <= number < high:

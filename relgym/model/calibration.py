@@ -368,20 +368,23 @@ class Calibration:
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
+        self._claimed: dict[tuple[Key, Assessment], bool] = {}
         self._least: dict[int, float] = {}  # probability that claims need, by who makes them
         self._kinds: dict[int, list[_Cell]] = {}  # cells of kinds of predictions, by who makes them
         self._vouched = (
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
-        self._assessed: dict[Key, tuple[tuple[int, ...], Assessment]] = {}
+        self._everyone = tuple(range(self.experts))
+        self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
         self._united: _Cell | None = None  # see `_whole`
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_assessed": {}, "_least": {}, "_kinds": {}, "_united": None}
+        return self.__dict__ | {"_assessed": {}, "_claimed": {}, "_least": {}, "_kinds": {}, "_united": None}
 
     def _changed(self, *, cells: bool = True) -> None:
         """What was worked out from the cells is out of date; of which kinds there are, too, if cells came or went."""
         self._assessed.clear()
+        self._claimed.clear()
         self._least.clear()
         self._united = None
         if cells:
@@ -403,11 +406,18 @@ class Calibration:
     # ------------------------------------------------------------------ what is made of a prediction
     def assess(self, key: Key, values: Sequence[float]) -> Assessment:
         """Who gives the value of a prediction, and how far that can be relied on."""
-        able = tuple(k for k, value in enumerate(values) if math.isfinite(value))
-        known = self._assessed.get(key)
-        if known is None or known[0] != able:
-            known = self._assessed[key] = (able, self._assess(key, able))
-        return known[1]
+        return self._known(key, tuple([k for k, value in enumerate(values) if math.isfinite(value)]))
+
+    def own_word(self, key: Key) -> Assessment | None:
+        """What is made of a prediction if the winner has the word whatever others say; None where that depends."""
+        told = self._known(key, self._everyone)
+        return told if told.speaker == OWN else None
+
+    def _known(self, key: Key, able: tuple[int, ...]) -> Assessment:
+        """`_assess`, worked out once between changes."""
+        if (known := self._assessed.get((key, able))) is None:
+            known = self._assessed[key, able] = self._assess(key, able)
+        return known
 
     def assess_many(
         self, key: Key, values: NDArray[np.float64]
@@ -495,6 +505,12 @@ class Calibration:
             return False
         if not self.trials:
             return True
+        if (known := self._claimed.get((key, told))) is None:
+            known = self._claimed[key, told] = self._claims(key, told)
+        return known
+
+    def _claims(self, key: Key, told: Assessment) -> bool:
+        """`claims` of what somebody looked back at, worked out once between changes."""
         who, cell = _who(key), self._cells.get(key)
         if who not in self._least:
             self._least[who] = self._needed(who)

@@ -106,8 +106,9 @@ class Laws:
 
         Modes rest until the laws are wrong more often than laws may be, and go on learning then.
         """
-        own = [t for t in targets if t.type == type_name]
-        return all(self.governs(t) for t in own) and self.learner.settled(type_name)
+        if type_name not in self.governed or not self.learner.settled(type_name):
+            return False
+        return all(self.governs(t) for t in targets if t.type == type_name)
 
     # ------------------------------------------------------------------ learning
     def learn_one(

@@ -8,9 +8,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
 from relgym.arguments import refusing
 from relgym.config.checks import checked_count
 from relgym.errors import ConfigError, ObservationError
@@ -80,27 +77,27 @@ class Outcomes:
     parts
         The (object, property) of each.
     residuals
-        Observed minus predicted value, in units of the property, shape ``(parts,)``.
+        Observed minus predicted value of each, in units of the property.
     changes
-        Observed value minus the one before, which is what *nothing changes* would be off by, shape ``(parts,)``.
+        Observed value minus the one before, which is what *nothing changes* would be off by.
     claimed
-        Whether the model predicted it, rather than giving a fallback value, shape ``(parts,)``.
+        Whether the model predicted it, rather than giving a fallback value.
     spreads
-        Standard deviation that the model stated, in units of the property; NaN: none; shape ``(parts,)``.
+        Standard deviation that the model stated, in units of the property; NaN: none.
     """
 
     parts: tuple[Key, ...]
-    residuals: NDArray[np.float64]
-    changes: NDArray[np.float64]
-    claimed: NDArray[np.bool_]
-    spreads: NDArray[np.float64]
+    residuals: tuple[float, ...]
+    changes: tuple[float, ...]
+    claimed: tuple[bool, ...]
+    spreads: tuple[float, ...]
 
     @classmethod
     def of(cls, prediction: ScenePrediction, before: Scene, residuals: Mapping[Key, float]) -> Outcomes:
         """What became of a prediction; `residuals` are those of `compared`."""
         told = [p for p in prediction.parts if (p.object, p.property) in residuals]
         parts = tuple((p.object, p.property) for p in told)
-        off = np.array([residuals[key] for key in parts])
+        off = tuple([residuals[key] for key in parts])
         # Observed minus predicted plus predicted minus before; a turn is measured the short way, as its residual is.
         places = before.layout.places
         columns = [places[key] for key in parts]
@@ -108,8 +105,8 @@ class Outcomes:
         for k, column in enumerate(columns):
             if column in before.layout.angles:
                 moved[k] = math.remainder(moved[k], 2.0 * math.pi)
-        claimed = np.array([p.ok for p in told], dtype=np.bool_)
-        return cls(parts, off, off + np.array(moved), claimed, np.array([p.spread for p in told]))
+        changes = tuple([a + b for a, b in zip(off, moved, strict=True)])
+        return cls(parts, off, changes, tuple([p.ok for p in told]), tuple([p.spread for p in told]))
 
 
 class Prequential:
@@ -174,16 +171,16 @@ class Prequential:
         for told in self._outcomes:
             for key, off, change in zip(told.parts, told.residuals, told.changes, strict=True):
                 sums = squares.setdefault(key, [0.0, 0.0])
-                sums[0] += float(off) ** 2
-                sums[1] += float(change) ** 2
+                sums[0] += off**2
+                sums[1] += change**2
         ratios = [off / moved if moved else float(off > 0.0) for off, moved in squares.values()]
         return math.sqrt(math.fsum(ratios) / len(ratios)) if ratios else math.nan
 
     @property
     def coverage(self) -> float:
         """Share of the latest predictions that the model claims, rather than abstains from; NaN before any."""
-        claimed = [told.claimed for told in self._outcomes if len(told.parts)]
-        return float(np.concatenate(claimed).mean()) if claimed else math.nan
+        claimed = [one for told in self._outcomes for one in told.claimed]
+        return sum(claimed) / len(claimed) if claimed else math.nan
 
     @property
     def calibration(self) -> float:
@@ -193,11 +190,12 @@ class Prequential:
         What is off by no more than 1e-9 counts as within; NaN where no prediction with a spread was claimed.
         """
         within = [
-            np.abs(told.residuals[stated]) <= np.maximum(2.0 * told.spreads[stated], WRONG)
+            abs(off) <= max(2.0 * spread, WRONG)
             for told in self._outcomes
-            if (stated := told.claimed & np.isfinite(told.spreads)).any()
+            for off, claimed, spread in zip(told.residuals, told.claimed, told.spreads, strict=True)
+            if claimed and math.isfinite(spread)
         ]
-        return float(np.concatenate(within).mean()) if within else math.nan
+        return sum(within) / len(within) if within else math.nan
 
     @property
     def recent_wrong(self) -> dict[Key, int]:

@@ -5,15 +5,34 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.model.calibration import EXPERTS, GUESS, LATEST, LINEAR, OWN, PERSISTENCE, Audit, key_of, keys_of
+from relgym.model.calibration import (
+    EXPERTS,
+    GUESS,
+    LATEST,
+    LINEAR,
+    OWN,
+    PERSISTENCE,
+    Audit,
+    Key,
+    key_of,
+    keys_of,
+)
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
+from relgym.model.prediction import (
+    OUTCOMES,
+    BatchPrediction,
+    LateAudit,
+    Outcome,
+    Prediction,
+    ScenePrediction,
+)
 from relgym.model.regression import KINDS
 from relgym.model.scenes import wrap
 from relgym.model.target.property_model import Verdict
@@ -95,11 +114,19 @@ def settled(
     """
     model = parts.models[target]
     lawful = parts.governs(target)
-    values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
     winner = -one.mode if lawful else one.mode
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
-    told = model.assess(key, values)
+    word = model.own_word(key) if math.isfinite(one.value) else None
+    record: Audit | LateAudit
+    if word is not None:  # what others would have said is asked if somebody looks back
+        told, value, present = word, one.value, following.copy()
+        others = partial(_overruled, parts, target, percept, index, present, value, lawful=lawful, key=key)
+        record = LateAudit(others, key, OWN)
+    else:
+        values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
+        told = model.assess(key, values)
+        value, record = values[told.speaker], Audit(key, values, told.speaker)
     mode, roles, spread = one.mode, one.roles, one.spread
     if told.speaker == LATEST and mode:
         mode, roles = model.latest, roles[:1]
@@ -117,7 +144,7 @@ def settled(
     return Prediction(
         percept.layout.names[index],
         target.property,
-        values[told.speaker],
+        value,
         outcome,
         mode,
         roles,
@@ -126,8 +153,24 @@ def settled(
         spread,
         told.probability,
         told.interval,
-        Audit(key, values, told.speaker),
+        record,
     )
+
+
+def _overruled(
+    parts: Parts,
+    target: Target,
+    percept: Percept,
+    index: int,
+    following: NDArray[np.float64],
+    own: float,
+    *,
+    lawful: bool,
+    key: Key,
+) -> Audit:
+    """What looking back needs of a prediction whose winner had the word."""
+    values = _experts_one(parts, target, percept, index, following, own, lawful=lawful)
+    return Audit(key, values, OWN)
 
 
 def _experts_one(

@@ -18,6 +18,7 @@ from relgym.errors import ConfigError
 from relgym.experiments.demo import demonstrate_all, demonstrations, learn_online
 from relgym.experiments.episodes import Episode
 from relgym.experiments.plots import Curve, Imagined, Trajectory, draw_curves, draw_trajectories
+from relgym.model.fitting import compare_and_learn
 from relgym.model.world_model import WorldModel
 
 
@@ -37,7 +38,7 @@ def test_what_the_wrapper_sees_are_the_episodes_own_transitions() -> None:
     for episode in episodes:
         next(lesson)
         for transition in episode.transitions():
-            taught.learn_one(transition)
+            compare_and_learn(taught, transition, taught.predict_one(transition.before))
     env.model.finish()
     taught.finish()
     assert env.model.to_json() == taught.to_json()

@@ -86,7 +86,7 @@ def test_errors_below_the_precision_are_not_wrong() -> None:
 def outcomes(*rows: tuple[tuple[str, str], float, float, bool, float]) -> Outcomes:
     """Of (part, residual, change, claimed, spread)."""
     parts, off, moved, claimed, spreads = zip(*rows, strict=True)
-    return Outcomes(parts, np.array(off), np.array(moved), np.array(claimed), np.array(spreads))
+    return Outcomes(parts, off, moved, claimed, spreads)
 
 
 def counted(*steps: Outcomes, window: int = 10) -> Prequential:
@@ -151,8 +151,4 @@ def test_outcomes_are_read_from_a_prediction() -> None:
     turned = 2 * math.pi - 6.0
     np.testing.assert_allclose(told.changes, [turned], atol=1e-12)
     np.testing.assert_allclose(told.residuals, [turned - 0.1], atol=1e-12)
-    assert (
-        told.parts == (("wheel", "turn"),)
-        and told.claimed.tolist() == [True]
-        and told.spreads.tolist() == [0.2]
-    )
+    assert (told.parts, told.claimed, told.spreads) == ((("wheel", "turn"),), (True,), (0.2,))

@@ -18,7 +18,8 @@ from relgym.model import running
 from relgym.model.calibration import Audit, Key
 from relgym.model.compiled import KERNEL
 from relgym.model.lowering import lowered
-from relgym.model.prediction import LateAudit, Prediction
+from relgym.model.perception import Percept
+from relgym.model.prediction import LateAudit, Prediction, ScenePrediction
 from relgym.model.querying import predict
 from relgym.model.world_model import WorldModel
 from relgym.program.records import BeyondError
@@ -116,15 +117,15 @@ def test_programs_that_cannot_tell_rest() -> None:
 
         def argued(self, *_: object) -> object:
             asked.append(self.now)
-            return "told" if 191 <= self.now < 194 else None
+            return "told" if 383 <= self.now < 386 else None
 
     programs = running.Programs()
-    for now in range(208):
+    for now in range(400):
         programs.changed()
         programs.of = lambda *_, now=now: Runner(now)  # type: ignore[method-assign]
         programs.one(None, scene, lambda _: None)  # type: ignore[arg-type, return-value]
-    # Rests of 1, 3, 7, 15, 31, 63, then of 64; whoever can tell is asked each time, and rests shortly when he can't.
-    assert asked == [0, 2, 6, 14, 30, 62, 126, 191, 192, 193, 194, 196, 200]
+    # Rests of 1, 3, 7, 15, 31, 63, 127, then 128; whoever can tell is asked each time, and rests shortly if he can't.
+    assert asked == [0, 2, 6, 14, 30, 62, 126, 254, 383, 384, 385, 386, 388, 392]
 
 
 @pytest.mark.parametrize("make", [cart_model, line_model, room_model, lambda: room_model("auto")])
@@ -174,11 +175,22 @@ def test_many_single_scenes_are_settled_by_the_program(monkeypatch: pytest.Monke
     layout, vectors = scenes_of(model, 1, seed=4)
     scene = Scene(model.schema, layout, vectors[0])
     monkeypatch.setattr(running, "SETTLING", 3)
-    late = [any(isinstance(p.record, LateAudit) for p in model.predict_one(scene).parts) for _ in range(6)]
-    assert late == [False] * 3 + [True] * 3
+    argued: list[Scene] = []
+    whole = running.Runner.argued
+
+    def noted(self: running.Runner, scene: Scene, percept: Percept) -> ScenePrediction | None:
+        argued.append(scene)
+        return whole(self, scene, percept)
+
+    monkeypatch.setattr(running.Runner, "argued", noted)
+    for _ in range(6):
+        model.predict_one(scene)
+    assert len(argued) == 3
     found = model.predict_one(scene)
+    assert all(isinstance(p.record, LateAudit) for p in found.parts)
     model.look_back(found, {(p.object, p.property): 0.0 for p in found.parts})
-    assert not any(isinstance(p.record, LateAudit) for p in model.predict_one(scene).parts)
+    model.predict_one(scene)
+    assert len(argued) == 4
 
 
 def test_a_late_audit_is_worked_out_once_and_copied_as_what_it_says() -> None:

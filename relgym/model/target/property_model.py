@@ -201,7 +201,7 @@ class PropertyModel:
     def settled(self) -> bool:
         """Whether nothing is being looked for, and modes are laws: what comes as predicted teaches nothing new."""
         c = self.clusterer
-        searching = c.searching or c.due or bool(self.candidates) or self.classifier.waits
+        searching = c.searching or c.due or self.classifier.waits
         return not (searching or c.approximate or c.population.chancy or self.rough or self.undecided)
 
     def take_for_known(self, mode: int) -> bool:
@@ -408,6 +408,10 @@ class PropertyModel:
     def assess(self, key: Key, values: Sequence[float]) -> Assessment:
         """Who gives the value of a prediction, and how right it will be."""
         return self.record.assess(key, values)
+
+    def own_word(self, key: Key) -> Assessment | None:
+        """How right a prediction will be whose winner has the word whatever others say; None where that depends."""
+        return self.record.own_word(key)
 
     def assess_many(
         self, key: Key, values: NDArray[np.float64]
