@@ -779,9 +779,16 @@ def _levels(key: Key) -> tuple[Key, Key, Key]:
 
 
 def _mean(cell: _Cell | None, expert: int, prior: float = 0.5) -> float:
-    """Posterior mean of an expert's hits in a cell; the prior where there is none."""
-    record = None if cell is None else cell.records.get(expert)
-    return prior if record is None else record.mean(prior)
+    """Posterior mean of an expert's hits in a cell; the prior where there is none.
+
+    Who makes no claims and never spoke there isn't right more often than those like him who did.
+    """
+    if cell is None:
+        return prior
+    if (record := cell.records.get(expert)) is not None:
+        return record.mean(prior)
+    others = [] if _makes_claims(expert) else [r for who, r in cell.records.items() if not _makes_claims(who)]
+    return min([prior, *(other.mean(prior) for other in others)])
 
 
 def _place(error: float) -> int:

@@ -1074,3 +1074,18 @@ def test_how_many_came_true_in_a_row_is_kept() -> None:
         known.confirm(KEY, 0.125)
     again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
     assert [again.confirm(KEY, 0.125) for _ in range(50)] == [known.confirm(KEY, 0.125) for _ in range(50)]
+
+
+def test_of_another_model_who_never_spoke_is_right_no_more_often_than_who_did() -> None:
+    # The regression spoke, and was right once in ten times; the guess codes best by now, and never spoke.
+    known = Calibration()
+    for k in range(60):
+        said = [math.nan] * len(EXPERTS)
+        said[GUESS], said[LINEAR], said[PERSISTENCE] = 1.3, 1.0 if k % 10 == 0 else 1.5, 0.0
+        known.look_back(Audit(KEY, tuple(said), LINEAR), 1.0, claimed=False, rounding=1e-9, error=0.05)
+    known.forget()
+    said = [math.nan] * len(EXPERTS)
+    said[GUESS], said[PERSISTENCE] = 1.3, 0.0
+    told = known.assess(Key(2, 0, 0), said)
+    assert told.speaker == GUESS
+    assert told.probability < 0.15

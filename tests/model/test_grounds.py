@@ -28,7 +28,7 @@ from relgym.model.compiled import KERNEL
 from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
-from relgym.model.prediction import ScenePrediction
+from relgym.model.prediction import Prediction, ScenePrediction
 from relgym.model.querying import predict
 from relgym.model.running import Runner
 from relgym.model.target.hindsight import Hindsight
@@ -51,9 +51,8 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def told(prediction: ScenePrediction) -> list[object]:
     """All that a prediction says, NaN being itself."""
-    parts = [
-        repr([getattr(p, name) for name in p.__slots__]) for p in prediction.parts
-    ]  # what takes no part in comparisons among them
+    fields = [name for name in Prediction.__slots__ if name != "record"]
+    parts = [repr([*(getattr(p, name) for name in fields), p.audit]) for p in prediction.parts]
     return [*parts, prediction.scene.vector.tobytes()]
 
 
