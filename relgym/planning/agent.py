@@ -424,7 +424,8 @@ class PlanningAgent:
         The world may have changed: old examples still count then, and nothing in a scene tells old from new. Or it
         went where it had never been, and what it learns there holds of what it saw before, too. So three are compared:
         the model at work, one that learns everything again, and two, each for its part. A new one for the second part
-        begins as the first one did, after as many steps.
+        begins as the first one did, after as many steps. What one model of everything says in few numbers it may say by
+        conditions that tell old from new by chance, so it must foresee the latest steps as well.
         """
         began = changed_at(self._wrong)
         if began is None:
@@ -439,10 +440,17 @@ class PlanningAgent:
         if fresh is None:
             return
         apart = missed(self.model, old, episodes[:-since]) + length(self.model) + least
-        if (whole := self._learned_again(seen, episodes, apart)[0]) is not None:
+        whole = self._learned_again(seen, episodes, apart)[0]
+        if whole is not None and self._foreseen(seen, episodes) >= self._foreseen(new, episodes[-since:]):
             self._adopt(whole, seen, episodes)
         else:
             self._adopt(fresh, new, episodes[-since:])
+
+    def _foreseen(self, seen: Sequence[Transition], episodes: NDArray[np.intp]) -> int:
+        """How many of some latest steps a model foresees that learned the others."""
+        count = _FIRST_REVIEW // 4
+        known = learned_again(self.model, seen[:-count], rng=self._rng, episodes=episodes[:-count])
+        return int(right(known, seen[-count:]).sum())
 
     def _learned_from(self) -> tuple[list[Transition], NDArray[np.intp]]:
         """What the model at work has learned from: one that took over after a change knows nothing from before."""
