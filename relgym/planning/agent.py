@@ -425,7 +425,7 @@ class PlanningAgent:
         went where it had never been, and what it learns there holds of what it saw before, too. So three are compared:
         the model at work, one that learns everything again, and two, each for its part. A new one for the second part
         begins as the first one did, after as many steps. What one model of everything says in few numbers it may say by
-        conditions that tell old from new by chance, so it must foresee the latest steps as well.
+        conditions that tell old from new by chance, so it must foresee more of the latest steps, if not all of them.
         """
         began = changed_at(self._wrong)
         if began is None:
@@ -441,16 +441,19 @@ class PlanningAgent:
             return
         apart = missed(self.model, old, episodes[:-since]) + length(self.model) + least
         whole = self._learned_again(seen, episodes, apart)[0]
-        if whole is not None and self._foreseen(seen, episodes) >= self._foreseen(new, episodes[-since:]):
+        if whole is not None:
+            all_foreseen, own = self._foreseen(seen, episodes), self._foreseen(new, episodes[-since:])
+            whole = whole if all_foreseen > own or all_foreseen == 1.0 else None
+        if whole is not None:
             self._adopt(whole, seen, episodes)
         else:
             self._adopt(fresh, new, episodes[-since:])
 
-    def _foreseen(self, seen: Sequence[Transition], episodes: NDArray[np.intp]) -> int:
-        """How many of some latest steps a model foresees that learned the others."""
+    def _foreseen(self, seen: Sequence[Transition], episodes: NDArray[np.intp]) -> float:
+        """Share of some latest steps that a model foresees that learned the others."""
         count = _FIRST_REVIEW // 4
         known = learned_again(self.model, seen[:-count], rng=self._rng, episodes=episodes[:-count])
-        return int(right(known, seen[-count:]).sum())
+        return float(right(known, seen[-count:]).mean())
 
     def _learned_from(self) -> tuple[list[Transition], NDArray[np.intp]]:
         """What the model at work has learned from: one that took over after a change knows nothing from before."""
