@@ -181,7 +181,7 @@ class Exemplars:
             self._shed(most)
         cell = self._cells[number := self._cell(assigned, example.key)]
         cell.count += weight
-        slot = self._room(cell, hard, most)
+        slot = self._room(cell, hard, most, weight)
         if slot is None:
             return None
         self.version += 1
@@ -326,7 +326,7 @@ class Exemplars:
         self._compact()
         self.version += 1
 
-    def _room(self, cell: _Cell, hard: bool, most: int) -> int | None:
+    def _room(self, cell: _Cell, hard: bool, most: int, weight: float) -> int | None:
         """A slot for a new example of this cell, or none if the reservoir passes it over."""
         if len(cell) < self._cap(cell):
             if len(self) < most:
@@ -340,8 +340,9 @@ class Exemplars:
         if hard:
             cell.keep(slot := cell.give_up(), hard)
             return slot
-        # Algorithm R, with a hash for a random number: the k-th example enters with probability size / k.
-        position = _hash(cell.key, cell.count) % max(int(cell.count) - len(cell.hard), 1)
+        # Algorithm R, with a hash for a random number: the k-th example enters with probability size / k, and one that
+        # stands for several with as many times that.
+        position = int(_hash(cell.key, cell.count) % max(int(cell.count) - len(cell.hard), 1) // weight)
         return cell.soft[position] if position < len(cell.soft) else None
 
     def _trim(self) -> NDArray[np.intp]:

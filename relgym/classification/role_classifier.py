@@ -103,15 +103,16 @@ class RoleClassifier:
 
     # ----- learning -----
 
-    def observe(self, example: Example, roles: Sequence[int]) -> bool:
-        """Learn from the role binding of one example of the mode; returns whether that contradicts the descriptions.
+    def observe(self, example: Example, roles: Sequence[int], weight: float = 1.0) -> bool:
+        """Learn from the role binding of one example of the mode, which stands for so many.
 
-        They must tell the players from the others by themselves: that the right objects happened to come first in
-        the order of preference doesn't count. Learns nothing (that is `refresh`).
+        Returns whether that contradicts the descriptions. They must tell the players from the others by themselves:
+        that the right objects happened to come first in the order of preference doesn't count. Learns nothing (that is
+        `refresh`).
         """
         if not self.kinds:
             return False
-        self.seen += 1.0
+        self.seen += weight
         stance = stances(example)
         for description in self.descriptions:
             if description.witness(stance[[roles[at] for at in description.places]]):
@@ -121,7 +122,7 @@ class RoleClassifier:
             for description, described in zip(self.descriptions, self._described(example), strict=True)
             if description.definition is not None
         )
-        self.contradictions += wrong
+        self.contradictions += weight * wrong
         grown = self.errors > 0 and self.seen >= self.config.relearn_growth * max(self.learned, 1.0)
         self.stale = self.stale or self.contradictions > self.errors or grown or self._has_choice(example)
         return wrong

@@ -21,9 +21,11 @@ class AssignmentLog:
     Attributes
     ----------
     seen
-        Number of examples that ever came.
+        Number of examples that ever came here.
     forgotten
         How many examples of each mode were dropped.
+    passed
+        How many examples of each mode never came here, since others stand for them; of `NOISE`: of modes that are gone.
 
     Notes
     -----
@@ -37,6 +39,7 @@ class AssignmentLog:
         self._size = 0
         self.seen = 0
         self.forgotten: Counter[int] = Counter()
+        self.passed: Counter[int] = Counter()
 
     def __len__(self) -> int:
         return self._size
@@ -64,11 +67,6 @@ class AssignmentLog:
         self._size += 1
         self.seen += 1
         return self._size - 1
-
-    def pass_over(self, label: int) -> None:
-        """Count an example of a mode that isn't kept."""
-        self.seen += 1
-        self.forgotten[label] += 1
 
     def keep(self, rows: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Forget the examples of dropped rows of the example table, and follow the others' new numbers.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import Any
 
@@ -131,8 +132,12 @@ class ModeClusterer:
 
     @property
     def seen(self) -> int:
-        """Number of examples that ever came, forgotten ones included."""
+        """Number of examples that it ever learned from, forgotten ones included."""
         return self.population.seen
+
+    def pass_over(self, mode: int) -> None:
+        """Count an example of a mode that isn't learned from, since others stand for it."""
+        self.population.log.passed[mode] += 1
 
     def fits(
         self, table: ExampleTable, examples: NDArray[np.intp]
@@ -363,13 +368,16 @@ class ModeClusterer:
             ):
                 own = Cluster(replace(cluster.mode, id=0, target=self.target))
                 matched[i] = self.search.admit(table, self.population.known(table), own)
-        for i, count in other.population.log.forgotten.items():
-            self.population.log.forgotten[matched.get(i, NOISE)] += count
+        log, its = self.population.log, other.population.log
+        for mine, theirs in ((log.forgotten, its.forgotten), (log.passed, its.passed)):
+            for i, count in theirs.items():
+                mine[matched.get(i, NOISE)] += count
         self.population.log.seen += other.population.log.seen - len(other.population.log)
 
     # ------------------------------------------------------------------ saving
     def to_json(self) -> dict[str, Any]:
         """Everything but the examples."""
+        passed = sorted([mode, count] for mode, count in self.population.log.passed.items() if count)
         return {
             "sigma": self.scale.sigma,
             "next_id": self.population.next_id,
@@ -381,6 +389,7 @@ class ModeClusterer:
             **({"due": True} if self.due else {}),
             **({"chancy": True} if self.population.chancy else {}),
             **({"estimating": True} if self._estimating else {}),
+            **({"passed": passed} if passed else {}),
             "noise": self.noise_examples,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
@@ -408,3 +417,4 @@ class ModeClusterer:
         self.search.restore(data)
         if arrays:
             self.population.log = AssignmentLog.from_arrays(arrays)
+            self.population.log.passed = Counter({int(i): int(n) for i, n in data.get("passed", ())})

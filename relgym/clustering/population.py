@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -114,11 +114,24 @@ class Population:
         """All modes but noise, by id."""
         if not len(self.log):
             return tuple(c.mode for _, c in sorted(self.clusters.items()))
-        labels, dropped = self.labels, self.log.forgotten
-        return tuple(
-            c.mode.with_examples(int(np.count_nonzero(labels == i)) + dropped[i])
-            for i, c in sorted(self.clusters.items())
-        )
+        counts = {i: int(np.count_nonzero(self.labels == i)) + self.log.forgotten[i] for i in self.clusters}
+        for i, more in self._stood_for(counts).items():
+            counts[i] += more
+        return tuple(c.mode.with_examples(counts[i]) for i, c in sorted(self.clusters.items()))
+
+    def _stood_for(self, counts: Mapping[int, int]) -> dict[int, int]:
+        """How many examples those of each mode stand for beside themselves.
+
+        Those of modes that are gone are anybody's: each mode has as large a share of them as of the others.
+        """
+        found = {i: self.log.passed[i] for i in self.clusters}
+        left, total = self.log.passed[NOISE], sum(counts.values())
+        if left and total:
+            for i in sorted(counts):
+                found[i] += left * counts[i] // total
+            most = max(sorted(counts), key=lambda i: counts[i])
+            found[most] += self.log.passed.total() - sum(found.values())
+        return found
 
     @property
     def noise_examples(self) -> int:
@@ -141,9 +154,10 @@ class Population:
         """Forget the modes: all examples become noise."""
         self.clusters.clear()
         self.chancy = False  # the next review tells, of the scale then assumed
-        total = self.log.forgotten.total()
-        self.log.forgotten.clear()
-        self.log.forgotten[NOISE] = total
+        for counted in (self.log.forgotten, self.log.passed):
+            total = counted.total()
+            counted.clear()
+            counted[NOISE] = total
         self.labels[:] = NOISE
 
     def fits(
@@ -266,20 +280,23 @@ class Population:
 
     def install(self, table: ExampleTable, cluster: Cluster, absorbed: tuple[int, ...]) -> int:
         """Put a mode in the place of those it absorbed; its id."""
-        inherited = sum(self.log.forgotten.pop(i, 0) for i in absorbed)
+        known = self.log.forgotten, self.log.passed
+        inherited = [sum(counted.pop(i, 0) for i in absorbed) for counted in known]
         for i in absorbed:
             self.remove(i)
         new = self.next_id
         self.next_id += 1
         self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
-        self.log.forgotten[new] += inherited
+        for counted, more in zip(known, inherited, strict=True):
+            counted[new] += more
         self.reassign(table, new)
         return new
 
     def remove(self, mode: int) -> None:
         """A deleted mode gives its examples back to the noise, from where others take them."""
         del self.clusters[mode]
-        self.log.forgotten[NOISE] += self.log.forgotten.pop(mode, 0)
+        for counted in (self.log.forgotten, self.log.passed):
+            counted[NOISE] += counted.pop(mode, 0)
         self.labels[self.labels == mode] = NOISE
 
     def reassign(self, table: ExampleTable, new: int) -> None:

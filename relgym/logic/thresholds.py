@@ -125,8 +125,8 @@ def simplest_between(low: float, high: float) -> float:
     """Return zero if it lies well inside a gap, else the number with the fewest digits that does.
 
     Of several with as few the one next to the middle. Where a world's own threshold is such a number, as people choose
-    them, it is this one: that it lies in a narrow gap is no chance. Where it isn't, it may lie anywhere in the gap, and
-    a number off the middle divides hardly worse.
+    them, it is this one: that it lies in a narrow gap is no chance. Where it isn't, it may lie anywhere in the gap: a
+    number at the gap's end then divides twice as badly as the middle does.
 
     >>> simplest_between(-0.0231, 0.0107)
     0.0

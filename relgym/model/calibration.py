@@ -242,8 +242,8 @@ class _Cell:
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials
     heard: float = 0.0  # predictions, those of long ago counting less
-    steady: int = 0  # predictions in a row, up to now, that came true
-    passed: int = 0  # of those that came true, how many the next one that is learned from stands for, too
+    steady: int = 0  # predictions in a row, up to now, that were confirmed
+    passed: int = 0  # of these, how many the next one that is learned from stands for, too
     _sure: tuple[float, float] | None = field(
         default=None, repr=False, compare=False
     )  # by bits, since the last trial
@@ -572,14 +572,18 @@ class Calibration:
         turn
             Length of a full turn, of an angle; 0 of anything else.
         times
-            For how many predictions that came true it stands (`confirm`); 0: it didn't.
+            For how many predictions it stands that were confirmed (`confirm`); 0: it wasn't.
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
         self.trials += not times
-        many = max(times, 1)
-        self._changes = _counted(self._changes, _place(errors[PERSISTENCE]), many)
+        self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
         within = max(rounding, error * self.change)
+        if errors[audit.speaker] > within:  # which its law explains; those it would stand for were hits
+            times = 0
+        many = max(times, 1)
+        if many > 1:
+            self._changes = _counted(self._changes, _place(errors[PERSISTENCE]), many - 1)
         self._slips[0] += many
         self._slips[1] += claimed and errors[audit.speaker] > within
         if self._slips[0] > MEMORY:
@@ -681,6 +685,8 @@ class Calibration:
         found = Calibration.from_json(more.to_json(), self.probability, *others)
         for key, cell in Calibration.from_json(less.to_json(), self.probability, *others)._cells.items():
             found._cells.setdefault(key, cell)
+        for cell in found._cells.values():  # a number stands for another mode here, maybe
+            cell.steady = cell.passed = 0
         found.trials = self.trials + other.trials
         return found
 

@@ -14,7 +14,7 @@ from relgym.clustering.clusterer import ClusterReport
 from relgym.html import html_table
 from relgym.logic.search import LITERAL
 from relgym.model.chaining import CHECK_AT, due, inquire, revise
-from relgym.model.forgetting import SLACK, forget
+from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import ScenePrediction
@@ -24,13 +24,14 @@ from relgym.model.target.property_model import bodies_of
 from relgym.scene.objects import TASK, Target, Transition
 from relgym.scheduling.agenda import Budget
 
-__all__ = ["LearnReport", "finish", "learn"]
+__all__ = ["NOTHING", "LearnReport", "finish", "learn"]
 
 
 SEARCHES = 0.6
 """Searches for modes, which may go on for ever, get this share of a step's budget; others get the rest."""
 
 NOTHING: Final[Mapping[tuple[str, str], Confirmed]] = MappingProxyType({})
+"""Of a transition of which nobody looked back at what was predicted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ class LearnReport:
     ----------
     parts
         Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice, nor for
-        what came as predicted and is learned from as one of many (`Calibration.look_back`).
+        what came as predicted and isn't learned from, since others stand for it (`Calibration.confirm`).
     work
         Deterministic units of work spent on re-learning classifiers.
     set_aside
@@ -115,8 +116,7 @@ def learn(
     for type_name, table in parts.tables.items():
         if parts.open and any(rows[type_name] < at <= table.seen for at in CHECK_AT):
             parts.looks += due(parts, type_name)
-        if len(table) >= SLACK * parts.config.history:
-            forget(table, [model for _, model in parts.by_type[type_name]], parts.config.history)
+        forget(table, [model for _, model in parts.by_type[type_name]], parts.config.history)
     _inquire(parts, budget)
     heard = parts.laws is not None and parts.laws.learn_one(
         percept, following, _there(parts, transition, only), parts.models, told

@@ -167,8 +167,10 @@ def _overruled(
     *,
     lawful: bool,
     key: Key,
-) -> Audit:
-    """What looking back needs of a prediction whose winner had the word."""
+) -> Audit | None:
+    """What looking back needs of a prediction whose winner had the word; None once that is no target any more."""
+    if target not in parts.models:
+        return None
     values = _experts_one(parts, target, percept, index, following, own, lawful=lawful)
     return Audit(key, values, OWN)
 

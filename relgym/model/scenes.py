@@ -20,7 +20,6 @@ __all__ = [
     "mismatch",
     "next_values",
     "passage",
-    "stays",
     "unwrapped",
     "with_action",
     "wrap",
@@ -84,11 +83,6 @@ def passage(before: SceneLayout, after: SceneLayout) -> Passage:
             after, stay, np.array(columns, dtype=np.intp), np.array(sources, dtype=np.intp)
         )
     return found
-
-
-def stays(before: Scene, after: Scene, index: int) -> bool:
-    """Whether an object of the first scene is in the second one: of the same name, and of the same type."""
-    return passage(before.layout, after.layout).stays[index]
 
 
 def mismatch(schema: SceneSchema, known: SceneSchema) -> str:

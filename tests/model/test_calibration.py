@@ -1089,3 +1089,18 @@ def test_of_another_model_who_never_spoke_is_right_no_more_often_than_who_did() 
     told = known.assess(Key(2, 0, 0), said)
     assert told.speaker == GUESS
     assert told.probability < 0.15
+
+
+def test_a_miss_that_a_law_explains_counts_once() -> None:
+    known = right(40)
+    known.look_back(Audit(KEY, values(own=1.5), OWN), 1.0, claimed=True, rounding=1e-9, error=0.05, times=8)
+    assert known._cells[KEY].records[OWN].run == -1
+    assert known._cells[KEY].steady == 0
+
+
+def test_of_two_models_together_all_is_learned_from_at_first() -> None:
+    known = right(1)
+    for _ in range(1_000):
+        known.confirm(KEY, 0.125)
+    both = known.united(right(1))
+    assert [both.confirm(KEY, 0.125) for _ in range(7)] == [1] * 7

@@ -17,9 +17,11 @@ from relgym.model.grounds import Grounds
 from relgym.model.motion import Laws
 from relgym.model.prequential import StepReport, compared
 from relgym.model.querying import predict
+from relgym.model.target.property_model import PropertyModel
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, Target, Transition
 from relgym.scene.schema import SceneSchema
+from relgym.scheduling.agenda import Budget
 from relgym.wrappers import ModelLearner
 
 
@@ -110,7 +112,6 @@ def test_what_comes_true_is_learned_from_as_one_of_many_and_counts_for_all() -> 
     kept = len(model.property_model("cart", "v").clusterer.rows)
     assert kept < 0.5 * len(some) < len(whole.property_model("cart", "v").clusterer.rows)
     assert kept == sum(("a", "v") in r.learned.parts for r in reports if r.learned is not None)
-    assert model.property_model("cart", "v").clusterer.seen == len(some)
     for one, other in zip(model.modes("cart", "v"), whole.modes("cart", "v"), strict=True):
         assert one.same_function(other)
     found = sum(mode.examples for mode in model.modes("cart", "v"))
@@ -162,3 +163,33 @@ def test_a_model_that_was_saved_leaves_out_the_same(tmp_path: Path) -> None:
         [Transition(*(again.schema.scene(s.values()) for s in (t.before, t.after))) for t in some[1_000:]],
     )
     assert written(model) == written(again)
+
+
+def test_what_was_left_out_is_nobodys_miss_when_modes_are_searched_anew() -> None:
+    model, some = WorldModel(BOX, targets=[SPEED]), list(steps(1_000))
+    learned(model, some)
+    known = model.property_model("cart", "v")
+    known.clusterer._start_over()
+    assert known.clusterer.noise_examples == len(known.clusterer.rows)
+    known.clusterer.search.discover(model._parts.tables["cart"], len(known.clusterer.rows) - 1, Budget())
+    found = sum(mode.examples for mode in known.modes)
+    assert known.modes
+    assert found + known.clusterer.noise_examples == len(some)
+
+
+def test_looks_that_are_due_after_so_many_examples_are_taken() -> None:
+    model, seen = WorldModel(BOX, targets=[SPEED]), []
+    known, measure = model._parts, PropertyModel._measure
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(PropertyModel, "_measure", lambda self, table: seen.append(1) or measure(self, table))
+        learned(model, steps(3_000))
+    rows = len(known.models[SPEED].clusterer.rows)
+    assert len(seen) >= rows // 256
+
+
+def test_a_late_audit_of_what_is_no_target_any_more_is_none() -> None:
+    model, some = WorldModel(BOX, targets=[SPEED]), list(steps(400))
+    learned(model, some)
+    said = model.predict_one(some[0].before)
+    del model._parts.models[SPEED]
+    assert [p.audit for p in said.parts] == [None]

@@ -859,6 +859,9 @@ def _check_examples(
     _distinct(dropped[:, 0].tolist(), f"history: {at}.forgotten")
     within = _within(dropped[:, 0], 0, model.clusterer.next_id)
     _require(within, f"history: {at}.forgotten", "examples of a mode that never was")
+    passed = [mode for mode, _ in model.clusterer.passed]
+    _distinct(passed, f"{at}: passed")
+    _require(max(passed, default=0) < model.clusterer.next_id, f"{at}: passed", "a mode that never was")
     _require(len(y) or not ids, f"history: {at}.y", "there are modes, but no examples")
     exemplars = model.classifier.exemplars
     if exemplars is not None:

@@ -184,6 +184,7 @@ class ClustererRecord(Record):
     due: bool = False
     chancy: bool = False
     estimating: bool = False
+    passed: list[tuple[Count, Count]] = []
 
 
 # ---------------------------------------------------------------------- clauses and trees

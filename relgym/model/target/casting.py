@@ -64,13 +64,21 @@ class Casting:
         for number in sorted(self.classifiers):
             self.classifiers[number].recall(exemplars, number)
 
-    def observe(self, mode: Mode, example: Example, roles: Sequence[int]) -> bool:
-        """Learn from the role binding of one example; returns whether that contradicts the descriptions."""
+    @property
+    def waits(self) -> bool:
+        """Whether there are descriptions that wait to be learned anew."""
+        return any(known.stale for known in self.classifiers.values())
+
+    def observe(self, mode: Mode, example: Example, roles: Sequence[int], weight: float = 1.0) -> bool:
+        """Learn from the role binding of one example, which stands for so many.
+
+        Returns whether that contradicts the descriptions.
+        """
         kinds = self._kinds(mode)
         known = self.classifiers.get(mode.id)
         if known is None or known.kinds != kinds:
             known = self.classifiers[mode.id] = RoleClassifier(self.vocabulary, kinds, self.config)
-        return known.observe(example, roles)
+        return known.observe(example, roles, weight)
 
     def refresh(self, exemplars: Exemplars, budget: float) -> int:
         """Learn stale descriptions anew until the budget is spent; the work spent."""

@@ -55,7 +55,7 @@ class Confirmed(NamedTuple):
     mode
         Which mode made it.
     weight
-        How many such examples it stands for when it is learned from; 0: others stand for it (`Calibration.look_back`).
+        How many such examples it stands for when it is learned from; 0: others stand for it (`Calibration.confirm`).
     """
 
     mode: int
@@ -148,7 +148,8 @@ def look_back(
     """Report to each target how its predictions of a step came out; arguments as of `WorldModel.look_back`.
 
     Only predictions of modes count: neither fallback values nor laws of motion, which abstain where they don't hold.
-    What rests on another property's next value that was off isn't evaluated, since the fault is that one's.
+    What rests on another property's next value that was off isn't evaluated, since the fault is that one's. Returned is
+    what came true, and whether that was all.
     """
     answers, look = parts.answers(prediction.scene.layout), _Look(parts, precision)
     for part in prediction.parts:
@@ -156,9 +157,13 @@ def look_back(
         answer = answers.get((part.object, part.property))
         if residual is not None and answer is not None and not look.repeats(part, residual, answer):
             look.compare(part, residual, answer)
+    counted = look.counted
     for target, (spoken, wrong) in look.counts.items():
-        parts.models[target].hindsight.add(spoken, wrong)
-    return Retrospect(look.confirmed, look.counted)
+        known = parts.models[target].hindsight
+        before = known.undecided
+        known.add(spoken, wrong)
+        counted = counted and known.undecided == before
+    return Retrospect(look.confirmed, counted)
 
 
 class _Look:
@@ -187,7 +192,7 @@ class _Look:
         target, model = answer.target, answer.model
         lawful = self._parts.governs(target)
         within = self._rounding(part.value + residual) if lawful else model.clusterer.scale.tolerance
-        if not abs(residual) <= within or not (lawful or model.settled):
+        if not abs(residual) <= within or not (lawful or (model.settled and not self._misled(answer))):
             return False
         self._times = model.calibration.confirm(record.key, self._parts.config.downsampling)
         if not lawful:

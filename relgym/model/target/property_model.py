@@ -194,21 +194,22 @@ class PropertyModel:
         played = self.functions.played_one(table, seen.row, report.mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played, weight=weight)
         if played:
-            self.casting.observe(self.mode(report.mode), seen, played)
+            self.casting.observe(self.mode(report.mode), seen, played, weight)
         return report
 
     @property
     def settled(self) -> bool:
         """Whether nothing is being looked for, and modes are laws: what comes as predicted teaches nothing new."""
         c = self.clusterer
-        searching = c.searching or c.due or self.classifier.waits
+        searching = c.searching or c.due or self.classifier.waits or self.casting.waits
         return not (searching or c.approximate or c.population.chancy or self.rough or self.undecided)
 
     def take_for_known(self, mode: int) -> bool:
         """Count an example that came as a mode predicted, and for which others stand; false if the mode is gone."""
         if mode not in self.clusterer.clusters:
             return False
-        self.clusterer.population.log.pass_over(mode)
+        self.clusterer.pass_over(mode)
+        self.latest = mode
         return True
 
     def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
