@@ -107,12 +107,13 @@ def learn(
     _go_on(parts, budget)
     searches = budget.part(SEARCHES)
     rows = {name: table.seen for name, table in parts.tables.items()}
+    moved = False
     for type_name in parts.by_type:
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
             if (only is None or index in only) and stays[index]:
-                _learn_object(parts, percept, index, following, reports, searches, confirmed)
+                moved |= _learn_object(parts, percept, index, following, reports, searches, confirmed)
     for type_name, table in parts.tables.items():
         if parts.open and any(rows[type_name] < at <= table.seen for at in CHECK_AT):
             parts.looks += due(parts, type_name)
@@ -123,7 +124,7 @@ def learn(
     )
     work = _refresh(parts, budget)
     parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
-    counted = not (reports or heard or budget.spent) and len(parts.targets) == known
+    counted = not (reports or moved or heard or budget.spent) and len(parts.targets) == known
     return LearnReport(reports, work, counted=counted)
 
 
@@ -184,17 +185,20 @@ def _learn_object(
     reports: dict[tuple[str, str], ClusterReport],
     budget: Budget,
     confirmed: Mapping[tuple[str, str], Confirmed],
-) -> None:
+) -> bool:
+    """Learn from one object; whether what others stand for changed what is said (`PropertyModel.latest`)."""
     layout = percept.layout
     name = layout.names[index]
     type_name = layout.types[index].name
     weights: dict[str, int] = {}
+    moved = False
     for target, model in parts.by_type[type_name]:
-        one = confirmed.get((name, target.property))
+        one, before = confirmed.get((name, target.property)), model.latest
         if one is None or one.weight or not model.take_for_known(one.mode):
             weights[target.property] = 1 if one is None else max(one.weight, 1)
+        moved |= model.latest != before and model.asks_latest
     if not weights:
-        return
+        return moved
     situation = percept.situation(index)
     table = parts.tables[type_name]
     x = percept.rows(index, following[None])[0]
@@ -213,6 +217,7 @@ def _learn_object(
             reports[name, target.property] = report
     if rough:
         parts.regressions[type_name].learn_one(situation.signature, x, changes)
+    return moved
 
 
 def _refresh(parts: Parts, budget: Budget) -> int:

@@ -193,3 +193,18 @@ def test_a_late_audit_of_what_is_no_target_any_more_is_none() -> None:
     said = model.predict_one(some[0].before)
     del model._parts.models[SPEED]
     assert [p.audit for p in said.parts] == [None]
+
+
+def test_a_step_that_changes_who_held_last_is_more_than_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = WorldModel(BOX, targets=[SPEED])
+    learned(model, steps(3_000))
+    monkeypatch.setattr(PropertyModel, "asks_latest", property(lambda _: True))
+    known, changed = model.property_model("cart", "v"), 0
+    for step in steps(300, seed=3):
+        before = known.latest
+        (report,) = learned(model, [step])
+        assert report.learned is not None
+        if known.latest != before:
+            changed += 1
+            assert not report.learned.counted
+    assert changed > 20
