@@ -25,7 +25,8 @@ class AssignmentLog:
     forgotten
         How many examples of each mode were dropped.
     passed
-        How many examples of each mode never came here, since others stand for them; of `NOISE`: of modes that are gone.
+        How many examples never came here, since others stand for them, by the mode of those; of `NOISE`: those for
+        which the next one will stand, and those of modes that are gone.
 
     Notes
     -----

@@ -135,9 +135,16 @@ class ModeClusterer:
         """Number of examples that it ever learned from, forgotten ones included."""
         return self.population.seen
 
-    def pass_over(self, mode: int) -> None:
-        """Count an example of a mode that isn't learned from, since others stand for it."""
-        self.population.log.passed[mode] += 1
+    def pass_over(self) -> None:
+        """Count an example that isn't learned from, since others stand for it."""
+        self.population.log.passed[NOISE] += 1
+
+    def stand_for(self, mode: int, others: int) -> None:
+        """An example of a mode stands for so many that were passed over."""
+        passed = self.population.log.passed
+        found = min(others, passed[NOISE])
+        passed[NOISE] -= found
+        passed[mode] += found
 
     def fits(
         self, table: ExampleTable, examples: NDArray[np.intp]

@@ -122,7 +122,7 @@ class Population:
     def _stood_for(self, counts: Mapping[int, int]) -> dict[int, int]:
         """How many examples those of each mode stand for beside themselves.
 
-        Those of modes that are gone are anybody's: each mode has as large a share of them as of the others.
+        Of what nobody stands for, yet or any more, each mode has as large a share as of the others.
         """
         found = {i: self.log.passed[i] for i in self.clusters}
         left, total = self.log.passed[NOISE], sum(counts.values())

@@ -208,3 +208,14 @@ def test_a_step_that_changes_who_held_last_is_more_than_counted(monkeypatch: pyt
             changed += 1
             assert not report.learned.counted
     assert changed > 20
+
+
+def test_modes_have_the_shares_of_what_came_that_they_have_where_all_is_learned_from() -> None:
+    """Also where several explain an example: it counts for the simplest, not for the one that predicted it."""
+    model, whole = (WorldModel(BOX, {"downsampling": share}, targets=[SPEED]) for share in (0.0075, 0.0))
+    some = list(steps(3_000, seed=4))
+    for each in (model, whole):
+        learned(each, some)
+    found = [{m.formula(): m.examples for m in each.modes("cart", "v")} for each in (model, whole)]
+    assert found[0].keys() == found[1].keys()
+    assert all(abs(found[0][name] - count) <= 0.03 * len(some) for name, count in found[1].items())

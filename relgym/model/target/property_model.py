@@ -174,6 +174,8 @@ class PropertyModel:
         seen = self._with_next(example, situation.signature, x, len(self.clusterer.y))
         self._compare(situation, seen, x[0], y)
         report = self.clusterer.learn_one(table, row, y, budget)
+        if weight > 1:
+            self.clusterer.stand_for(report.mode, weight - 1)
         self._unsettled = _noisy(self.clusterer.labels[-HOPELESS:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
@@ -208,7 +210,7 @@ class PropertyModel:
         """Count an example that came as a mode predicted, and for which others stand; false if the mode is gone."""
         if mode not in self.clusterer.clusters:
             return False
-        self.clusterer.pass_over(mode)
+        self.clusterer.pass_over()
         self.latest = mode
         return True
 
