@@ -13,6 +13,7 @@ from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import MODES, PublishedMode
 from relgym.experiments.data import BALL_EXPERIMENTS, THESIS_EXPERIMENTS, ball_episodes
 from relgym.experiments.evaluate import TOLERANCE
+from relgym.experiments.jobs.code import LEARNER
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.scenes import TOLD_APART
 from relgym.experiments.seeds import FREQUENCY_SEEDS
@@ -33,7 +34,12 @@ def plan(protocol: Protocol) -> Plan:
     """Ten seeds of each experiment, in both kinds of scenes."""
     return {
         f"{experiment}/{scenes}": [
-            Task(f"{__name__}:count", {"experiment": experiment, "seed": seed, "scenes": scenes}, "scenes")
+            Task(
+                f"{__name__}:count",
+                {"experiment": experiment, "seed": seed, "scenes": scenes},
+                "scenes",
+                LEARNER,
+            )
             for seed in FREQUENCY_SEEDS
         ]
         for experiment in (1, 2)

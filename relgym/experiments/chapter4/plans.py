@@ -10,6 +10,7 @@ from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, installed
 from relgym.baselines.tuned import setting_of
 from relgym.experiments.chapter4.job import Plan
 from relgym.experiments.chapter4.protocol import ABLATIONS, LEARNERS, WHOLE_TEST, Batch, Protocol
+from relgym.experiments.jobs.code import LEARNER
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 
@@ -30,6 +31,11 @@ __all__ = [
 _ROOM: Final = "relgym.experiments.chapter4"
 
 
+def _without(learner: str) -> tuple[str, ...]:
+    """What a learner, or a baseline, runs nothing of, though it is imported beside it."""
+    return () if learner in ("world", "default", "auto") else LEARNER
+
+
 def nothing(_: Protocol) -> Plan:
     """What is only drawn."""
     return {}
@@ -38,7 +44,13 @@ def nothing(_: Protocol) -> Plan:
 def pushing(protocol: Protocol) -> Plan:
     """Box pushing, every learner once."""
     return {
-        learner: [Task(f"{_ROOM}.pushing:lesson", {"learner": learner, "seed": TRAINING_SEEDS[0]})]
+        learner: [
+            Task(
+                f"{_ROOM}.pushing:lesson",
+                {"learner": learner, "seed": TRAINING_SEEDS[0]},
+                without=_without(learner),
+            )
+        ]
         for learner in LEARNERS
     }
 
@@ -91,7 +103,7 @@ def _lesson(
         "tests": protocol.tests(),
         "stages": list(stages),
     }
-    return Task(f"{_ROOM}.lesson:lesson", arguments, f"experiment {experiment}, {learner}")
+    return Task(f"{_ROOM}.lesson:lesson", arguments, f"experiment {experiment}, {learner}", _without(learner))
 
 
 def rollouts(protocol: Protocol) -> Plan:
@@ -105,7 +117,9 @@ def rollouts(protocol: Protocol) -> Plan:
         "trials": protocol.trials,
     }
     return {
-        learner: [Task(f"{_ROOM}.rolled:imagine", {"learner": learner, **arguments}, learner)]
+        learner: [
+            Task(f"{_ROOM}.rolled:imagine", {"learner": learner, **arguments}, learner, _without(learner))
+        ]
         for learner in LEARNERS
     }
 
@@ -125,7 +139,9 @@ def noise(protocol: Protocol) -> Plan:
                     "episodes": protocol.after(1)[-1],
                     "tests": protocol.tests(),
                 }
-                task = Task(f"{_ROOM}.noisy:lesson", arguments, f"expected {expected}")
+                task = Task(
+                    f"{_ROOM}.noisy:lesson", arguments, f"expected {expected}", _without(f"{expected}")
+                )
                 plan.setdefault(f"{expected}", []).append(task)
     return plan
 
@@ -167,7 +183,7 @@ def _baseline(
         "tests": protocol.tests(),
         "setting": setting_of(function, name, seen),
     }
-    return Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}")
+    return Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}", LEARNER)
 
 
 def tunings(protocol: Protocol) -> Plan:
@@ -187,6 +203,6 @@ def tunings(protocol: Protocol) -> Plan:
                         "tests": {"seeds": [TUNING_TEST_SEED], "episodes": 12},
                         "setting": number,
                     }
-                    task = Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}")
+                    task = Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}", LEARNER)
                     plan.setdefault(f"{function}/{name}/{seen}", []).append(task)
     return plan

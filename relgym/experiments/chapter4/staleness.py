@@ -41,11 +41,9 @@ def digest_of(name: str) -> str:
         Of a job, such as ``"table-4.2"``.
     """
     job = JOBS[name]
-    modules = {
-        task.function.partition(":")[0] for group in job.plan(Protocol.fast(1)).values() for task in group
-    }
     show = getattr(job.show, "func", job.show)
-    versions = [code_version(module) for module in sorted(modules or {show.__module__})]
+    tasks = [task for group in job.plan(Protocol.fast(1)).values() for task in group]
+    versions = sorted({task.version for task in tasks} or {code_version(show.__module__)})
     return hashlib.sha256(" ".join(versions).encode()).hexdigest()[:12]
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 from relgym.errors import ConfigError
 
-__all__ = ["code_version", "modules_behind"]
+__all__ = ["LEARNER", "code_version", "modules_behind"]
 
 _PACKAGE: Final = "relgym"
 
@@ -28,13 +28,44 @@ _LIBRARIES: Final = {
 }
 """Libraries that results depend on: import name and distribution."""
 
+LEARNER: Final = (
+    "relgym.classification",
+    "relgym.clustering.columns",
+    "relgym.clustering.population",
+    "relgym.clustering.roles",
+    "relgym.envs.dreams",
+    "relgym.envs.model_files",
+    "relgym.laws",
+    "relgym.logic",
+    "relgym.model.calibration",
+    "relgym.model.learning",
+    "relgym.model.parts",
+    "relgym.model.perception",
+    "relgym.model.reports.advice",
+    "relgym.model.reports.distant",
+    "relgym.model.reports.report",
+    "relgym.model.target",
+    "relgym.model.world_model",
+    "relgym.program",
+    "relgym.thesis.files",
+)
+"""Modules and packages of relgym's own learner, and of files: other learners are imported beside them and run none of
+their functions. `tests/experiments/chapter4/test_apart.py` looks at what is run."""
+
 
 @cache
-def code_version(module: str) -> str:
+def code_version(module: str, without: tuple[str, ...] = ()) -> str:
     """Hexadecimal digest of the code behind a module, and of the versions of the libraries that they import.
 
     A change anywhere else leaves it as it is (what draws a figure isn't what measured it), and so does one of comments
     and docstrings.
+
+    Parameters
+    ----------
+    module
+        Its name.
+    without
+        As of `modules_behind`.
 
     Raises
     ------
@@ -43,7 +74,7 @@ def code_version(module: str) -> str:
     """
     digest = hashlib.sha256()
     libraries: set[str] = set()
-    for name in modules_behind(module):
+    for name in modules_behind(module, without):
         digest.update(f"{name} {_content(name)}\n".encode())
         libraries |= {found.split(".")[0] for found in _imports(name)} & _LIBRARIES.keys()
     for library in sorted(libraries):
@@ -51,10 +82,22 @@ def code_version(module: str) -> str:
     return digest.hexdigest()
 
 
-def modules_behind(module: str) -> tuple[str, ...]:
+def modules_behind(module: str, without: tuple[str, ...] = ()) -> tuple[str, ...]:
     """The module itself and every module of relgym that it imports, directly or not, sorted by name.
 
     Imports inside functions count.
+
+    Parameters
+    ----------
+    module
+        Its name.
+    without
+        Modules and packages of which nothing is run, though they are imported; what only they import is left out, too.
+
+    Raises
+    ------
+    ConfigError
+        There is no such module.
     """
     if _source(module) is None:
         raise ConfigError(f"no module {module!r} to take the version of")
@@ -68,7 +111,9 @@ def modules_behind(module: str) -> tuple[str, ...]:
         waiting += [
             found
             for found in _imports(name)
-            if found.split(".")[0] == _PACKAGE and _source(found) is not None
+            if found.split(".")[0] == _PACKAGE
+            and not any(f"{found}.".startswith(f"{each}.") for each in without)
+            and _source(found) is not None
         ]
     return tuple(sorted(known))
 

@@ -30,11 +30,15 @@ class Task:
         Plain data.
     kind
         What it has in common with others that take about as long; for the estimate of the remaining time.
+    without
+        Modules and packages that it imports and of which it runs nothing (`relgym.experiments.jobs.code.LEARNER`): a
+        change of those leaves its result as it is.
     """
 
     function: str
     arguments: Mapping[str, Any] = field(default_factory=dict)
     kind: str = ""
+    without: tuple[str, ...] = ()
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -42,8 +46,13 @@ class Task:
     @cached_property
     def key(self) -> str:
         """Hexadecimal digest of function, arguments and the version of all code behind them."""
-        content = [self.function, self.arguments, code_version(self._module)]
+        content = [self.function, self.arguments, self.version]
         return hashlib.sha256(canonical(content).encode()).hexdigest()
+
+    @property
+    def version(self) -> str:
+        """Hexadecimal digest of the code behind it."""
+        return code_version(self._module, self.without)
 
     @property
     def name(self) -> str:
