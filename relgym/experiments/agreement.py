@@ -163,7 +163,7 @@ def agreement(taught: Taught, *, scenes: int, exported: int) -> Agreement:
             known = predict_many(parts, parts.perception.percept(layout, chunk), layout, chunk)
             told = runner.many(chunk)
         if told is None:
-            return Agreement(0, 0.0, 0.0, False, 0, 0.0, 0.0, "regressions may give values")
+            return Agreement(0, 0.0, 0.0, False, 0, 0.0, 0.0, "laws of hypothesis classes that were added")
         same.append(_same(told, known))
         largest = max(largest, _apart(told.vectors, known.vectors))
         if at < exported:

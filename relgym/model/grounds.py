@@ -1,8 +1,8 @@
 """What a program was lowered from: as long as a model holds the same, its program says what the model says.
 
 Most transitions change what is counted, not what is said: a program is lowered anew only when something else is read
-than before. Votes do change with every example; they are no reason to lower, but written into the program that there is
-(`relgym.model.running.Runner.follow`).
+than before. Votes do change with every example, as do the mode that held last and how far regressions are trusted; they
+are no reason to lower, but written into the program that there is (`relgym.model.running.Runner.follow`).
 """
 
 from __future__ import annotations
@@ -42,8 +42,15 @@ class Grounds(NamedTuple):
             book = parts.laws.learner.book
             things += (book.pair, book.inertia, *book.free.values())
             numbers += (parts.laws.governed, book.tolerance, tuple(book.free), dict(book.shares))
+        rough = set()
         for target in parts.targets:
             _read(parts.models[target], things, numbers, votes=not parts.governs(target))
+            if parts.models[target].rough:
+                rough.add(target.type)
+        for name in sorted(rough):
+            weights, others = parts.regressions[name].solved
+            things += weights
+            numbers.append(others)
         return cls(tuple(things), tuple(numbers))
 
     def same(self, other: Grounds) -> bool:
@@ -62,7 +69,13 @@ def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes:
     things += (known.scope, model.limits, model.stops, model.spreads, model.conditions, known.guess)
     things += (known.guess_beyond, classifier.vocabulary, *classifier.classifiers)
     things += [cluster.mode for cluster in clusterer.clusters.values()]
-    numbers += (tuple(clusterer.clusters), classifier.modes, clusterer.approximate, model.surmise)
+    numbers += (
+        tuple(clusterer.clusters),
+        classifier.modes,
+        clusterer.approximate,
+        model.surmise,
+        model.rough,
+    )
     if not votes:
         return
     numbers += (model.undecided, model.lost, model.latest if model.lost else NOISE)

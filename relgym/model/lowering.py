@@ -67,6 +67,7 @@ class _Lowering:
         self.registers = self.one + 1
         self.keys: dict[tuple[str, str], int] = {}
         self.everything = False
+        self.fits: dict[int, tuple[int, ir.Fit] | None] = {}  # of objects: their numbers, and what they are
         self.wanted: set[int] = set()
         check_bodies(self.axes, self.perception.extractor.geometry, layout)
         self.unary = {
@@ -141,6 +142,7 @@ class _Lowering:
             perception.parting,
             self.everything,
             motion,
+            tuple(known[1] for known in self.fits.values() if known is not None),
             answers,
             kinematics,
             tuple(angle_columns(layout).tolist()),
@@ -240,8 +242,10 @@ class _Lowering:
         laws = parts.laws
         component = laws._components[target.type, target.property] if governed and laws is not None else -1
         fields: dict[str, object] = {}
+        regression = None
         if not governed:
             fields = self._modes(model, layout, index, body, situation, one)
+            regression = self._regression(target, index, signature, gather.tolist()) if model.rough else None
         return ir.Answer(
             layout.names[index],
             target.property,
@@ -254,6 +258,7 @@ class _Lowering:
             reach=reach,
             guess=guess,
             beyond=beyond,
+            regression=regression,
             features=tuple(one.features.values()),
             **fields,  # type: ignore[arg-type]
         )
@@ -306,6 +311,28 @@ class _Lowering:
             "high": (limits.high, float(limits.most)),
             "stops": tuple(self._stops(model, signature, one)),
         }
+
+    def _regression(
+        self, target: Target, index: int, signature: SlotSignature, gather: list[int]
+    ) -> ir.Regression | None:
+        """Least squares of a target's changes; None while there is nothing."""
+        learned = self.parts.regressions[target.type]
+        if (told := learned.sums(target.property)) is None:
+            return None
+        if index not in self.fits:
+            known = learned.fit(signature)
+            self.fits[index] = None
+            if known is not None:
+                places, centre, scale, reach = known
+                columns = tuple((gather[p], c, s) for p, c, s in zip(places, centre, scale, strict=True))
+                number = sum(each is not None for each in self.fits.values())
+                self.fits[index] = number, ir.Fit(columns, tuple(ir.Leverage(*each) for each in reach))
+        if (fit := self.fits[index]) is None:
+            return None
+        weights, bounds = told
+        trusted = tuple(ir.Trusted(*each) for each in learned.trusted(target.property))
+        column = self.layout.column(index, target.property)
+        return ir.Regression(fit[0], column, weights, *bounds, trusted)
 
     def _own_columns(
         self,

@@ -100,6 +100,7 @@ def settled(
     index: int,
     following: NDArray[np.float64],
     one: Prediction | Said,
+    values: tuple[float, ...] | None = None,
 ) -> Prediction:
     """A prediction with the value of who codes such ones best, how right that will be, and what it is of.
 
@@ -111,6 +112,8 @@ def settled(
         Next values as far as they are predicted, the present one of this property, shape ``(width,)``.
     one
         What modes or laws say; its value is NaN where they say nothing.
+    values
+        What all experts say, if that is known already.
     """
     model = parts.models[target]
     lawful = parts.governs(target)
@@ -119,7 +122,10 @@ def settled(
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
     word = model.own_word(key) if math.isfinite(one.value) else None
     record: Audit | LateAudit
-    if word is not None:  # what others would have said is asked if somebody looks back
+    if values is not None:
+        told = model.assess(key, values) if word is None else word
+        value, record = values[told.speaker], Audit(key, values, told.speaker)
+    elif word is not None:  # what others would have said is asked if somebody looks back
         told, value, present = word, one.value, following.copy()
         others = partial(_overruled, parts, target, percept, index, present, value, lawful=lawful, key=key)
         record = LateAudit(others, key, OWN)

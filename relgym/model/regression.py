@@ -66,9 +66,10 @@ class Regression:
         # Mean squares of what was left of each target, where h is 0: by that nothing changes, and each regression.
         self._left = np.zeros((1 + KINDS, 0))
         self._places: dict[int, tuple[SlotSignature, NDArray[np.intp] | None]] = {}
+        self._texts: dict[int, tuple[NDArray[np.float32], str]] = {}  # see `_text`
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_places": {}}  # keyed by identity, which a copy doesn't share
+        return self.__dict__ | {"_places": {}, "_texts": {}}  # keyed by identity, which a copy doesn't share
 
     def learn_one(
         self, signature: SlotSignature, row: NDArray[np.float64], changes: Mapping[str, float]
@@ -184,36 +185,51 @@ class Regression:
         bias = np.maximum(self._left[: kind + 1].min(axis=0) - left, 0.0)
         return np.where(known, bias, 1.0), np.where(known, left, 0.0)
 
-    def sums(
-        self, signature: SlotSignature, target: str
-    ) -> (
-        tuple[
-            list[int],
-            list[float],
-            list[float],
-            tuple[tuple[float, ...], ...],
-            tuple[float, float],
-            list[tuple[tuple[float, ...], str, int, float, float]],
-        ]
-        | None
-    ):
-        """What `values` works out for a target: columns of a row, their centres and scales, weights, bounds.
+    def fit(
+        self, signature: SlotSignature
+    ) -> tuple[list[int], list[float], list[float], list[tuple[tuple[float, ...], str]]] | None:
+        """What is the same for all targets: columns of a row, their centres and scales; None while there is nothing.
 
-        And of each regression how far its word counts: mean, packed spread, rows, and what the words before it leave
-        more than it, and it.
+        And what the leverage in each regression is worked out from: mean and packed spread.
         """
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
+        reach = [(tuple(r.mean.tolist()), self._text(k)) for k, r in enumerate(self._ridges)]
+        return places.tolist(), self._centre.tolist(), self._scale.tolist(), reach
+
+    def sums(self, target: str) -> tuple[tuple[tuple[float, ...], ...], tuple[float, float]] | None:
+        """Weights of each regression for a target, and bounds of the change; None where nothing is known of it."""
+        if not self._ridges or target not in self.targets:
+            return None
         k = self.targets.index(target)
-        weights = tuple(tuple(r.weights[k].tolist()) for r in self._ridges if k < len(r.weights))
         least, most = self._range[:, k].tolist()
         slack = BEYOND * (most - least)
-        centre, scale = self._centre.tolist(), self._scale.tolist()
-        reach = []
+        return tuple(tuple(r.weights[k].tolist()) for r in self._ridges), (least - slack, most + slack)
+
+    def trusted(self, target: str) -> list[tuple[float, float, int]]:
+        """How far the word of each regression counts for a target (`relgym.program.records.Trusted`).
+
+        What the words before it leave more than it, and what it leaves, in the mean square; and its rows.
+        """
+        k = self.targets.index(target)
+        found = []
         for kind, ridge in enumerate(self._ridges):
-            bias, left = (float(each[k]) for each in self._bias(kind))
-            reach.append((tuple(ridge.mean.tolist()), _packed(ridge.spread), ridge.rows, bias, left))
-        return places.tolist(), centre, scale, weights, (least - slack, most + slack), reach
+            bias, left = self._bias(kind)
+            found.append((float(bias[k]), float(left[k]), ridge.rows))
+        return found
+
+    @property
+    def solved(self) -> tuple[tuple[object, ...], tuple[object, ...]]:
+        """What `fit` and `sums` tell: arrays that are replaced when it changes, and what is compared by value."""
+        return tuple(r.weights for r in self._ridges), (len(self.targets), self._range.tobytes())
+
+    def _text(self, kind: int) -> str:
+        """The packed spread of a regression, worked out once."""
+        ridge = self._ridges[kind]
+        known = self._texts.get(kind)
+        if known is None or known[0] is not ridge.spread:
+            known = self._texts[kind] = ridge.spread, _packed(ridge.spread)
+        return known[1]
 
     def _columns(self, signature: SlotSignature) -> NDArray[np.intp] | None:
         """Where the columns lie in a signature's rows; None where one is missing."""

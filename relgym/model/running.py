@@ -30,19 +30,18 @@ from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import (
     OUTCOMES,
     BatchPrediction,
-    LateAudit,
     Outcome,
     Prediction,
     ScenePrediction,
 )
-from relgym.model.querying import Said, derive, predict, settled
+from relgym.model.querying import Said, derive, settled
 from relgym.model.scenes import wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
 from relgym.model.trusting import trusting
 from relgym.program.machine import Machine
 from relgym.program.records import Answer, BeyondError, Program, Trust
-from relgym.program.tape import Tape, encoded, kind_of, ordered
+from relgym.program.tape import Tape, encoded, kind_of, ordered, trust_numbers
 from relgym.scene.objects import Scene, SceneLayout
 
 __all__ = ["Programs", "Runner"]
@@ -180,6 +179,8 @@ class _Told(NamedTuple):
     """Probability and interval of each answer; stale unless it is settled."""
     believed: list[list[int]]
     """Number and place of each answer's belief; stale unless it is settled."""
+    experts: list[list[float]]
+    """What everybody but persistence says of each answer (`relgym.model.calibration.EXPERTS`)."""
 
 
 class Runner:
@@ -203,7 +204,7 @@ class Runner:
         tape = encoded(program)
         self._space, count = tape.space(), len(program.answers)
         self._now, self._after = np.empty(program.width), np.empty(program.width)
-        told = ("outcomes", "modes", "margins", "touched", "players", "sure", "believed")
+        told = ("outcomes", "modes", "margins", "touched", "players", "sure", "believed", "experts")
         self._tells = tuple(
             self._space[name][0, :count] for name in told
         )  # where the kernel leaves what it says
@@ -222,15 +223,15 @@ class Runner:
         self._lay(tape)
 
     def _lay(self, tape: Tape) -> None:
-        """Take note of where votes stand in the tape that is run, and write those that hold now."""
-        self._places = tape.votes
+        """Take note of where what changes often stands in the tape that is run, and write what holds now."""
+        self._places, self._latest, self._trusted = tape.votes, tape.latest, tape.trusted
         self._votes = [None for places, _ in tape.votes for _ in places]
         self.follow()
 
     def follow(self) -> None:
-        """Write the votes that hold now into the program; all else that it says is as it was.
+        """Write what changes often into the program: votes, the mode that held last, how far regressions are trusted.
 
-        How right its predictions are is written anew when somebody asks for many.
+        All else that it says is as it was. How right its predictions are is written anew when somebody asks for many.
         """
         self._settled, self._asked = False, 0
         code, k, moved = self._space["code"][0], 0, False
@@ -245,6 +246,14 @@ class Runner:
             code[by_tie : by_tie + len(first)] = first
         if moved:
             self._space["memory_keys"] = 0  # answers that are remembered were voted for as it was before
+        numbers = self._space["numbers"][0]
+        for teller, (place, modes), trusted in zip(self._tellers, self._latest, self._trusted, strict=True):
+            model = teller.model
+            if modes:
+                code[place] = modes.get(model.latest, 0) if model.asks_latest else 0
+            if trusted >= 0:
+                known = self._parts.regressions[model.target.type].trusted(model.target.property)
+                numbers[trusted : trusted + 3 * len(known)] = trust_numbers(known)
 
     def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """Predict what follows n scenes; None: arrays must, or can say why not."""
@@ -304,11 +313,13 @@ class Runner:
         found: list[Prediction] = []
         for k, teller in enumerate(self._tellers):
             a = teller.answer
-            after, outcomes, modes, margins, noted, players, _, _ = told
-            raw = teller.tell(now, after, outcomes[k], modes[k], margins[k], noted[k], players[k])
+            after, outcomes, modes, margins, noted, players, _, _, experts = told
+            said = experts[k]
+            raw = teller.tell(now, said[OWN], outcomes[k], modes[k], margins[k], noted[k], players[k])
             if raw is None:
                 return None
-            one = settled(self._parts, teller.target, percept, teller.index, following, raw)
+            others = None if teller.model.candidates else teller.values(said, now)
+            one = settled(self._parts, teller.target, percept, teller.index, following, raw, others)
             following[a.column] = one.value
             found.append(one)
             same = one.value == after[a.column]
@@ -340,12 +351,12 @@ class Runner:
         after, rows = told.following, zip(self._tellers, *told[1:], strict=True)
         found: list[Prediction] = []
         kinds = self._kinds
-        for k, (teller, outcome, mode, margin, noted, players, sure, believed) in enumerate(rows):
+        for teller, outcome, mode, margin, noted, players, sure, believed, experts in rows:
             probability, interval = sure
             speaker, spread = teller.spoken[believed[1]]
-            value = float(after[teller.answer.column])
-            if speaker == GUESS or teller.turned(value, now):
+            if speaker == GUESS:  # what it left isn't told
                 return None
+            values = teller.values(experts, now)
             roles, own, frame = teller.known(now, mode, noted, players)
             if speaker == LATEST and mode:
                 roles = roles[:1]
@@ -354,12 +365,11 @@ class Runner:
             key = kinds.get(believed[0])
             if key is None:
                 key = kinds[believed[0]] = Key(*kind_of(believed[0]))
-            audit = LateAudit(partial(_audit, self._parts, scene, k, key, speaker, value), key, speaker)
             found.append(
                 Prediction(
                     teller.answer.object,
                     teller.answer.property,
-                    value,
+                    values[speaker],
                     OUTCOMES[outcome],
                     mode,
                     roles,
@@ -368,7 +378,7 @@ class Runner:
                     own,
                     probability,
                     interval,
-                    audit,
+                    Audit(key, values, speaker),
                 )
             )
         return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
@@ -400,7 +410,7 @@ class Runner:
                 self._given[list(given)] = 0
             if bad:
                 return None
-            outcomes, modes, margins, noted, players, sure, believed = self._tells
+            outcomes, modes, margins, noted, players, sure, believed, experts = self._tells
             return _Told(
                 self._after.copy(),
                 outcomes.tolist(),
@@ -410,6 +420,7 @@ class Runner:
                 players.copy(),
                 sure.tolist(),
                 believed.tolist(),
+                experts.tolist(),
             )
 
 
@@ -432,7 +443,7 @@ class _Teller:
     """
 
     __slots__ = (
-        *("_body_names", "_fixed", "_frame", "_modes", "_spreads", "_turns"),
+        *("_body_names", "_fixed", "_frame", "_modes", "_spreads"),
         *("answer", "index", "model", "spoken", "target"),
     )
 
@@ -449,7 +460,6 @@ class _Teller:
         index = self.index = layout.index(answer.object)
         model = self.model = parts.property_model(layout.types[index].name, answer.property)
         self.target = model.target
-        self._turns = answer.property in layout.types[index].angles
         situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)
         signature = situation.signature
         gather = parts.perception.gather(layout, signature, tuple(situation.plain.tolist())).tolist()
@@ -458,7 +468,7 @@ class _Teller:
     def tell(
         self,
         now: NDArray[np.float64],
-        after: NDArray[np.float64],
+        value: float,
         outcome: int,
         mode: int,
         margin: float,
@@ -467,17 +477,13 @@ class _Teller:
     ) -> Said | None:
         """What modes or laws say of a scene; `noted` is the mode that gave the value, or of laws whom the body touches.
 
-        None where whether they have a value isn't told, or what it was before a turn was taken off.
+        None where it isn't told whether they have a value.
         """
-        a = self.answer
-        lawful = a.component >= 0
+        lawful = self.answer.component >= 0
         if lawful and outcome == _DEPENDS:
             return None
-        value = math.nan
-        if outcome == _PREDICTED if lawful else noted > 0:
-            value = float(after[a.column])
-            if self.turned(value, now):
-                return None
+        if not (outcome == _PREDICTED if lawful else noted > 0):
+            value = math.nan
         roles, spread, frame = self.known(now, mode, noted, players)
         return Said(value, OUTCOMES[outcome], mode, roles, margin, frame, spread)
 
@@ -485,9 +491,10 @@ class _Teller:
         """Take note of what is believed now."""
         self.spoken = [] if trust is None else [(b.speaker, b.spread) for b in ordered(trust.beliefs)]
 
-    def turned(self, value: float, now: NDArray[np.float64]) -> bool:
-        """Whether a turn was taken off a value: what it was before isn't told."""
-        return self._turns and abs(value - now[self.answer.column]) > math.pi
+    def values(self, said: list[float], now: NDArray[np.float64]) -> tuple[float, ...]:
+        """What each of `EXPERTS` says, persistence too; NaN: nothing."""
+        found = [value if math.isfinite(value) else math.nan for value in said]
+        return (*found, float(now[self.answer.column]))
 
     def known(
         self, now: NDArray[np.float64], mode: int, noted: int, players: _Bits
@@ -514,27 +521,6 @@ class _Teller:
         for role in known.roles:
             names[role.number + 1] = self._body_names[int(players[role.number])]
         return tuple(name for name in names if name is not None)
-
-
-def _audit(parts: Parts, scene: Scene, part: int, key: Key, speaker: int, value: float) -> Audit | None:
-    """What looking back needs of a prediction that a program settled: what the other experts said, too.
-
-    Parameters
-    ----------
-    parts, scene, part
-        The model, what it was asked, and the number of the answer.
-    key
-        Kind of prediction.
-    speaker, value
-        Who spoke, and what was said.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        said = predict(parts, parts.perception.percept(scene.layout, scene.vector[None]), scene).parts
-    known = said[part].audit if part < len(said) else None
-    if known is None:
-        return None
-    values = tuple(value if k == speaker else each for k, each in enumerate(known.values))
-    return Audit(key, values, speaker)
 
 
 def _spreads(

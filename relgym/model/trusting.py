@@ -8,12 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from relgym.model.parts import Parts
-from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome
-from relgym.model.regression import Regression
 from relgym.model.target.property_model import PropertyModel
 from relgym.program import records as ir
 from relgym.scene.objects import SceneLayout
@@ -47,13 +43,12 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
         if model.candidates:
             raise ir.BeyondError("laws of hypothesis classes that were added")
         latest = _latest(model, a)
-        regression = _regression(parts, layout, index, a) if model.rough and a.component < 0 else None
         able = 1 | (2 if a.guess is not None or a.beyond is not None else 0)
-        able |= (12 if regression is not None else 0) | (16 if latest is not None else 0)
+        able |= (12 if a.regression is not None else 0) | (16 if latest else 0)
         key = layout.types[index].name, a.property
         if key not in beliefs:
             beliefs[key] = tuple(_beliefs(model, able))
-        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest, regression)))
+        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest)))
     return replace(program, answers=tuple(answers))
 
 
@@ -66,27 +61,9 @@ def _beliefs(model: PropertyModel, able: int) -> list[ir.Belief]:
     ]
 
 
-def _latest(model: PropertyModel, a: ir.Answer) -> tuple[int, ir.Sum] | None:
-    """The mode that held last, if it is asked; None where some role of it is open."""
+def _latest(model: PropertyModel, a: ir.Answer) -> int:
+    """The mode that held last, if it is asked; 0 where it isn't, or some role of it is open."""
     if a.component >= 0 or not model.asks_latest:
-        return None
+        return 0
     known = next((mode for mode in a.modes if mode.id == model.latest), None)
-    if known is None or known.function is None or known.roles:
-        return None
-    return known.id, known.function
-
-
-def _regression(parts: Parts, layout: SceneLayout, index: int, a: ir.Answer) -> ir.Regression | None:
-    """Least squares of an answer's changes; None while there is nothing."""
-    known: Regression = parts.regressions[layout.types[index].name]
-    if a.property not in known.targets:
-        return None
-    situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)
-    signature = situation.signature
-    gather = parts.perception.gather(layout, signature, tuple(situation.plain.tolist())).tolist()
-    said = known.sums(signature, a.property)
-    if said is None:
-        return None
-    places, centre, scale, weights, bounds, leverage = said
-    columns = tuple((gather[p], c, s) for p, c, s in zip(places, centre, scale, strict=True))
-    return ir.Regression(a.column, columns, weights, *bounds, tuple(ir.Leverage(*each) for each in leverage))
+    return 0 if known is None or known.function is None or known.roles else known.id

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relgym.config.constants import SUMMABLE
 
-__all__ = ["OnlineRidge"]
+__all__ = ["OnlineRidge", "in_order"]
 
 PENALTY = 1.0
 """Of standardised columns: each weight is taken to be no larger than the noise a single row leaves, as scikit-learn's
@@ -64,6 +64,7 @@ class OnlineRidge:
         self.weights = np.zeros((0, columns + 1))
         self.mean = np.zeros(columns)
         self.spread = np.full((columns, columns), np.inf, dtype=np.float32)
+        self._half = (np.zeros((0, 0), dtype=np.float32), np.zeros((0, 0)))  # see `_halved`
         self._gram = np.zeros((columns + 1, columns + 1))
         self._moments = np.zeros((0, columns + 1))
         self._due = due
@@ -120,18 +121,16 @@ class OnlineRidge:
                 spread = (inverse * (ends[:, None] * ends) / n).astype(np.float32)
             self.spread = np.triu(spread) + np.triu(spread, 1).T
             level -= (solved * mean).sum(axis=1)
-            # Rows lie side by side in memory: so sums along them are taken in the same order, however many there are.
-            self.weights = np.ascontiguousarray(np.concatenate([level[:, None], solved], axis=1))
+            self.weights = np.concatenate([level[:, None], solved], axis=1)
 
     def predict(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Responses of rows ``(n, d)``, shape ``(n, responses)``; of a row alone the same bits as among others."""
-        rows = np.ascontiguousarray(np.concatenate([np.ones((len(x), 1)), x], axis=1))
+        if len(x) == 1:
+            return in_order(self.weights.T * np.concatenate([[1.0], x[0]])[:, None])[None]
+        columns = np.concatenate([np.ones((1, len(x))), x.T])
         found = np.empty((len(x), len(self.weights)))
-        if len(x) == 1:  # the same sums along the same axis
-            found[0] = (self.weights * rows).sum(axis=1)
-            return found
         for k, weights in enumerate(self.weights):
-            found[:, k] = (rows * weights).sum(axis=1)
+            found[:, k] = in_order(columns * weights[:, None])
         return found
 
     def leverage(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -139,12 +138,18 @@ class OnlineRidge:
 
         Of noise with a variance of 1 the weights are off by so much there, squared. Cost O(d^2) a row.
         """
-        found = np.empty(len(x))
+        found, half = np.empty(len(x)), self._halved()
         with np.errstate(over="ignore", invalid="ignore"):  # what lies that far is far from all
-            for k, off in enumerate((x - self.mean).astype(np.float32, order="C")):
-                # One by one, each in one piece: of a row alone the same bits as among others.
-                found[k] = np.einsum("i,i->", off, np.einsum("ij,j->i", self.spread, off))
+            for k, off in enumerate(x - self.mean):
+                found[k] = in_order((off * in_order(half * off[:, None]))[:, None])[0]
         return np.where(found >= 0.0, found, np.inf) + 1.0 / max(self.rows, 1)
+
+    def _halved(self) -> NDArray[np.float64]:
+        """Entries of `spread` on and above the diagonal, those above it twice, by the second column, then the first."""
+        if self._half[0] is not self.spread:
+            upper = self.spread.astype(np.float64)
+            self._half = self.spread, np.ascontiguousarray((np.triu(upper) + np.triu(upper, 1)).T)
+        return self._half[1]
 
     # ------------------------------------------------------------------ saving
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -166,6 +171,15 @@ class OnlineRidge:
     def due(self) -> int:
         """Number of rows at which weights are solved anew."""
         return self._due
+
+
+def in_order(terms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sums along the first axis of ``(m, k)`` terms, one after the other: what any loop over them gives, to the bit."""
+    if terms.shape[1] == 1:  # one after the other in memory, which NumPy adds in pairs
+        found: NDArray[np.float64] = np.add.accumulate(terms, axis=0)[-1]
+    else:
+        found = np.ascontiguousarray(terms).sum(axis=0)
+    return found
 
 
 def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -69,7 +69,7 @@ TURNED = 3
 NOT_FINITE = 4
 """A number is NaN or infinite: arrays say so."""
 
-OWN, GUESS, LATEST = 0, 1, 4
+OWN, GUESS, LINEAR, PRODUCTS, LATEST, PERSISTENCE = range(6)
 """Who gives a value (`relgym.program.records.EXPERTS`); what nobody does stays as it is."""
 
 FREE, TOUCHING = 1, 2
@@ -1598,19 +1598,83 @@ def find(s, at, count, wanted):
     return low if low < count and s.code[at + low] == wanted else np.int64(-1)
 
 
-def settled(s, a, k, value, outcome, mode, margin):
+def look_at(s, fit):
+    """Work out what regressions look at, and how far that lies from all that they know, unless it is known."""
+    if s.fitted[0] == fit:
+        return
+    s.fitted[0] = fit
+    count, columns, centres = s.code[fit], s.code[fit + 1], s.code[fit + 2]
+    shown, off = s.shown[0], s.shown[1]
+    for k in range(count):
+        shown[k] = (s.x[s.code[columns + k]] - s.numbers[centres + 2 * k]) / s.numbers[centres + 2 * k + 1]
+    for kind in range(s.code[fit + 3]):
+        at, width = s.code[fit + 4 + kind], count
+        if kind:
+            for i in range(count):
+                for j in range(i, count):
+                    shown[width] = shown[i] * shown[j]
+                    width += 1
+        for k in range(width):
+            off[k] = shown[k] - s.numbers[at + k]
+        entry, far = at + width, 0.0
+        for i in range(width):
+            along = 0.0
+            for j in range(i, width):
+                along += s.numbers[entry] * off[j]
+                entry += 1
+            far += off[i] * along
+        s.leverage[kind] = far if far >= 0.0 else math.inf
+
+
+def regress(s, record, k):
+    """What regressions say of an answer (`relgym.model.regression.Regression.values`)."""
+    fit = s.code[record]
+    look_at(s, fit)
+    width, kinds = s.code[fit], s.code[fit + 3]
+    present, bounds, trusted = s.x[s.code[record + 1]], s.code[record + 2], s.code[record + 3]
+    low, high, whole, linear = s.numbers[bounds], s.numbers[bounds + 1], 0.0, math.nan
+    for kind in range(kinds):
+        weights = s.code[record + 4 + kind]
+        if kind:
+            width += width * (width + 1) // 2
+        word = s.numbers[weights]
+        for j in range(width):
+            word += s.numbers[weights + 1 + j] * s.shown[0, j]
+        if word == word:
+            word = min(max(word, low), high)
+        if kind == 0:
+            linear = word
+        if math.isfinite(word):
+            at = trusted + 3 * kind
+            bias, left, far = s.numbers[at], s.numbers[at + 1], s.leverage[kind] + s.numbers[at + 2]
+            more = left * ((2.0 + far) * far) if left > 0.0 else 0.0
+            share = bias / (bias + more) if bias > 0.0 else 0.0
+            whole = whole + share * (word - whole)
+    s.experts[k, LINEAR] = present + linear
+    s.experts[k, PRODUCTS] = present + whole if math.isfinite(linear) else math.nan
+
+
+def consult(s, a, k, value):
+    """What everybody says of an answer, in `s.experts`, the winner's value among it; who has a value, as bits."""
+    said = s.experts[k]
+    said[OWN] = value
+    said[GUESS] = guessed(s, a) if s.code[a + 16] or s.code[a + 17] else math.nan
+    said[LINEAR] = said[PRODUCTS] = math.nan
+    if s.code[a + 26]:
+        regress(s, s.code[a + 26], k)
+    said[LATEST] = total(s, s.code[s.code[a + 27] + 2]) if s.code[a + 27] else math.nan
+    able = np.int64(0)
+    for expert in range(PERSISTENCE):
+        if math.isfinite(said[expert]):
+            able |= np.int64(1) << expert
+    return able
+
+
+def settled(s, a, k, value, outcome, mode, margin, able):
     """Value, outcome and mode, once it is known how right such predictions were (`relgym.model.querying`)."""
     trust = s.code[a + 25]
     winner = -mode if s.code[trust + 4] else mode
     kind = np.int64(PREDICTED if mode else outcome)
-    guess = latest = math.nan
-    able = np.int64(1 if math.isfinite(value) else 0)
-    if s.code[a + 16] or s.code[a + 17]:
-        guess = guessed(s, a)
-        able |= 2 if math.isfinite(guess) else 0
-    if s.code[trust + 6]:
-        latest = total(s, s.code[trust + 6])
-        able |= 16 if math.isfinite(latest) else 0
     number = ((winner * 16 + lead_of(margin) + 2) * 8 + kind) * 32 + able
     if s.believed[k, 0] != number:
         place = find(s, s.code[trust + 1], s.code[trust], number)
@@ -1628,13 +1692,9 @@ def settled(s, a, k, value, outcome, mode, margin):
         outcome = UNSURE if outcome == PREDICTED else outcome
     elif outcome == UNEXPLAINED and winner:
         outcome = PREDICTED
-    if speaker == OWN:
-        return value, outcome, mode
-    if speaker == GUESS:
-        return guess, outcome, mode
-    if speaker == LATEST:
-        return latest, outcome, s.code[trust + 5] if winner else mode
-    return math.nan, outcome, mode
+    if speaker == LATEST and winner:
+        mode = s.code[s.code[a + 27]]
+    return s.experts[k, speaker] if speaker < PERSISTENCE else math.nan, outcome, mode
 
 
 def step(s, settling, telling):
@@ -1647,6 +1707,7 @@ def step(s, settling, telling):
         s.masks[3], s.masks[4], s.masks[6] = -1, 0, 0
         if s.code[MOVERS] and move(s) < 0:
             return TOO_MANY
+    s.fitted[0] = 0
     for k in range(s.code[KEYS]):
         s.lost[k] = 0
     for k in range(s.code[ANSWERS]):
@@ -1676,8 +1737,9 @@ def step(s, settling, telling):
             outcome = OUTSIDE
         if not (told and (outcome == PREDICTED or outcome == UNEXPLAINED)):
             mode = np.int64(0)
+        able = consult(s, a, k, value) if telling or settling else np.int64(0)
         if settling and s.code[a + 25]:
-            value, outcome, mode = settled(s, a, k, value, outcome, mode, margin)
+            value, outcome, mode = settled(s, a, k, value, outcome, mode, margin, able)
         else:
             s.sure[k, 0] = s.sure[k, 1] = math.nan
         if not (told or (settling and s.code[a + 25])):

@@ -39,6 +39,7 @@ __all__ = [
     "Experience",
     "Factor",
     "Feature",
+    "Fit",
     "Follow",
     "IsA",
     "Landing",
@@ -63,6 +64,7 @@ __all__ = [
     "Test",
     "Tree",
     "Trust",
+    "Trusted",
     "Vote",
 ]
 
@@ -465,50 +467,76 @@ class Reach:
 # ---------------------------------------------------------------------------------------------- who is believed
 @dataclass(frozen=True, slots=True)
 class Leverage:
-    """How far the word of a regression counts at leverage h: ``bias / (bias + left ((1 + h)^2 - 1))``, 0 without bias.
+    """What a regression's leverage is worked out from (`relgym.numeric.online_ridge.OnlineRidge.leverage`).
 
     Attributes
     ----------
     mean, spread
-        What leverage is worked out from (`relgym.numeric.online_ridge.OnlineRidge.leverage`); of the latter the upper
-        triangle, row by row, as little-endian float32 in base64.
-    rows
-        Number of rows learned from.
-    bias, left
-        By how much more the words before it leave, and what it leaves, in the mean square.
+        Where its columns lie, and the inverse of the sums of squares about that: the upper triangle, row by row, as
+        little-endian float32 in base64.
     """
 
     mean: tuple[float, ...]
     spread: str
-    rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """What least squares of all targets of one object look at.
+
+    Attributes
+    ----------
+    columns
+        Column, centre and scale of each number: ``z = (column - centre) / scale``.
+    leverage
+        Of each regression: on z; and on z and all products of two of them, row by row, if there is such a one.
+    """
+
+    columns: tuple[tuple[int, float, float], ...]
+    leverage: tuple[Leverage, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Trusted:
+    """How far the word of a regression counts at leverage h: ``bias / (bias + left ((1 + h)^2 - 1))``, 0 without bias.
+
+    Attributes
+    ----------
+    bias, left
+        By how much more the words before it leave, and what it leaves, in the mean square.
+    rows
+        Number of rows learned from, which add 1 / rows to the leverage.
+    """
+
     bias: float
     left: float
+    rows: int
 
 
 @dataclass(frozen=True, slots=True)
 class Regression:
-    """Least squares: ``present + weights @ (1, z)`` with ``z = (column - centre) / scale``, changes kept within bounds.
+    """Least squares of one target: ``present + weights @ (1, z)``, changes kept within bounds.
 
     Attributes
     ----------
+    fit
+        Number of what is looked at, in `Program.fits`.
     present
         Column of the present value.
-    columns
-        Column, centre and scale of each number looked at.
     weights
-        Of 1 and z, then of 1, z and all products of two of them, row by row; one or two of them.
+        Of each regression, that of 1 first.
     least, most
         Bounds of the change.
-    leverage
+    trusted
         How far the word of each counts in what all together say.
     """
 
+    fit: int
     present: int
-    columns: tuple[tuple[int, float, float], ...]
     weights: tuple[tuple[float, ...], ...]
     least: float
     most: float
-    leverage: tuple[Leverage, ...] = ()
+    trusted: tuple[Trusted, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -556,15 +584,12 @@ class Trust:
     lawful
         Whether winners are laws.
     latest
-        The mode that held last, and its function; None where nobody asks.
-    regression
-        Least squares; None where nobody asks.
+        The mode that held last; 0 where nobody asks it.
     """
 
     beliefs: tuple[Belief, ...]
     lawful: bool
-    latest: tuple[int, Sum] | None
-    regression: Regression | None
+    latest: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -597,6 +622,8 @@ class Answer:
         Whether modes keep within `reach`.
     guess, beyond
         Fallback values, and those out of scope.
+    regression
+        Least squares; None where nobody asks.
     low, high
         Limits: (mode, value).
     stops
@@ -624,6 +651,7 @@ class Answer:
     reach: Reach | None = None
     guess: Sum | None = None
     beyond: Sum | None = None
+    regression: Regression | None = None
     low: tuple[int, float] = (0, float("-inf"))
     high: tuple[int, float] = (0, float("inf"))
     stops: tuple[Stop | Landing, ...] = ()
@@ -658,6 +686,8 @@ class Program:
         Whether some clause or role looks at all objects.
     motion
         Laws of motion, if any govern anything.
+    fits
+        What regressions look at.
     answers
         One for each target of each object, in causal order.
     kinematics
@@ -685,6 +715,7 @@ class Program:
     parting: bool
     everything: bool
     motion: Motion | None
+    fits: tuple[Fit, ...]
     answers: tuple[Answer, ...]
     kinematics: tuple[tuple[int, float, int], ...]
     angles: tuple[int, ...]

@@ -64,8 +64,7 @@ class _Source:
             f'"""{_doc(self.told)}\n\nMade by relgym; needs numpy alone. `step` predicts one scene, `predict` many.'
             '\n"""\n'
         )
-        fitted = any(a.trust is not None and a.trust.regression is not None for a in p.answers)
-        modules = [*(["base64"] if fitted else []), *(["itertools"] if p.casts else []), "math"]
+        modules = [*(["base64"] if p.fits else []), *(["itertools"] if p.casts else []), "math"]
         add("".join(f"import {name}\n" for name in modules) + "\nimport numpy as np\n")
         add("# ---- the state vector")
         add(f"COLUMNS = {p.columns!r}")
@@ -97,7 +96,7 @@ class _Source:
             add(_SCENE)
         if trusts:
             add(_TRUST)
-        if any(trust.regression is not None for trust in trusts):
+        if p.fits and trusts:
             add(_REGRESSION)
         if p.casts or votes:
             add(_VOTES)
@@ -550,6 +549,8 @@ class _Source:
             "# -2: of all other modes), and whose values there are (bits of EXPERTS): who speaks, and how sure that is"
         )
         add(f"EXPERTS = {ir.EXPERTS!r}")
+        for number, fit in enumerate(self.program.fits):
+            self._fit(number, fit)
         for number, a in enumerate(self.program.answers):
             trust = a.trust
             if trust is None:
@@ -563,25 +564,28 @@ class _Source:
                     add(f"    ({b.outcome}, {b.winner}, {b.lead}, {b.able}): ({b.speaker}, {sure}),")
                 add("}")
             name = self._called(number)
-            latest = (
-                f"({trust.latest[0]}, {name}_mode_{trust.latest[0]})" if trust.latest is not None else "None"
-            )
-            squares = self._regression(name, trust.regression) if trust.regression is not None else "None"
+            latest = f"({trust.latest}, {name}_mode_{trust.latest})" if trust.latest else "None"
+            squares = self._regression(name, a.regression) if a.regression is not None else "None"
             told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {trust.lawful}, {latest}, {squares})")
         add("# beliefs, whether of laws, the mode that held last, regressions; of each answer below")
         add("TRUST = (\n" + "".join(f"    {each},\n" for each in told) + ")\n")
 
+    def _fit(self, number: int, fit: ir.Fit) -> None:
+        """What regressions of one object look at: columns, centres and scales; means and spreads."""
+        add = self.lines.append
+        columns = (f"({self.names[c]}, {_number(m)}, {_number(s)})" for c, m, s in fit.columns)
+        add(f"FIT_{number} = (\n    ({', '.join(columns)},),\n    (")
+        for one in fit.leverage:
+            add(f"        (({', '.join(map(_number, one.mean))},), {one.spread!r}),")
+        add("    ),\n)")
+
     def _regression(self, name: str, r: ir.Regression) -> str:
         add = self.lines.append
         add(f"{name.upper()}_LEAST_SQUARES = (")
-        columns = (f"({self.names[c]}, {_number(m)}, {_number(s)})" for c, m, s in r.columns)
         weights = (f"({', '.join(map(_number, row))},)" for row in r.weights)
-        add(f"    {self.names[r.present]},\n    ({', '.join(columns)},),\n    ({', '.join(weights)},),")
-        add(f"    {_number(r.least)}, {_number(r.most)}, (")
-        for one in r.leverage:
-            mean = ", ".join(map(_number, one.mean))
-            add(f"        (({mean},), {one.spread!r}, {one.rows}, {_number(one.bias)}, {_number(one.left)}),")
-        add("    ),\n)")
+        trusted = (f"({_number(each.bias)}, {_number(each.left)}, {each.rows})" for each in r.trusted)
+        add(f"    {self.names[r.present]}, FIT_{r.fit},\n    ({', '.join(weights)},),")
+        add(f"    {_number(r.least)}, {_number(r.most)}, ({', '.join(trusted)},),\n)")
         return f"{name.upper()}_LEAST_SQUARES"
 
     # ------------------------------------------------------------------ the step
@@ -815,24 +819,36 @@ _REGRESSION = '''
 SPREADS = {}  # what leverage is worked out from, by the text that says it
 
 
-def regressed(x, present, columns, weights, least, most, leverage):
+def spread(text, width):
+    """Entries on and below the diagonal, those below it twice; what the text says is read once."""
+    if text not in SPREADS:
+        upper = np.zeros((width, width))
+        upper[np.triu_indices(width)] = np.frombuffer(base64.b64decode(text), dtype="<f4")
+        SPREADS[text] = (upper + np.triu(upper, 1)).T
+    return SPREADS[text]
+
+
+def in_order(terms):
+    """The sum of some terms, one after the other."""
+    return float(np.add.accumulate(np.array(terms))[-1])
+
+
+def regressed(x, present, fit, weights, least, most, trusted):
     """The next value by least squares on some numbers, and what that and least squares on their products say together.
 
     Each counts as far as the leverage allows.
     """
+    columns, reach = fit
     z = [(x[c] - centre) / scale for c, centre, scale in columns]
     both = z, z + [z[i] * z[j] for i in range(len(z)) for j in range(i, len(z))]
-    words = [float((np.array([1.0, *shown]) * np.array(row)).sum()) for shown, row in zip(both, weights)]
-    words = [min(max(word, least), most) for word in words]
+    with np.errstate(over="ignore", invalid="ignore"):
+        words = [in_order(np.array([1.0, *shown]) * np.array(row)) for shown, row in zip(both, weights)]
+    words = [min(max(word, least), most) if word == word else word for word in words]
     whole = 0.0
-    for word, shown, (mean, text, rows, bias, left) in zip(words, both, leverage):
-        if text not in SPREADS:
-            half = np.zeros((len(mean), len(mean)), dtype=np.float32)
-            half[np.triu_indices(len(mean))] = np.frombuffer(base64.b64decode(text), dtype="<f4")
-            SPREADS[text] = half + np.triu(half, 1).T
+    for word, shown, (mean, text), (bias, left, rows) in zip(words, both, reach, trusted):
+        off = np.array(shown) - np.array(mean)
         with np.errstate(over="ignore", invalid="ignore"):
-            off = (np.array(shown) - np.array(mean)).astype(np.float32)
-            far = float(np.einsum("i,i->", off, np.einsum("ij,j->i", SPREADS[text], off)))
+            far = in_order(off * np.add.accumulate(spread(text, len(mean)) * off[:, None])[-1])
         h = (far if far >= 0.0 else math.inf) + 1.0 / max(rows, 1)
         more = left * ((2.0 + h) * h) if left > 0.0 else 0.0
         share = bias / (bias + more) if bias > 0.0 else 0.0

@@ -7,6 +7,7 @@ numbers; where it holds others, it names where those begin (0: there is none). `
 from __future__ import annotations
 
 import math
+from base64 import b64decode
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from relgym.program import records as ir
 
-__all__ = ["Tape", "encoded", "kind_of", "ordered"]
+__all__ = ["Tape", "encoded", "kind_of", "ordered", "trust_numbers"]
 
 HEADER = 28
 (
@@ -57,7 +58,7 @@ RELATION_KINDS = {
 
 MOST_REGISTERS, MOST_CONTACTS, MOST_CORNERS, MOST_RELATIONS, MOST_FEATURES = 4096, 128, 16, 16, 64
 MOST_MODES, MOST_VARIABLES, MOST_ROLES, MOST_KEYS = 64, 12, 12, 256
-MOST_CODE, MOST_NUMBERS, MOST_ANSWERS = 65536, 16384, 512
+MOST_CODE, MOST_NUMBERS, MOST_ANSWERS, MOST_SHOWN = 65536, 131072, 512, 512
 """What a work space has room for."""
 
 REMEMBERED, REMEMBERED_MODES, REMEMBERED_ROLES = 512, 8, 6
@@ -112,6 +113,11 @@ SPACE = np.dtype(
         ("given", np.int64, (MOST_ANSWERS,)),
         ("given_values", np.float64, (MOST_ANSWERS,)),
         ("touched", np.int64, (MOST_ANSWERS,)),  # whom a mover touches; or the mode that gave a value
+        # What the winner, the guess, both regressions and the mode that held last say of each answer; NaN: nothing.
+        ("experts", np.float64, (MOST_ANSWERS, 5)),
+        ("fitted", np.int64, (1,)),  # what regressions look at lies in `shown`; 0: nothing does
+        ("shown", np.float64, (2, MOST_SHOWN)),  # that, and how far from what they know
+        ("leverage", np.float64, (2,)),  # of both regressions there
         ("state", np.uint64, (1,)),  # all relations that are known, as a number
         ("memory_keys", np.uint64, (REMEMBERED,)),
         ("memory", np.int64, (REMEMBERED, 2 + REMEMBERED_MODES * (2 + REMEMBERED_ROLES))),
@@ -136,12 +142,18 @@ class Tape:
     votes
         Of every answer that is voted for, in order: where the votes of each contest begin in the code, and where its
         modes stand in the order in which they win ties.
+    latest
+        Of every answer, where in the code it stands which mode held last, and where each mode stands.
+    trusted
+        Of every answer, where among the numbers it stands how far regressions are trusted; -1: there are none.
     """
 
     code: NDArray[np.int64]
     numbers: NDArray[np.float64]
     roles: int
     votes: tuple[tuple[tuple[int, ...], int], ...] = ()
+    latest: tuple[tuple[int, dict[int, int]], ...] = ()
+    trusted: tuple[int, ...] = ()
 
     def space(self) -> NDArray[np.void]:
         """A work space with the tape in it, shape ``(1,)``."""
@@ -166,6 +178,7 @@ def encoded(program: ir.Program) -> Tape:
     writer = _Writer(program)
     tape = writer.tape()
     sizes = {
+        "columns of regressions": (writer.shown, MOST_SHOWN),
         "numbers": (program.registers, MOST_REGISTERS),
         "bodies": (len(program.bodies), ir.MOST_BODIES),
         "corners of a body": (max((len(b.outline) for b in program.bodies), default=0), MOST_CORNERS),
@@ -200,6 +213,10 @@ class _Writer:
         self.variables = 1
         self.reads: set[int] = set()
         self.votes: list[tuple[tuple[int, ...], int]] = []
+        self.latest: list[tuple[int, dict[int, int]]] = []
+        self.trusted: list[int] = []
+        self.fits: list[int] = []
+        self.shown = 0
 
     def put(self, *values: int) -> int:
         """Append whole numbers; where they begin."""
@@ -235,6 +252,7 @@ class _Writer:
         head[KEYS] = 1 + max((a.key for a in p.answers), default=0)
         if p.motion is not None:
             self._motion(p.motion)
+        self.fits = [self._fit(fit) for fit in p.fits]
         answers = [self._answer(a) for a in p.answers]
         head[ANSWERS], head[AT_ANSWERS] = len(answers), self.put(*answers)
         at = self.num(*(step for _, step, _ in p.kinematics))
@@ -245,7 +263,12 @@ class _Writer:
         head[ANGLES], head[AT_ANGLES] = len(p.angles), self.put(*p.angles)
         self._note_nexts()
         return Tape(
-            np.array(self.code, dtype=np.int64), np.array(self.numbers), self.roles, tuple(self.votes)
+            np.array(self.code, dtype=np.int64),
+            np.array(self.numbers),
+            self.roles,
+            tuple(self.votes),
+            tuple(self.latest),
+            tuple(self.trusted),
         )
 
     def _note_nexts(self) -> None:
@@ -443,7 +466,11 @@ class _Writer:
         lists = [self.put(len(v), *v) for v in (list(a.needs), features, modes, stops)]
         at_follows = self.put(len(a.follows), *follows)
         state = ("modes", "lost", "none").index(a.state)
-        return self.put(
+        latest = 0 if a.trust is None else a.trust.latest
+        places = {
+            mode.id: at for mode, at in zip(a.modes, modes, strict=True) if mode.function and not mode.roles
+        }
+        at = self.put(
             a.column,  # 0
             a.key,
             a.body,
@@ -470,20 +497,50 @@ class _Writer:
             int(a.vote is not None and _relational(a.vote)),
             int(a.vote is not None and _narrow(a.vote)),
             self._trust(a.trust),  # 25
+            self._regression(a.regression),
+            places.get(latest, 0),
         )
+        self.latest.append((at + 27, places))
+        return at
 
     def _trust(self, trust: ir.Trust | None) -> int:
         """Beliefs in the order of their kinds' numbers: kinds, who speaks and whether that is claimed, and how sure."""
         if trust is None:
             return 0
-        if trust.regression is not None:
-            raise ir.BeyondError("values that regressions may give")
         some = ordered(trust.beliefs)
         kinds = self.put(*map(_kind, some))
         said = self.put(*(v for each in some for v in (each.speaker, each.claimed)))
         at = self.num(*(v for each in some for v in (each.probability, each.interval)))
-        mode, function = (0, 0) if trust.latest is None else (trust.latest[0], self._sum(trust.latest[1]))
-        return self.put(len(some), kinds, said, at, trust.lawful, mode, function)
+        return self.put(len(some), kinds, said, at, trust.lawful)
+
+    def _fit(self, fit: ir.Fit) -> int:
+        """How many columns, which, their centres and scales; then of each regression where its leverage is told.
+
+        That is its mean, and the entries of the spread on and above its diagonal, row by row, those above it twice.
+        """
+        d = len(fit.columns)
+        at = self.num(*(v for _, centre, scale in fit.columns for v in (centre, scale)))
+        columns = self.put(*self.col(*(c for c, _, _ in fit.columns)))
+        reach = []
+        for one in fit.leverage:
+            width = len(one.mean)
+            entries = np.frombuffer(b64decode(one.spread), dtype="<f4").astype(np.float64)
+            first, second = np.triu_indices(width)
+            doubled = np.where(first == second, entries, 2.0 * entries)
+            reach.append(self.num(*one.mean, *doubled.tolist()))
+            self.shown = max(self.shown, width)
+        return self.put(d, columns, at, len(reach), *reach)
+
+    def _regression(self, r: ir.Regression | None) -> int:
+        """What it looks at, the present value's column, where bounds and weights stand, and how far it is trusted."""
+        if r is None:
+            self.trusted.append(-1)
+            return 0
+        bounds = self.num(r.least, r.most)
+        weights = [self.num(*row) for row in r.weights]
+        trusted = self.num(*trust_numbers((each.bias, each.left, each.rows) for each in r.trusted))
+        self.trusted.append(trusted)
+        return self.put(self.fits[r.fit], *self.col(r.present), bounds, trusted, *weights)
 
     def _feature(self, feature: ir.Feature) -> int:
         kinds = {"": 0, "sin": 1, "cos": 2}
@@ -495,6 +552,11 @@ class _Writer:
             at = self.num(each.value, each.step, each.bound, each.side)
             return self.put(0, each.mode, *self.col(each.column), at)
         return self.put(1, each.mode, *self.col(each.column), self.num(each.value, each.at, each.slack))
+
+
+def trust_numbers(known: Iterable[tuple[float, float, int]]) -> list[float]:
+    """How far regressions are trusted, as it stands on the tape: bias, what is left, and what rows add to leverages."""
+    return [v for bias, left, rows in known for v in (bias, left, 1.0 / max(rows, 1))]
 
 
 def ordered(beliefs: Iterable[ir.Belief]) -> list[ir.Belief]:

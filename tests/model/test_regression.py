@@ -169,13 +169,18 @@ def test_sums_say_what_values_say(n: int, seed: int) -> None:
     found = taught(n, seed=seed % 7)
     rows = 3.0 * np.random.default_rng(seed).normal(size=(4, len(SIGNATURE.columns)))
     said, leverage = found._said(rows[:, found._columns(SIGNATURE)])
+    looked = found.fit(SIGNATURE)
+    assert looked is not None
+    places, centre, scale, reach = looked
+    for ridge, (mean, spread) in zip(found._ridges, reach, strict=True):
+        assert list(mean) == ridge.mean.tolist()
+        assert _unpacked(spread, len(mean)).tobytes() == ridge.spread.tobytes()
     for k, target in enumerate(found.targets):
-        told = found.sums(SIGNATURE, target)
+        told = found.sums(target)
         assert told is not None
-        places, centre, scale, weights, (least, most), reach = told
-        for kind, (mean, spread, n, bias, left) in enumerate(reach):
-            assert (list(mean), n) == (found._ridges[kind].mean.tolist(), found._ridges[kind].rows)
-            assert _unpacked(spread, len(mean)).tobytes() == found._ridges[kind].spread.tobytes()
+        weights, (least, most) = told
+        for kind, (bias, left, count) in enumerate(found.trusted(target)):
+            assert count == found._ridges[kind].rows
             share = bias / (bias + left * ((1.0 + leverage[:, kind]) ** 2 - 1.0)) if bias else np.zeros(4)
             np.testing.assert_allclose(found._share(kind, leverage[:, kind])[:, k], share)
         for row, expected in zip(rows, said, strict=True):
@@ -189,21 +194,21 @@ def test_sums_say_what_values_say(n: int, seed: int) -> None:
 def test_bounds_are_half_a_range_beyond_what_was_seen() -> None:
     found = taught(100)
     least, most = found._range[:, 1]
-    told = found.sums(SIGNATURE, "y")
+    told = found.sums("y")
     assert told is not None
-    assert told[4] == pytest.approx((1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
+    assert told[1] == pytest.approx((1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
     far = np.zeros((2, len(SIGNATURE.columns)))
     far[:, SIGNATURE.column(0, "y")] = -1e3, 1e3
     said = found.values(SIGNATURE, far)
     assert said is not None
-    assert said[:, 0, 1].tolist() == list(told[4])
+    assert said[:, 0, 1].tolist() == list(told[1])
 
 
 def test_of_other_columns_nothing_is_said() -> None:
     other = WorldModel(schema_of(("x",), ("a",)))._parts.signature_of(("self", "action"))
     found = taught(100)
     assert found.values(other, np.zeros((1, len(other.columns)))) is None
-    assert found.sums(other, "x") is None
+    assert found.fit(other) is None and found.sums("z") is None
     seen = found.seen
     found.learn_one(other, np.zeros(len(other.columns)), {"x": 1.0})
     assert found.seen == seen

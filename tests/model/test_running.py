@@ -187,7 +187,7 @@ def test_many_single_scenes_are_settled_by_the_program(monkeypatch: pytest.Monke
         model.predict_one(scene)
     assert len(argued) == 3
     found = model.predict_one(scene)
-    assert all(isinstance(p.record, LateAudit) for p in found.parts)
+    assert all(isinstance(p.record, Audit) for p in found.parts)
     model.look_back(found, {(p.object, p.property): 0.0 for p in found.parts})
     model.predict_one(scene)
     assert len(argued) == 4

@@ -15,6 +15,7 @@ from relgym.model.files.archive import parts_to_arrays, parts_to_json
 from relgym.model.fitting import compare_and_learn
 from relgym.model.grounds import Grounds
 from relgym.model.motion import Laws
+from relgym.model.prediction import LateAudit
 from relgym.model.prequential import StepReport, compared
 from relgym.model.querying import predict
 from relgym.model.target.property_model import PropertyModel
@@ -190,7 +191,10 @@ def test_looks_that_are_due_after_so_many_examples_are_taken() -> None:
 def test_a_late_audit_of_what_is_no_target_any_more_is_none() -> None:
     model, some = WorldModel(BOX, targets=[SPEED]), list(steps(400))
     learned(model, some)
-    said = model.predict_one(some[0].before)
+    before = some[0].before
+    percept = model._parts.perception.percept(before.layout, before.vector[None])
+    said = predict(model._parts, percept, before)
+    assert all(isinstance(p.record, LateAudit) for p in said.parts)
     del model._parts.models[SPEED]
     assert [p.audit for p in said.parts] == [None]
 

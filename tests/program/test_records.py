@@ -78,18 +78,16 @@ def test_least_squares_by_hand() -> None:
     """
     columns = ((1, 2.0, 2.0), (2, 0.0, 1.0))
     weights = ((0.5, 1.0, 2.0), (0.0, 1.0, 0.0, 0.0, 0.25, 0.5))  # 1, z1, z2; then z1 z1, z1 z2, z2 z2
-    leverage = tuple(
-        ir.Leverage((0.0,) * d, b64encode(bytes(2 * d * (d + 1))).decode(), 2, bias, 2.0)
-        for d, bias in ((2, 1.0), (5, 3.0))
-    )
-    squares = ir.Regression(0, columns, weights, -3.0, 3.0, leverage)
+    leverage = tuple(ir.Leverage((0.0,) * d, b64encode(bytes(2 * d * (d + 1))).decode()) for d in (2, 5))
+    trusted = ir.Trusted(1.0, 2.0, 2), ir.Trusted(3.0, 2.0, 2)
+    squares = ir.Regression(0, 0, weights, -3.0, 3.0, trusted)
     told = {}
     for speaker in (2, 3):
         beliefs = tuple(ir.Belief(1, 0, -2, able, speaker, 0.75, 0.125, True) for able in (0, 4, 8, 12))
         answer = ir.Answer(
-            "o", "p0", 0, 0, (), -1, state="none", trust=ir.Trust(beliefs, False, None, squares)
+            "o", "p0", 0, 0, (), -1, state="none", trust=ir.Trust(beliefs, False, 0), regression=squares
         )
-        program = empty(3, 9, answers=(answer,))
+        program = empty(3, 9, answers=(answer,), fits=(ir.Fit(columns, leverage),))
         said = by_source(python_source(program, "", SENTENCES), np.array([[10.0, 4.0, 1.0]]))
         told[speaker] = said.after[0, 0]
         assert (said.outcomes[0, 0], said.probabilities[0, 0], said.intervals[0, 0]) == (1, 0.75, 0.125)

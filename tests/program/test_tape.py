@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from base64 import b64encode
 from dataclasses import replace
 from typing import Any
 
@@ -130,17 +131,21 @@ def test_what_there_is_no_room_for(make: Any, most: int, what: str) -> None:
         encoded(make(most + 1))
 
 
+def _regressed(width: int) -> ir.Program:
+    """A program with a regression on so many columns."""
+    spread = b64encode(bytes(2 * width * (width + 1))).decode()
+    return _many(fits=(ir.Fit(((0, 0.0, 1.0),) * width, (ir.Leverage((0.0,) * width, spread),)),))
+
+
 def test_there_is_room_for_so_many_constants() -> None:
-    with pytest.raises(ir.BeyondError, match="constants, of which there may be 16384"):
-        encoded(_terms(tapes.MOST_NUMBERS))
+    encoded(_regressed(tapes.MOST_SHOWN - 4))
+    with pytest.raises(ir.BeyondError, match="constants, of which there may be 131072"):
+        encoded(_regressed(tapes.MOST_SHOWN))
 
 
-def test_regressions_are_left_to_arrays() -> None:
-    squares = ir.Regression(0, ((1, 0.0, 1.0),), ((0.0, 1.0),), -1.0, 1.0)
-    (answer,) = halving().answers
-    trust = ir.Trust((belief(),), False, None, squares)
-    with pytest.raises(ir.BeyondError, match="regressions"):
-        encoded(_many(answers=(replace(answer, trust=trust),)))
+def test_there_is_room_for_regressions_on_so_many_columns() -> None:
+    with pytest.raises(ir.BeyondError, match="513 columns of regressions, of which there may be 512"):
+        encoded(_regressed(tapes.MOST_SHOWN + 1))
 
 
 @given(st.integers(0, 6), st.integers(-4, 1 << 40), st.integers(-2, 7), st.integers(0, 31))

@@ -6,6 +6,8 @@ import functools
 import itertools
 import math
 import random
+import struct
+from base64 import b64decode, b64encode
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -57,6 +59,7 @@ def empty(width: int, registers: int, **fields: Any) -> ir.Program:
         "parting": False,
         "everything": False,
         "motion": None,
+        "fits": (),
         "answers": (),
         "kinematics": (),
         "angles": (),
@@ -123,7 +126,7 @@ def _step(p: ir.Program, now: Sequence[float]) -> tuple[list[float], list[tuple[
             value = value if math.isfinite(value) else guess
         else:
             value, outcome, mode, sure = _trusted(
-                a, a.trust, x, p.width, (value, outcome, mode, margin, guess)
+                a, a.trust, x, p.width, (value, outcome, mode, margin, guess), _regressed(p, a.regression, x)
             )
         if math.isfinite(value):
             x[p.width + a.column] = value
@@ -257,12 +260,19 @@ def _passes(t: ir.Test, x: Sequence[float]) -> bool:
 
 
 def _trusted(
-    a: ir.Answer, trust: ir.Trust, x: Sequence[float], width: int, said: tuple[float, int, int, float, float]
+    a: ir.Answer,
+    trust: ir.Trust,
+    x: Sequence[float],
+    width: int,
+    said: tuple[float, int, int, float, float],
+    regressed: tuple[float, float],
 ) -> tuple[float, int, int, tuple[float, float]]:
     value, outcome, mode, margin, guess = said
-    latest = math.nan if trust.latest is None else _sum(trust.latest[1], x)
-    values = {"own": value, "guess": guess, "latest": latest, "persistence": x[width + a.column]}
-    able = sum(1 << ir.EXPERTS.index(e) for e in ("own", "guess", "latest") if math.isfinite(values[e]))
+    functions = {m.id: m.function for m in a.modes}
+    function = functions.get(trust.latest)
+    latest = math.nan if function is None else _sum(function, x)
+    values = dict(zip(ir.EXPERTS, (value, guess, *regressed, latest, x[width + a.column]), strict=True))
+    able = sum(1 << k for k, e in enumerate(ir.EXPERTS[:5]) if math.isfinite(values[e]))
     kind = PREDICTED if mode else outcome
     # Bins of leads: below 1/2, 1, 2, 4, 8, and more; 0: none, 7: nobody else was in it.
     lead = (
@@ -276,9 +286,34 @@ def _trusted(
         outcome = UNSURE
     elif outcome == UNEXPLAINED and b.claimed and mode:
         outcome = PREDICTED
-    if ir.EXPERTS[b.speaker] == "latest" and mode and trust.latest is not None:
-        mode = trust.latest[0]
+    if ir.EXPERTS[b.speaker] == "latest" and mode:
+        mode = trust.latest
     return values[ir.EXPERTS[b.speaker]], outcome, mode, (b.probability, b.interval)
+
+
+def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tuple[float, float]:
+    """What both regressions say, the second one as far as their leverages allow."""
+    if r is None:
+        return math.nan, math.nan
+    fit, words, whole = p.fits[r.fit], list[float](), 0.0
+    shown = [(x[c] - centre) / scale for c, centre, scale in fit.columns]
+    both = shown, shown + [a * b for a, b in itertools.combinations_with_replacement(shown, 2)]
+    for z, row, reach, known in zip(both, r.weights, fit.leverage, r.trusted, strict=False):
+        word = row[0]
+        for weight, each in zip(row[1:], z, strict=True):
+            word += weight * each
+        words.append(min(max(word, r.least), r.most))
+        entries = iter(struct.unpack(f"<{len(z) * (len(z) + 1) // 2}f", b64decode(reach.spread)))
+        off, far = [a - b for a, b in zip(z, reach.mean, strict=True)], 0.0
+        for i in range(len(z)):
+            along = 0.0
+            for j in range(i, len(z)):
+                along += next(entries) * (1.0 if i == j else 2.0) * off[j]
+            far += off[i] * along
+        h = (far if far >= 0.0 else math.inf) + 1.0 / max(known.rows, 1)
+        more = known.left * ((2.0 + h) * h) if known.left else 0.0
+        whole += (known.bias / (known.bias + more) if known.bias else 0.0) * (words[-1] - whole)
+    return x[r.present] + words[0], x[r.present] + whole
 
 
 # ---------------------------------------------------------------------- making them up
@@ -294,6 +329,7 @@ class _Maker:
     def __init__(self, rng: random.Random) -> None:
         self.rng, self.width = rng, rng.randint(1, 4)
         self.registers = 2 * self.width + 3
+        self.fits = tuple(self.fit() for _ in range(rng.randint(0, 2)))
 
     def program(self) -> ir.Program:
         rng, width = self.rng, self.width
@@ -302,7 +338,9 @@ class _Maker:
         places = [k for k in range(width) if k not in told and self.coin()]
         kinematics = tuple((k, self.small(), rng.randrange(2 * width)) for k in places)
         angles = tuple(k for k in range(width) if rng.random() < 0.2)
-        return empty(width, self.registers, answers=answers, kinematics=kinematics, angles=angles)
+        return empty(
+            width, self.registers, answers=answers, kinematics=kinematics, angles=angles, fits=self.fits
+        )
 
     def coin(self) -> bool:
         return self.rng.random() < 0.5
@@ -380,8 +418,35 @@ class _Maker:
             a = self.modes(a, able)
         elif self.coin():  # it isn't asked, but may be the one that held last
             a = replace(a, modes=(ir.Mode(9, self.register(), self.sum(able)),))
-        bound = [(mode.id, mode.function) for mode in a.modes if mode.function is not None]
-        return replace(a, trust=self.trust(a, rng.choice([None, *bound]))) if trusting else a
+        if self.fits and self.coin():
+            a = replace(a, regression=self.regression(column))
+        bound = [mode.id for mode in a.modes if mode.function is not None]
+        return replace(a, trust=self.trust(a, rng.choice([0, *bound]))) if trusting else a
+
+    def fit(self) -> ir.Fit:
+        """What one or two regressions look at."""
+        rng, count = self.rng, self.rng.randint(1, self.width)
+        columns = tuple(
+            (c, self.small(), rng.randint(1, 4) / 2.0) for c in rng.sample(range(self.width), count)
+        )
+        widths = (count, count + count * (count + 1) // 2)[: rng.randint(1, 2)]
+        return ir.Fit(columns, tuple(self.leverage(width) for width in widths))
+
+    def leverage(self, width: int) -> ir.Leverage:
+        entries = [self.small() for _ in range(width * (width + 1) // 2)]
+        spread = b64encode(struct.pack(f"<{len(entries)}f", *entries)).decode()
+        return ir.Leverage(tuple(self.small() for _ in range(width)), spread)
+
+    def regression(self, column: int) -> ir.Regression:
+        number, rng = self.rng.randrange(len(self.fits)), self.rng
+        widths = [len(each.mean) for each in self.fits[number].leverage]
+        weights = tuple(tuple(self.small() for _ in range(width + 1)) for width in widths)
+        trusted = tuple(
+            ir.Trusted(rng.choice((0.0, 0.5, 3.0)), rng.choice((0.0, 0.25)), rng.randint(0, 9))
+            for _ in widths
+        )
+        least = rng.randint(-9, 0) / 2
+        return ir.Regression(number, column, weights, least, least + rng.randint(0, 12) / 2, trusted)
 
     def modes(self, a: ir.Answer, able: list[int]) -> ir.Answer:
         rng, count = self.rng, self.rng.randint(1, 4)
@@ -413,13 +478,15 @@ class _Maker:
             return ir.Landing(6, value, place, self.small(), self.rng.choice((0.0, 0.25)))
         return ir.Stop(5, value, place, self.small(), self.small(), self.rng.choice((-1.0, 1.0)))
 
-    def trust(self, a: ir.Answer, latest: tuple[int, ir.Sum] | None) -> ir.Trust:
+    def trust(self, a: ir.Answer, latest: int) -> ir.Trust:
         """Something about every kind of predictions, and more about some of them."""
         rng = self.rng
         able = [
             bits
-            for bits in (0, 1, 2, 3, 16, 17, 18, 19)
-            if (a.guess or a.beyond or not bits & 2) and (latest or not bits & 16)
+            for bits in range(32)
+            if (a.guess or a.beyond or not bits & 2)
+            and (latest or not bits & 16)
+            and (a.regression or not bits & 12)
         ]
         kinds = [(outcome, who, -2) for outcome in range(6) for who in (-1, 0, 1)]
         winners = [*(mode.id for mode in a.modes), 5, 7]
@@ -428,7 +495,7 @@ class _Maker:
         beliefs = []
         for outcome, winner, lead in kinds:
             for bits in able:
-                speaker = rng.choice([*(k for k in (0, 1, 4) if bits >> k & 1), 5])
+                speaker = rng.choice([*(k for k in range(5) if bits >> k & 1), 5])
                 sure, width = rng.choice((math.nan, 0.5, 0.99)), rng.randint(1, 99) / 8.0
                 beliefs.append(ir.Belief(outcome, winner, lead, bits, speaker, sure, width, self.coin()))
-        return ir.Trust(tuple(beliefs), False, latest, None)
+        return ir.Trust(tuple(beliefs), False, latest)

@@ -71,5 +71,7 @@ def _module(file: Path, here: Path) -> str:
 
 def test_the_learner_itself_is_left_out() -> None:
     behind = modules_behind(f"{CHAPTER}.lesson", LEARNER)
-    assert not [m for m in behind if m.startswith(("relgym.laws", "relgym.logic", "relgym.model.world_model"))]
+    assert not [
+        m for m in behind if m.startswith(("relgym.laws", "relgym.logic", "relgym.model.world_model"))
+    ]
     assert "relgym.thesis.foil" in behind
