@@ -330,7 +330,8 @@ class _Lowering:
         if (fit := self.fits[index]) is None:
             return None
         weights, bounds = told
-        trusted = tuple(ir.Trusted(*each) for each in learned.trusted(target.property))
+        number = learned.targets.index(target.property)
+        trusted = tuple(ir.Trusted(*each) for each in learned.trusted[number].tolist())
         column = self.layout.column(index, target.property)
         return ir.Regression(fit[0], column, weights, *bounds, trusted)
 

@@ -206,16 +206,17 @@ class Regression:
         slack = BEYOND * (most - least)
         return tuple(tuple(r.weights[k].tolist()) for r in self._ridges), (least - slack, most + slack)
 
-    def trusted(self, target: str) -> list[tuple[float, float, int]]:
-        """How far the word of each regression counts for a target (`relgym.program.records.Trusted`).
+    @property
+    def trusted(self) -> NDArray[np.float64]:
+        """How far the word of each regression counts for each target, shape ``(targets, regressions, 3)``.
 
-        What the words before it leave more than it, and what it leaves, in the mean square; and its rows.
+        What the words before it leave more than it, what it leaves, both in the mean square, and 1 / rows
+        (`relgym.program.records.Trusted`).
         """
-        k = self.targets.index(target)
-        found = []
+        found = np.empty((len(self.targets), len(self._ridges), 3))
         for kind, ridge in enumerate(self._ridges):
-            bias, left = self._bias(kind)
-            found.append((float(bias[k]), float(left[k]), ridge.rows))
+            found[:, kind, 0], found[:, kind, 1] = self._bias(kind)
+            found[:, kind, 2] = 1.0 / max(ridge.rows, 1)
         return found
 
     @property

@@ -10,7 +10,7 @@ written into the program that there is. Until then, and where there is no progra
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from threading import Lock
@@ -35,13 +35,14 @@ from relgym.model.prediction import (
     ScenePrediction,
 )
 from relgym.model.querying import Said, derive, settled
+from relgym.model.regression import Regression
 from relgym.model.scenes import wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
 from relgym.model.trusting import trusting
 from relgym.program.machine import Machine
 from relgym.program.records import Answer, BeyondError, Program, Trust
-from relgym.program.tape import Tape, encoded, kind_of, ordered, trust_numbers
+from relgym.program.tape import Tape, encoded, kind_of, ordered
 from relgym.scene.objects import Scene, SceneLayout
 
 __all__ = ["Programs", "Runner"]
@@ -224,7 +225,8 @@ class Runner:
 
     def _lay(self, tape: Tape) -> None:
         """Take note of where what changes often stands in the tape that is run, and write what holds now."""
-        self._places, self._latest, self._trusted = tape.votes, tape.latest, tape.trusted
+        self._places, self._latest = tape.votes, tape.latest
+        self._regressions = self._trusted_at(tape.trusted)
         self._votes = [None for places, _ in tape.votes for _ in places]
         self.follow()
 
@@ -246,14 +248,28 @@ class Runner:
             code[by_tie : by_tie + len(first)] = first
         if moved:
             self._space["memory_keys"] = 0  # answers that are remembered were voted for as it was before
-        numbers = self._space["numbers"][0]
-        for teller, (place, modes), trusted in zip(self._tellers, self._latest, self._trusted, strict=True):
-            model = teller.model
+        for teller, (place, modes) in zip(self._tellers, self._latest, strict=True):
             if modes:
+                model = teller.model
                 code[place] = modes.get(model.latest, 0) if model.asks_latest else 0
-            if trusted >= 0:
-                known = self._parts.regressions[model.target.type].trusted(model.target.property)
-                numbers[trusted : trusted + 3 * len(known)] = trust_numbers(known)
+        for regression, targets, where in self._regressions:
+            known = regression.trusted
+            self._space["numbers"][0, where] = known.reshape(len(known), -1)[targets]
+
+    def _trusted_at(self, places: Sequence[int]) -> list[tuple[Regression, list[int], NDArray[np.intp]]]:
+        """Regressions, targets of theirs that are asked, and where on the tape it stands how far these are trusted."""
+        found: dict[str, tuple[list[int], list[int]]] = {}
+        for teller, place in zip(self._tellers, places, strict=True):
+            if place >= 0:
+                name, prop = teller.target.type, teller.target.property
+                targets, starts = found.setdefault(name, ([], []))
+                targets.append(self._parts.regressions[name].targets.index(prop))
+                starts.append(place)
+        known = [(self._parts.regressions[name], *each) for name, each in found.items()]
+        return [
+            (r, targets, np.array(starts)[:, None] + np.arange(3 * r.trusted.shape[1]))
+            for r, targets, starts in known
+        ]
 
     def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
         """Predict what follows n scenes; None: arrays must, or can say why not."""

@@ -504,13 +504,13 @@ class Trusted:
     ----------
     bias, left
         By how much more the words before it leave, and what it leaves, in the mean square.
-    rows
-        Number of rows learned from, which add 1 / rows to the leverage.
+    least
+        Leverage in the midst of all that is known: one part in the number of rows.
     """
 
     bias: float
     left: float
-    rows: int
+    least: float
 
 
 @dataclass(frozen=True, slots=True)

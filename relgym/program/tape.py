@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from relgym.program import records as ir
 
-__all__ = ["Tape", "encoded", "kind_of", "ordered", "trust_numbers"]
+__all__ = ["Tape", "encoded", "kind_of", "ordered"]
 
 HEADER = 28
 (
@@ -538,7 +538,7 @@ class _Writer:
             return 0
         bounds = self.num(r.least, r.most)
         weights = [self.num(*row) for row in r.weights]
-        trusted = self.num(*trust_numbers((each.bias, each.left, each.rows) for each in r.trusted))
+        trusted = self.num(*(v for each in r.trusted for v in (each.bias, each.left, each.least)))
         self.trusted.append(trusted)
         return self.put(self.fits[r.fit], *self.col(r.present), bounds, trusted, *weights)
 
@@ -552,11 +552,6 @@ class _Writer:
             at = self.num(each.value, each.step, each.bound, each.side)
             return self.put(0, each.mode, *self.col(each.column), at)
         return self.put(1, each.mode, *self.col(each.column), self.num(each.value, each.at, each.slack))
-
-
-def trust_numbers(known: Iterable[tuple[float, float, int]]) -> list[float]:
-    """How far regressions are trusted, as it stands on the tape: bias, what is left, and what rows add to leverages."""
-    return [v for bias, left, rows in known for v in (bias, left, 1.0 / max(rows, 1))]
 
 
 def ordered(beliefs: Iterable[ir.Belief]) -> list[ir.Belief]:

@@ -179,8 +179,8 @@ def test_sums_say_what_values_say(n: int, seed: int) -> None:
         told = found.sums(target)
         assert told is not None
         weights, (least, most) = told
-        for kind, (bias, left, count) in enumerate(found.trusted(target)):
-            assert count == found._ridges[kind].rows
+        for kind, (bias, left, few) in enumerate(found.trusted[k].tolist()):
+            assert few == 1.0 / found._ridges[kind].rows
             share = bias / (bias + left * ((1.0 + leverage[:, kind]) ** 2 - 1.0)) if bias else np.zeros(4)
             np.testing.assert_allclose(found._share(kind, leverage[:, kind])[:, k], share)
         for row, expected in zip(rows, said, strict=True):

@@ -79,7 +79,7 @@ def test_least_squares_by_hand() -> None:
     columns = ((1, 2.0, 2.0), (2, 0.0, 1.0))
     weights = ((0.5, 1.0, 2.0), (0.0, 1.0, 0.0, 0.0, 0.25, 0.5))  # 1, z1, z2; then z1 z1, z1 z2, z2 z2
     leverage = tuple(ir.Leverage((0.0,) * d, b64encode(bytes(2 * d * (d + 1))).decode()) for d in (2, 5))
-    trusted = ir.Trusted(1.0, 2.0, 2), ir.Trusted(3.0, 2.0, 2)
+    trusted = ir.Trusted(1.0, 2.0, 0.5), ir.Trusted(3.0, 2.0, 0.5)
     squares = ir.Regression(0, 0, weights, -3.0, 3.0, trusted)
     told = {}
     for speaker in (2, 3):

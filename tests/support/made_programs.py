@@ -310,7 +310,7 @@ def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tu
             for j in range(i, len(z)):
                 along += next(entries) * (1.0 if i == j else 2.0) * off[j]
             far += off[i] * along
-        h = (far if far >= 0.0 else math.inf) + 1.0 / max(known.rows, 1)
+        h = (far if far >= 0.0 else math.inf) + known.least
         more = known.left * ((2.0 + h) * h) if known.left else 0.0
         whole += (known.bias / (known.bias + more) if known.bias else 0.0) * (words[-1] - whole)
     return x[r.present] + words[0], x[r.present] + whole
@@ -442,7 +442,7 @@ class _Maker:
         widths = [len(each.mean) for each in self.fits[number].leverage]
         weights = tuple(tuple(self.small() for _ in range(width + 1)) for width in widths)
         trusted = tuple(
-            ir.Trusted(rng.choice((0.0, 0.5, 3.0)), rng.choice((0.0, 0.25)), rng.randint(0, 9))
+            ir.Trusted(rng.choice((0.0, 0.5, 3.0)), rng.choice((0.0, 0.25)), 1.0 / rng.randint(1, 9))
             for _ in widths
         )
         least = rng.randint(-9, 0) / 2
