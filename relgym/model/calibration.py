@@ -65,6 +65,9 @@ PRIOR: Final = 1.0
 COVERED: Final = 0.95
 """Share of what comes that intervals are to hold."""
 
+_OUTSIDE, _HELD = math.log2(5.0), math.log2((1.0 - 5.0 * (1.0 - COVERED)) / COVERED)
+"""Bits by which what lies outside of its interval, or in it, speaks for five times as many outside."""
+
 ENOUGH: Final = 19
 """Fewest errors that can tell such an interval: the largest of them does then."""
 
@@ -242,8 +245,9 @@ class _Cell:
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials
     heard: float = 0.0  # predictions, those of long ago counting less
-    steady: int = 0  # predictions in a row, up to now, that were confirmed
+    steady: int = 0  # predictions in a row, up to now, that came out as such ones do
     passed: int = 0  # of these, how many the next one that is learned from stands for, too
+    doubt: float = 0.0  # bits by which intervals held less often lately than they are to
     _sure: tuple[float, float] | None = field(
         default=None, repr=False, compare=False
     )  # by bits, since the last trial
@@ -554,6 +558,7 @@ class Calibration:
         error: float,
         turn: float = 0.0,
         times: int = 0,
+        stands: int = 0,
     ) -> None:
         """Take in how a prediction came out.
 
@@ -573,10 +578,12 @@ class Calibration:
             Length of a full turn, of an angle; 0 of anything else.
         times
             For how many predictions it stands that were confirmed (`confirm`); 0: it wasn't.
+        stands
+            For how many it stands that came out as such ones do (`thin`); 0: it stands for itself alone.
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
-        self.trials += not times
+        self.trials += not (times or stands)
         self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
         within = max(rounding, error * self.change)
         if errors[audit.speaker] > within:  # which its law explains; those it would stand for were hits
@@ -584,8 +591,8 @@ class Calibration:
         many = max(times, 1)
         if many > 1:
             self._changes = _counted(self._changes, _place(errors[PERSISTENCE]), many - 1)
-        self._slips[0] += many
-        self._slips[1] += claimed and errors[audit.speaker] > within
+        self._slips[0] += max(many, stands)
+        self._slips[1] += max(stands, 1) * (claimed and errors[audit.speaker] > within)
         if self._slips[0] > MEMORY:
             self._slips = [0.5 * each for each in self._slips]
             for cell in self._cells.values():
@@ -600,8 +607,8 @@ class Calibration:
             else:
                 cell.count(errors, within, many)
         cell = self._cells[audit.key]
-        cell.heard += many
-        cell.steady *= times > 0
+        cell.heard += max(many, stands)
+        cell.steady *= times > 0 or stands > 0
         self._changed(cells=len(self._cells) > known)
 
     def confirm(self, key: Key, share: float) -> int:
@@ -618,6 +625,33 @@ class Calibration:
         cell.steady += 1
         times = int(2.0 * share * cell.steady)
         if times > 1 and cell.steady % (1 << (times.bit_length() - 1)):
+            cell.passed += 1
+            return 0
+        weight, cell.passed = cell.passed + 1, 0
+        return weight
+
+    def thin(self, key: Key, *, held: bool) -> int:
+        """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
+
+        More than `MEMORY` of a kind tell hardly more about it: twice as many are known as well as all of them to a
+        fortieth of their spread. So of n one of n / `MEMORY` is learned from. Where intervals hold less often than they
+        are to, by `EVIDENCE` bits, the world isn't what it was, and all is learned from (cumulative sums: Page 1954;
+        the alternative is that five times as many lie outside).
+
+        Parameters
+        ----------
+        key
+            Its kind.
+        held
+            Whether what came lay in its interval.
+        """
+        self.trials += 1
+        cell = self._cells.get(key)
+        if cell is None:
+            return 1
+        cell.steady += 1
+        cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)
+        if cell.doubt < EVIDENCE and cell.passed + 1 < cell.steady // MEMORY:
             cell.passed += 1
             return 0
         weight, cell.passed = cell.passed + 1, 0
@@ -686,7 +720,7 @@ class Calibration:
         for key, cell in Calibration.from_json(less.to_json(), self.probability, *others)._cells.items():
             found._cells.setdefault(key, cell)
         for cell in found._cells.values():  # a number stands for another mode here, maybe
-            cell.steady = cell.passed = 0
+            cell.steady, cell.passed, cell.doubt = 0, 0, 0.0
         found.trials = self.trials + other.trials
         return found
 
@@ -705,6 +739,7 @@ class Calibration:
                     "heard": cell.heard,
                     "steady": cell.steady,
                     "passed": cell.passed,
+                    **({"doubt": cell.doubt} if cell.doubt else {}),
                     "records": [
                         [
                             who,
@@ -751,6 +786,7 @@ class Calibration:
                 float(each["heard"]),
                 int(each["steady"]),
                 int(each["passed"]),
+                float(each.get("doubt", 0.0)),
             )
         return found
 

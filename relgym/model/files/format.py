@@ -453,8 +453,8 @@ class CellRecord(Record):
 
     A record is an expert, trials, hits, the run under way, bins of errors, and of runs that are over the trials in
     those of misses and of hits, and how many there were; squares are trials, the expert's own and those of saying that
-    nothing changes. Steady are predictions in a row, up to now, that came true, passed those of them for which the next
-    one that is learned from stands.
+    nothing changes. Steady are predictions in a row, up to now, that came out as such ones do, passed those of them for
+    which the next one that is learned from stands; doubt are bits by which intervals held less often than they are to.
     """
 
     key: Kind
@@ -464,6 +464,7 @@ class CellRecord(Record):
     passed: Count
     records: list[tuple[Expert, Weight, Weight, Whole, Bins, tuple[Weight, Weight, Weight, Weight]]]
     squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=6)]
+    doubt: Weight = 0.0
 
 
 class CalibrationRecord(Record):

@@ -14,12 +14,14 @@ from collections.abc import Iterable, Mapping
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from relgym.clustering.mode import NOISE
 from relgym.config.constants import STDS
-from relgym.model.calibration import OWN, Calibration
+from relgym.model.calibration import OWN, Calibration, Key
 from relgym.model.prediction import Prediction, ScenePrediction
 
 if TYPE_CHECKING:
     from relgym.model.parts import Answer, Parts
+    from relgym.model.target.property_model import PropertyModel
     from relgym.scene.objects import Target
 
 __all__ = [
@@ -38,6 +40,9 @@ __all__ = [
 WRONG = 1e-9
 """A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
 
+FAR = 4.0
+"""What is off by so many times what 95 % are is news, and never left out: of normal errors that is eight deviations."""
+
 WINDOW, LEAST = 200, 50
 """So many of the latest steps are remembered; fewer than `LEAST` say nothing."""
 
@@ -48,14 +53,15 @@ wrong, from one to the next a quarter."""
 
 
 class Confirmed(NamedTuple):
-    """A prediction that came true.
+    """A prediction that came out as such ones do.
 
     Attributes
     ----------
     mode
-        Which mode made it.
+        Which mode made it, and came true; `NOISE` of what is only roughly right.
     weight
-        How many such examples it stands for when it is learned from; 0: others stand for it (`Calibration.confirm`).
+        How many such examples it stands for when it is learned from; 0: others stand for it (`Calibration.confirm`,
+        `Calibration.thin`).
     """
 
     mode: int
@@ -68,7 +74,7 @@ class Retrospect(NamedTuple):
     Attributes
     ----------
     confirmed
-        What modes predicted and came true, by (object, property).
+        What came out as such predictions do, by (object, property).
     counted
         Whether all were counted and no more: how right such predictions are is known as it was.
     """
@@ -176,7 +182,9 @@ class _Look:
         # Who says how large the noise is takes it for granted.
         self._least = WRONG if isinstance(noise, str) else max(WRONG, config.clustering.inlier_stds * noise)
         self._off: set[tuple[str, str]] = set()
-        self._times = 0  # that the present prediction counts for, as one of many that came true
+        self._times = self._stands = (
+            0  # predictions that came true, or as such ones do, that this one counts for
+        )
         self.counts: dict[Target, list[int]] = {}
         self.confirmed: dict[tuple[str, str], Confirmed] = {}
         self.counted = True
@@ -185,12 +193,16 @@ class _Look:
         return max(WRONG, self._precision * max(1.0, abs(came)))
 
     def repeats(self, part: Prediction, residual: float, answer: Answer) -> bool:
-        """Whether a prediction came true and another one of its kind stands for it: then it is counted, no more."""
-        self._times, record = 0, part.record
-        if record is None or not part.ok or not part.mode or record.speaker != OWN:
+        """Whether a prediction came out as such ones do and another one stands for it: it is counted, no more."""
+        self._times = self._stands = 0
+        record, target, model = part.record, answer.target, answer.model
+        if record is None:
             return False
-        target, model = answer.target, answer.model
         lawful = self._parts.governs(target)
+        if not lawful and model.coarse:
+            return self._passed(part, residual, record.key, model)
+        if not part.ok or not part.mode or record.speaker != OWN:
+            return False
         within = self._rounding(part.value + residual) if lawful else model.clusterer.scale.tolerance
         if not abs(residual) <= within or not (lawful or (model.settled and not self._misled(answer))):
             return False
@@ -203,6 +215,17 @@ class _Look:
             self.counts.setdefault(target, [0, 0])[0] += 1
         return True
 
+    def _passed(self, part: Prediction, residual: float, key: Key, model: PropertyModel) -> bool:
+        """`repeats` of what is only roughly right: of what its interval, or a wider one, tells."""
+        if not self._parts.config.downsampling:
+            return False
+        if not abs(residual) <= FAR * part.interval:
+            self._stands = 1
+            return False
+        self._stands = model.calibration.thin(key, held=abs(residual) <= part.interval)
+        self.confirmed[part.object, part.property] = Confirmed(NOISE, self._stands)
+        return self._stands == 0
+
     def compare(self, part: Prediction, residual: float, answer: Answer) -> None:
         """Take in how far a prediction was off, and who would have known better."""
         self.counted = False
@@ -213,7 +236,14 @@ class _Look:
             rounding = max(rounding, self._least)
             error = self._parts.config.claim_error
             model.calibration.look_back(
-                audit, came, claimed=part.ok, rounding=rounding, error=error, turn=turn, times=self._times
+                audit,
+                came,
+                claimed=part.ok,
+                rounding=rounding,
+                error=error,
+                turn=turn,
+                times=self._times,
+                stands=self._stands,
             )
         if not abs(residual) <= rounding:
             self._off.add((target.type, target.property))

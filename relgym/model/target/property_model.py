@@ -206,12 +206,21 @@ class PropertyModel:
         searching = c.searching or c.due or self.classifier.waits or self.casting.waits
         return not (searching or c.approximate or c.population.chancy or self.rough or self.undecided)
 
+    @property
+    def coarse(self) -> bool:
+        """Whether it is known only roughly what comes, and nothing tells more: of such steps some will do."""
+        return (self.clusterer.approximate or self.rough) and not self.undecided
+
     def take_for_known(self, mode: int) -> bool:
-        """Count an example that came as a mode predicted, and for which others stand; false if the mode is gone."""
-        if mode not in self.clusterer.clusters:
+        """Count an example for which others stand; false if the mode that predicted it is gone.
+
+        `NOISE`: it was only roughly right, and nobody asked which mode held.
+        """
+        if mode != NOISE and mode not in self.clusterer.clusters:
             return False
         self.clusterer.pass_over()
-        self.latest = mode
+        if mode != NOISE:
+            self.latest = mode
         return True
 
     def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
