@@ -104,7 +104,9 @@ def learn(
     following = unwrapped(before.layout, before.vector, next_values(before, after))
     reports: dict[tuple[str, str], ClusterReport] = {}
     budget = parts.agenda.open()
-    _go_on(parts, budget)
+    idle = parts.idle
+    if not idle:
+        _go_on(parts, budget)
     searches = budget.part(SEARCHES)
     rows = {name: table.seen for name, table in parts.tables.items()}
     moved = False
@@ -114,7 +116,7 @@ def learn(
         for index in before.layout.of_type(type_name):
             if (only is None or index in only) and stays[index]:
                 moved |= _learn_object(parts, percept, index, following, reports, searches, confirmed)
-    for type_name, table in parts.tables.items():
+    for type_name, table in parts.tables.items() if reports else ():
         if parts.open and any(rows[type_name] < at <= table.seen for at in CHECK_AT):
             parts.looks += due(parts, type_name)
         forget(table, [model for _, model in parts.by_type[type_name]], parts.config.history)
@@ -122,10 +124,20 @@ def learn(
     heard = parts.laws is not None and parts.laws.learn_one(
         percept, following, _there(parts, transition, only), parts.models, told
     )
-    work = _refresh(parts, budget)
-    parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
+    work = 0
+    if not idle or reports or heard:
+        work = _refresh(parts, budget)
+        parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
+        parts.idle = not budget.spent and _nothing_waits(parts)
     counted = not (reports or moved or heard or budget.spent) and len(parts.targets) == known
     return LearnReport(reports, work, counted=counted)
+
+
+def _nothing_waits(parts: Parts) -> bool:
+    """Whether nothing is under way, and nothing will be before something is learned."""
+    if parts.looks or parts.inquiry is not None or parts.agenda.waiting:
+        return False
+    return not any(parts.models[target].waits for target in parts.targets)
 
 
 def _go_on(parts: Parts, budget: Budget) -> None:
@@ -163,7 +175,7 @@ def _there(parts: Parts, transition: Transition, only: frozenset[int] | None) ->
 
 def finish(parts: Parts) -> int:
     """Make all searches that still wait, and re-learn every stale classifier, without a budget; the work spent."""
-    budget = Budget()
+    budget, parts.idle = Budget(), False
     while parts.looks or parts.inquiry is not None:
         _inquire(parts, budget)
     for target in parts.targets:

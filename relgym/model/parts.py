@@ -87,6 +87,8 @@ class Parts:
         The look that is being taken.
     agenda
         How much may be searched in a step, and what waits for its next piece.
+    idle
+        Whether it is known that nothing is under way or due, as long as nothing is learned.
     screen
         Tells gross errors in observations, which aren't learned from.
     """
@@ -114,6 +116,7 @@ class Parts:
         self.looks: list[Look] = []
         self.inquiry: Inquiry | None = None
         self.agenda = Agenda(earned=config.cells_per_step, most=config.most_cells, saved=config.saved_cells)
+        self.idle = False
         self.screen = Screen()
         self.laws: Laws | None = None
         if config.frames == "auto":
@@ -200,6 +203,7 @@ class Parts:
         ConfigError
             The property comes from outside the world.
         """
+        self.idle = False
         t = self.schema.type(target.type)
         if target.property not in t.properties:
             raise SchemaError(f"target {target}: type {t.name!r} has no property {target.property!r}")

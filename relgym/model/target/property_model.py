@@ -203,8 +203,17 @@ class PropertyModel:
     def settled(self) -> bool:
         """Whether nothing is being looked for, and modes are laws: what comes as predicted teaches nothing new."""
         c = self.clusterer
-        searching = c.searching or c.due or self.classifier.waits or self.casting.waits
-        return not (searching or c.approximate or c.population.chancy or self.rough or self.undecided)
+        if c.approximate or c.population.chancy or c.searching or c.due or self.rough or self.undecided:
+            return False
+        return not (self.classifier.waits or self.casting.waits)
+
+    @property
+    def waits(self) -> bool:
+        """Whether something is being looked for, or is due."""
+        c, fallback = self.clusterer, self.fallback
+        if c.searching or c.due or self.classifier.waits or self.casting.waits:
+            return True
+        return self.candidates.due(c.seen) or (fallback.guessable and fallback.guesses.stale(c.seen))
 
     @property
     def coarse(self) -> bool:
