@@ -633,10 +633,11 @@ class Calibration:
     def thin(self, key: Key, *, held: bool) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
 
-        More than `MEMORY` of a kind tell hardly more about it: twice as many are known as well as all of them to a
-        fortieth of their spread. So of n one of n / `MEMORY` is learned from. Where intervals hold less often than they
-        are to, by `EVIDENCE` bits, the world isn't what it was, and all is learned from (cumulative sums: Page 1954;
-        the alternative is that five times as many lie outside).
+        The more of a kind there are, the less one more tells. So of n, if these are many times more than `MEMORY`, one
+        of sqrt(n / `MEMORY`) is learned from: what is learned goes on becoming better, as if there were
+        1.5 sqrt(n `MEMORY`) of them in all, at a cost that falls. Where intervals hold less often than they are to, by
+        `EVIDENCE` bits, the world isn't what it was, and all is learned from (cumulative sums: Page 1954; the
+        alternative is that five times as many lie outside).
 
         Parameters
         ----------
@@ -651,7 +652,7 @@ class Calibration:
             return 1
         cell.steady += 1
         cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)
-        if cell.doubt < EVIDENCE and cell.passed + 1 < cell.steady // MEMORY:
+        if cell.doubt < EVIDENCE and cell.passed + 1 < math.isqrt(cell.steady // MEMORY):
             cell.passed += 1
             return 0
         weight, cell.passed = cell.passed + 1, 0

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from relgym.model.calibration import (
     _EXACT,
+    COVERED,
     ENOUGH,
     EXPERTS,
     FEW,
@@ -1104,3 +1105,55 @@ def test_of_two_models_together_all_is_learned_from_at_first() -> None:
         known.confirm(KEY, 0.125)
     both = known.united(right(1))
     assert [both.confirm(KEY, 0.125) for _ in range(7)] == [1] * 7
+
+
+def test_of_what_is_roughly_known_ever_fewer_are_learned_from() -> None:
+    # Of n one of the root of n / 1024: of each two from the 4096th on, of each three from the 9216th on.
+    known = right(1)
+    weights = [known.thin(KEY, held=True) for _ in range(9_230)]
+    assert weights[:4_095] == [1] * 4_095
+    assert weights[4_095:4_099] == [0, 2, 0, 2]
+    assert weights[-6:] in ([0, 0, 3] * 2, [0, 3, 0] * 2, [3, 0, 0] * 2)
+    assert sum(weights) in (9_230, 9_229, 9_228)  # each that is learned from stands for those before it, too
+
+
+def test_where_intervals_hold_less_often_all_is_learned_from() -> None:
+    known = right(1)
+    for _ in range(5_000):
+        known.thin(KEY, held=True)
+    # Outside of its interval each speaks for a change by log2(5) = 2.3 bits; ten are enough.
+    outside = [known.thin(KEY, held=False) for _ in range(12)]
+    assert outside[4:] in ([1] * 8, [2, *[1] * 7])
+    # Those that it holds speak against that by a third of a bit each: after thirty, some are left out again.
+    held = [known.thin(KEY, held=True) for _ in range(60)]
+    assert 0 not in held[:25]
+    assert held[-10:].count(0) == 5
+
+
+def test_one_in_twenty_outside_of_its_interval_is_as_it_should_be() -> None:
+    known, rng = right(1), np.random.default_rng(0)
+    weights = [known.thin(KEY, held=bool(held)) for held in rng.random(20_000) < COVERED]
+    assert weights[10_000:].count(0) > 0.6 * 10_000
+
+
+def test_what_a_rough_prediction_stands_for_counts_where_claims_are_rationed_and_nowhere_else() -> None:
+    one, many = right(40), right(40)
+    audit = Audit(KEY, values(own=1.3), OWN)
+    for known, stands in ((one, 0), (many, 5)):
+        for _ in range(3):
+            known.thin(KEY, held=True)
+        known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, stands=stands)
+    cells = one._cells[KEY], many._cells[KEY]
+    assert cells[0].records == cells[1].records and cells[0].squares == cells[1].squares
+    assert cells[1].heard == cells[0].heard + 4
+    assert many._slips == [one._slips[0] + 4, one._slips[1] + 4]
+    assert (cells[0].steady, cells[1].steady) == (0, 3)
+
+
+def test_how_roughly_things_are_known_is_kept() -> None:
+    known = right(1)
+    for k in range(5_003):
+        known.thin(KEY, held=k % 9 > 0)
+    again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
+    pattern = [bool(k % 7) for k in range(50)]
+    assert [again.thin(KEY, held=h) for h in pattern] == [known.thin(KEY, held=h) for h in pattern]

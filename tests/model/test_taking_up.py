@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -223,3 +224,39 @@ def test_modes_have_the_shares_of_what_came_that_they_have_where_all_is_learned_
     found = [{m.formula(): m.examples for m in each.modes("cart", "v")} for each in (model, whole)]
     assert found[0].keys() == found[1].keys()
     assert all(abs(found[0][name] - count) <= 0.03 * len(some) for name, count in found[1].items())
+
+
+def curve(count: int, *, sign: float = 1.0, seed: int = 0) -> Iterator[Transition]:
+    """A cart whose next speed is a curve of its speed, through noise: it is known roughly."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        x, v, force = rng.uniform(-3.0, 3.0, size=3)
+        later = 0.5 * v + sign * (math.sin(2.0 * v) + 0.3 * force) + 0.05 * rng.normal()
+        yield Transition(
+            BOX.scene({"a": [x, v], "action": [force]}), BOX.scene({"a": [x, later], "action": [0.0]})
+        )
+
+
+def test_of_what_is_roughly_known_some_is_learned_from_until_the_world_changes() -> None:
+    model = WorldModel(BOX, targets=[SPEED])
+    learned(model, curve(4_200))
+    known = model.property_model("cart", "v")
+    assert known.coarse and not known.settled
+
+    def shares(some: Iterable[Transition]) -> list[float]:
+        taken = [("a", "v") in r.learned.parts for r in learned(model, some) if r.learned is not None]
+        return [float(np.mean(part)) for part in np.array_split(taken, 4)]
+
+    assert max(shares(curve(800, seed=1))[1:]) < 0.75
+    assert min(shares(curve(400, sign=-1.0, seed=2))) > 0.9
+
+
+def test_models_of_what_is_roughly_known_are_hardly_worse_for_it() -> None:
+    some, fresh = list(curve(6_000)), list(curve(500, seed=9))
+    left = []
+    for share in (0.0075, 0.0):
+        model = WorldModel(BOX, {"downsampling": share}, targets=[SPEED])
+        learned(model, some)
+        off = [model.predict_one(s.before).scene["a"]["v"] - s.after["a"]["v"] for s in fresh]
+        left.append(float(np.sqrt(np.mean(np.square(off)))))
+    assert left[0] < 1.05 * left[1]
