@@ -518,10 +518,25 @@ class Calibration:
         who, cell = _who(key), self._cells.get(key)
         if who not in self._least:
             self._least[who] = self._needed(who)
-        share = (
-            told.probability if cell is None else cell.sure((self.probability, self.allowed), self._bits(who))
-        )
+        like = [cell] if cell is not None else self._alike(key)
+        claims, bits = (self.probability, self.allowed), self._bits(who)
+        share = min([c.sure(claims, bits) for c in like], default=told.probability)
+        if cell is None and told.probability >= 1.0 - self.allowed:  # rations aren't needed
+            share = max(share, told.probability)
         return min(told.probability, share) > self.probability and share >= self._least[who]
+
+    def _alike(self, key: Key) -> list[_Cell]:
+        """Kinds of predictions of which one that was never seen, and isn't rationed therefore, is no surer than any.
+
+        Those of its winner; of a winner that was never seen, those of all modes, or all laws.
+        """
+        kinds = [
+            (k, c)
+            for k, c in self._cells.items()
+            if k.lead >= 0 and k.outcome == key.outcome and c.heard >= 1.0
+        ]
+        own = [c for k, c in kinds if k.winner == key.winner]
+        return own or [c for k, c in kinds if _who(k) == _who(key)]
 
     def _needed(self, who: int) -> float:
         """The least probability that is claimed."""

@@ -745,13 +745,24 @@ def test_one_miss_is_left_to_every_kind() -> None:
         assert known.claims(KEY, Assessment(OWN, 1.0, math.nan, math.nan)) is expected
 
 
-def test_what_is_no_kind_of_its_own_is_claimed_when_it_is_as_sure() -> None:
-    known, other = rationed(0.01), Key(0, 7, 3)
-    assert known.claims(other, Assessment(OWN, 0.965, math.nan, math.nan))
-    assert not known.claims(other, Assessment(OWN, 0.96, math.nan, math.nan))
+def test_what_was_never_seen_is_claimed_when_all_like_it_are_or_it_needs_no_rations() -> None:
+    known, other = rationed(0.01), Key(0, 7, 3)  # of whose like two kinds of four are claimed
+    assert known.claims(other, Assessment(OWN, 0.99, math.nan, math.nan))
+    assert not known.claims(other, Assessment(OWN, 0.985, math.nan, math.nan))
     assert not known.claims(other, Assessment(LINEAR, 0.99, math.nan, math.nan))
     assert known.claims(other, Assessment(LATEST, 0.99, math.nan, math.nan))
     assert known.claims(other, Assessment(len(EXPERTS), 0.99, math.nan, math.nan))  # an added class' law
+
+
+def test_of_a_winner_of_which_all_kinds_are_claimed_a_new_kind_is() -> None:
+    known = Calibration()
+    for lead in (2, 5):
+        known._cells[Key(0, 4, lead)] = cell(40.0, 40.0, heard=40.0)
+    known._cells[Key(0, 5, 2)] = cell(20.0, 40.0, heard=1_000.0)
+    known.trials = 1_080
+    assert known.claims(Key(0, 4, 3), Assessment(OWN, 0.96, math.nan, math.nan))
+    assert not known.claims(Key(0, 5, 3), Assessment(OWN, 0.96, math.nan, math.nan))
+    assert not known.claims(Key(0, 6, 3), Assessment(OWN, 0.96, math.nan, math.nan))
 
 
 def test_the_least_probability_holds_of_both() -> None:
