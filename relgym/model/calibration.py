@@ -381,16 +381,25 @@ class Calibration:
         self._everyone = tuple(range(self.experts))
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
         self._united: _Cell | None = None  # see `_whole`
+        self._relied: tuple[bool, frozenset[int]] | None = None  # see `unproven`
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_assessed": {}, "_claimed": {}, "_least": {}, "_kinds": {}, "_united": None}
+        worked_out = {
+            "_assessed": {},
+            "_claimed": {},
+            "_least": {},
+            "_kinds": {},
+            "_united": None,
+            "_relied": None,
+        }
+        return self.__dict__ | worked_out
 
     def _changed(self, *, cells: bool = True) -> None:
         """What was worked out from the cells is out of date; of which kinds there are, too, if cells came or went."""
         self._assessed.clear()
         self._claimed.clear()
         self._least.clear()
-        self._united = None
+        self._united = self._relied = None
         if cells:
             self._kinds.clear()
 
@@ -598,7 +607,7 @@ class Calibration:
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
-        self.trials += not (times or stands)
+        self.trials += not times
         self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
         within = max(rounding, error * self.change)
         if errors[audit.speaker] > within:  # which its law explains; those it would stand for were hits
@@ -661,17 +670,25 @@ class Calibration:
         held
             Whether what came lay in its interval.
         """
-        self.trials += 1
         cell = self._cells.get(key)
         if cell is None:
             return 1
         cell.steady += 1
         cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)
         if cell.doubt < EVIDENCE and cell.passed + 1 < math.isqrt(cell.steady // MEMORY):
+            self.trials += 1
             cell.passed += 1
             return 0
         weight, cell.passed = cell.passed + 1, 0
         return weight
+
+    def unproven(self, modes: Sequence[int]) -> bool:
+        """Whether regressions gave many values, and some mode hasn't predicted any yet."""
+        if self._relied is None:
+            kinds = [(k, c) for k, c in self._cells.items() if k.lead >= 0]
+            relied = any(c.speaker in (LINEAR, PRODUCTS) and c.heard >= FEW for _, c in kinds)
+            self._relied = relied, frozenset(k.winner for k, c in kinds if c.heard >= 1.0)
+        return self._relied[0] and not self._relied[1].issuperset(modes)
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""

@@ -1168,3 +1168,13 @@ def test_how_roughly_things_are_known_is_kept() -> None:
     again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
     pattern = [bool(k % 7) for k in range(50)]
     assert [again.thin(KEY, held=h) for h in pattern] == [known.thin(KEY, held=h) for h in pattern]
+
+
+def test_each_prediction_that_somebody_looked_back_at_is_counted_once() -> None:
+    known = right(1)
+    left_out = sum(known.thin(KEY, held=True) == 0 for _ in range(5_000))
+    assert left_out > 400 and known.trials == 1 + left_out
+    audit = Audit(KEY, values(own=1.3), OWN)
+    for stands in (0, 1, 3):
+        known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, stands=stands)
+    assert known.trials == 4 + left_out

@@ -478,8 +478,13 @@ class PropertyModel:
 
     @property
     def rough(self) -> bool:
-        """Whether so much is unexplained, or explained only roughly, that regressions may know better."""
-        return self._unsettled or self.fallback.guessable
+        """Whether so much is unexplained, explained only roughly, or told wrongly, that regressions may know better.
+
+        And as long as some mode never spoke where they did before.
+        """
+        if self._unsettled or self.fallback.guessable or self.undecided:
+            return True
+        return self.calibration.unproven(self.classifier.modes)
 
     @property
     def lost(self) -> bool:
