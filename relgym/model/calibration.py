@@ -384,7 +384,7 @@ class Calibration:
         self._relied: tuple[bool, frozenset[int]] | None = None  # see `unproven`
 
     def __getstate__(self) -> dict[str, Any]:
-        worked_out = {
+        worked_out: dict[str, Any] = {
             "_assessed": {},
             "_claimed": {},
             "_least": {},
