@@ -33,7 +33,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EVIDENCE, SUMMABLE
+from relgym.config.constants import CHANGED, EVIDENCE, SUMMABLE
 
 __all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
 
@@ -64,9 +64,6 @@ PRIOR: Final = 1.0
 
 COVERED: Final = 0.95
 """Share of what comes that intervals are to hold."""
-
-_OUTSIDE, _HELD = math.log2(5.0), math.log2((1.0 - 5.0 * (1.0 - COVERED)) / COVERED)
-"""Bits by which what lies outside of its interval, or in it, speaks for five times as many outside."""
 
 ENOUGH: Final = 19
 """Fewest errors that can tell such an interval: the largest of them does then."""
@@ -661,7 +658,7 @@ class Calibration:
         of sqrt(n / `MEMORY`) is learned from: what is learned goes on becoming better, as if there were
         1.5 sqrt(n `MEMORY`) of them in all, at a cost that falls. Where intervals hold less often than they are to, by
         `EVIDENCE` bits, the world isn't what it was, and all is learned from (cumulative sums: Page 1954; the
-        alternative is that five times as many lie outside).
+        alternative is that `CHANGED` times as many lie outside).
 
         Parameters
         ----------
@@ -674,7 +671,8 @@ class Calibration:
         if cell is None:
             return 1
         cell.steady += 1
-        cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)
+        likelihood = (1.0 - CHANGED * (1.0 - COVERED)) / COVERED if held else CHANGED
+        cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
         if cell.doubt < EVIDENCE and cell.passed + 1 < math.isqrt(cell.steady // MEMORY):
             self.trials += 1
             cell.passed += 1

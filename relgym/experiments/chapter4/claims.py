@@ -1015,12 +1015,13 @@ CLAIMS: Final = (
 def plan(protocol: Protocol) -> Plan:
     """The thesis' two presets on all experiments, roll-outs, transfer, box pushing and the scenes; and baselines.
 
-    Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces. Experiment 3, whose
-    trainings are the longest, and the baselines, whose tests are, in five batches and three at most.
+    Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces. Noise and experiment 3,
+    of which there are most and the longest trainings, in five batches at most, baselines, whose tests take long, in three.
     """
     protocol = replace(
         protocol,
         test_episodes=WHOLE_TEST,
+        noise_batches=min(protocol.noise_batches, 5),
         long_batches=min(protocol.long_batches, 5),
         comparison_batches=min(protocol.comparison_batches, 3),
     )

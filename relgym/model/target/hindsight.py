@@ -40,9 +40,6 @@ __all__ = [
 WRONG = 1e-9
 """A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
 
-FAR = 4.0
-"""What is off by so many times what 95 % are is news, and never left out: of normal errors that is eight deviations."""
-
 WINDOW, LEAST = 200, 50
 """So many of the latest steps are remembered; fewer than `LEAST` say nothing."""
 
@@ -216,10 +213,10 @@ class _Look:
         return True
 
     def _passed(self, part: Prediction, residual: float, key: Key, model: PropertyModel) -> bool:
-        """`repeats` of what is only roughly right: of what its interval, or a wider one, tells."""
+        """`repeats` of what is only roughly right; far outside of its interval lies news, which is never left out."""
         if not self._parts.config.downsampling:
             return False
-        if not abs(residual) <= FAR * part.interval:
+        if not abs(residual) <= STDS * part.interval:
             self._stands = 1
             return False
         self._stands = model.calibration.thin(key, held=abs(residual) <= part.interval)
