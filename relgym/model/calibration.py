@@ -378,25 +378,16 @@ class Calibration:
         self._everyone = tuple(range(self.experts))
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
         self._united: _Cell | None = None  # see `_whole`
-        self._relied: tuple[bool, frozenset[int]] | None = None  # see `unproven`
 
     def __getstate__(self) -> dict[str, Any]:
-        worked_out: dict[str, Any] = {
-            "_assessed": {},
-            "_claimed": {},
-            "_least": {},
-            "_kinds": {},
-            "_united": None,
-            "_relied": None,
-        }
-        return self.__dict__ | worked_out
+        return self.__dict__ | {"_assessed": {}, "_claimed": {}, "_least": {}, "_kinds": {}, "_united": None}
 
     def _changed(self, *, cells: bool = True) -> None:
         """What was worked out from the cells is out of date; of which kinds there are, too, if cells came or went."""
         self._assessed.clear()
         self._claimed.clear()
         self._least.clear()
-        self._united = self._relied = None
+        self._united = None
         if cells:
             self._kinds.clear()
 
@@ -679,14 +670,6 @@ class Calibration:
             return 0
         weight, cell.passed = cell.passed + 1, 0
         return weight
-
-    def unproven(self, modes: Sequence[int]) -> bool:
-        """Whether regressions gave many values, and some mode hasn't predicted any yet."""
-        if self._relied is None:
-            kinds = [(k, c) for k, c in self._cells.items() if k.lead >= 0]
-            relied = any(c.speaker in (LINEAR, PRODUCTS) and c.heard >= FEW for _, c in kinds)
-            self._relied = relied, frozenset(k.winner for k, c in kinds if c.heard >= 1.0)
-        return self._relied[0] and not self._relied[1].issuperset(modes)
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""

@@ -1015,8 +1015,9 @@ CLAIMS: Final = (
 def plan(protocol: Protocol) -> Plan:
     """The thesis' two presets on all experiments, roll-outs, transfer, box pushing and the scenes; and baselines.
 
-    Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces. Noise and experiment 3,
-    of which there are most and the longest trainings, in five batches at most, baselines, whose tests take long, in three.
+    Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces. Noise, of which there
+    is most, and experiment 3, whose trainings are the longest, in five batches at most; baselines, whose tests take
+    long, in three.
     """
     protocol = replace(
         protocol,

@@ -20,7 +20,7 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
 from relgym.config.constants import HOPELESS, SEARCHED_CELLS
-from relgym.model.calibration import EXPERTS, OWN, Assessment, Calibration, Key
+from relgym.model.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
 from relgym.model.grouping import distinct, members
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import OUTCOMES, Outcome, Prediction
@@ -478,13 +478,13 @@ class PropertyModel:
 
     @property
     def rough(self) -> bool:
-        """Whether so much is unexplained, explained only roughly, or told wrongly, that regressions may know better.
+        """Whether so much is unexplained, or explained only roughly, that regressions may know better.
 
-        And as long as some mode never spoke where they did before.
+        So they may where nothing tells which mode holds, though half of what a record remembers came.
         """
-        if self._unsettled or self.fallback.guessable or self.undecided:
+        if self._unsettled or self.fallback.guessable:
             return True
-        return self.calibration.unproven(self.classifier.modes)
+        return self.undecided and 2 * self.calibration.trials >= MEMORY
 
     @property
     def lost(self) -> bool:
