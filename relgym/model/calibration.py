@@ -464,9 +464,7 @@ class Calibration:
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-        elif not self._cells or (
-            OWN in able and _Record().share(_mean(family, OWN), bits) > self.probability
-        ):
+        elif not self._cells or (OWN in able and self._vouches(family, bits)):
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
@@ -487,6 +485,16 @@ class Calibration:
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
+
+    def _vouches(self, family: _Cell | None, bits: float) -> bool:
+        """Whether modes, or laws, were right often enough for a new one to have the word, and hardly left more than is.
+
+        Of a flag that seldom changes nearly all that they say is right, and of its changes next to nothing.
+        """
+        if not _Record().share(_mean(family, OWN), bits) > self.probability:
+            return False
+        left = self._whole().left(OWN)
+        return math.isinf(left) or left <= LEAVE * LEAVE
 
     def _whole(self) -> _Cell:
         """What all cells know together."""
