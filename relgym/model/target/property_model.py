@@ -349,7 +349,7 @@ class PropertyModel:
         self.casting = Casting(self._base, self.config.classification)
         self.functions = ModeFunctions(self.clusterer, self.casting, self.config)
         self.fallback.guesses.drop()
-        self.hindsight = Hindsight()  # what follows is another model's word
+        self.hindsight, self._unsettled = Hindsight(), True  # what follows is another model's word
         self.calibration.forget()
         self.candidates.forget()
         self._follow(table)
