@@ -37,10 +37,6 @@ EVIDENCE: Final = 10.0
 TIE_BITS: Final = 1e-6
 """Difference in bits that decides nothing: sums of some thousand logarithms are rounded by less."""
 
-CHANGED: Final = 5.0
-"""So many times more than are to may lie outside of their intervals where a world changed: one in four instead of one
-in twenty. Less tells a change from chance only after long; more is missed where a change is small."""
-
 STDS: Final = 4.0
 """Standard deviations within which an error is noise: a normal one is beyond them once in 16,000 times."""
 

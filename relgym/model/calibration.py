@@ -33,7 +33,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CHANGED, EVIDENCE, SUMMABLE
+from relgym.config.constants import EVIDENCE, SUMMABLE
 
 __all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
 
@@ -657,7 +657,7 @@ class Calibration:
         of sqrt(n / `MEMORY`) is learned from: what is learned goes on becoming better, as if there were
         1.5 sqrt(n `MEMORY`) of them in all, at a cost that falls. Where intervals hold less often than they are to, by
         `EVIDENCE` bits, the world isn't what it was, and all is learned from (cumulative sums: Page 1954; the
-        alternative is that `CHANGED` times as many lie outside).
+        alternative is that four to five times as many lie outside).
 
         Parameters
         ----------
@@ -670,7 +670,8 @@ class Calibration:
         if cell is None:
             return 1
         cell.steady += 1
-        likelihood = (1.0 - CHANGED * (1.0 - COVERED)) / COVERED if held else CHANGED
+        missed = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
+        likelihood = (1.0 - missed) / COVERED if held else missed / (1.0 - COVERED)
         cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
         if cell.doubt < EVIDENCE and cell.passed + 1 < math.isqrt(cell.steady // MEMORY):
             self.trials += 1
