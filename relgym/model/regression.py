@@ -164,9 +164,7 @@ class Regression:
             for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
                 found[:, k, : len(ridge.weights)] = ridge.predict(columns)
                 leverage[:, k] = ridge.leverage(columns)
-        least, most = self._range
-        slack = BEYOND * (most - least)
-        return np.clip(found, least - slack, most + slack), leverage
+        return np.clip(found, *self._bounds()), leverage
 
     def _share(self, kind: int, leverage: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far a regression's word counts, at leverages ``(n,)``, for each target, shape ``(n, targets)``."""
@@ -202,9 +200,8 @@ class Regression:
         if not self._ridges or target not in self.targets:
             return None
         k = self.targets.index(target)
-        least, most = self._range[:, k].tolist()
-        slack = BEYOND * (most - least)
-        return tuple(tuple(r.weights[k].tolist()) for r in self._ridges), (least - slack, most + slack)
+        least, most = self._bounds()[:, k].tolist()
+        return tuple(tuple(r.weights[k].tolist()) for r in self._ridges), (least, most)
 
     @property
     def trusted(self) -> NDArray[np.float64]:
@@ -220,9 +217,21 @@ class Regression:
         return found
 
     @property
-    def solved(self) -> tuple[tuple[object, ...], tuple[object, ...]]:
-        """What `fit` and `sums` tell: arrays that are replaced when it changes, and what is compared by value."""
-        return tuple(r.weights for r in self._ridges), (len(self.targets), self._range.tobytes())
+    def reach(self) -> NDArray[np.float64]:
+        """Bounds of each target's changes, then what `trusted` says: what changes often, shape ``(targets, k)``."""
+        known = self.trusted
+        return np.concatenate([self._bounds().T, known.reshape(len(known), -1)], axis=1)
+
+    def _bounds(self) -> NDArray[np.float64]:
+        """How far changes go, shape ``(2, targets)``: beyond what was seen by `BEYOND` of its range."""
+        least, most = self._range
+        slack = BEYOND * (most - least)
+        return np.stack([least - slack, most + slack])
+
+    @property
+    def solved(self) -> tuple[tuple[object, ...], int]:
+        """Arrays that are replaced when weights, or what leverage follows from, change, and the number of targets."""
+        return tuple(r.weights for r in self._ridges), len(self.targets)
 
     def _text(self, kind: int) -> str:
         """The packed spread of a regression, worked out once."""

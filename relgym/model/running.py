@@ -226,12 +226,12 @@ class Runner:
     def _lay(self, tape: Tape) -> None:
         """Take note of where what changes often stands in the tape that is run, and write what holds now."""
         self._places, self._latest = tape.votes, tape.latest
-        self._regressions = self._trusted_at(tape.trusted)
+        self._regressions = self._reaches_at(tape.reaches)
         self._votes = [None for places, _ in tape.votes for _ in places]
         self.follow()
 
     def follow(self) -> None:
-        """Write what changes often into the program: votes, the mode that held last, how far regressions are trusted.
+        """Write what changes often into the program: votes, the mode that held last, how far regressions reach.
 
         All else that it says is as it was. How right its predictions are is written anew when somebody asks for many.
         """
@@ -253,11 +253,10 @@ class Runner:
                 model = teller.model
                 code[place] = modes.get(model.latest, 0) if model.asks_latest else 0
         for regression, targets, where in self._regressions:
-            known = regression.trusted
-            self._space["numbers"][0, where] = known.reshape(len(known), -1)[targets]
+            self._space["numbers"][0, where] = regression.reach[targets]
 
-    def _trusted_at(self, places: Sequence[int]) -> list[tuple[Regression, list[int], NDArray[np.intp]]]:
-        """Regressions, targets of theirs that are asked, and where on the tape it stands how far these are trusted."""
+    def _reaches_at(self, places: Sequence[int]) -> list[tuple[Regression, list[int], NDArray[np.intp]]]:
+        """Regressions, targets of theirs that are asked, and where on the tape it stands how far these reach."""
         found: dict[str, tuple[list[int], list[int]]] = {}
         for teller, place in zip(self._tellers, places, strict=True):
             if place >= 0:
@@ -267,7 +266,7 @@ class Runner:
                 starts.append(place)
         known = [(self._parts.regressions[name], *each) for name, each in found.items()]
         return [
-            (r, targets, np.array(starts)[:, None] + np.arange(3 * r.trusted.shape[1]))
+            (r, targets, np.array(starts)[:, None] + np.arange(r.reach.shape[1]))
             for r, targets, starts in known
         ]
 

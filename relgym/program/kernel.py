@@ -1631,10 +1631,10 @@ def regress(s, record, k):
     fit = s.code[record]
     look_at(s, fit)
     width, kinds = s.code[fit], s.code[fit + 3]
-    present, bounds, trusted = s.x[s.code[record + 1]], s.code[record + 2], s.code[record + 3]
-    low, high, whole, linear = s.numbers[bounds], s.numbers[bounds + 1], 0.0, math.nan
+    present, reach = s.x[s.code[record + 1]], s.code[record + 2]
+    low, high, whole, linear = s.numbers[reach], s.numbers[reach + 1], 0.0, math.nan
     for kind in range(kinds):
-        weights = s.code[record + 4 + kind]
+        weights = s.code[record + 3 + kind]
         if kind:
             width += width * (width + 1) // 2
         word = s.numbers[weights]
@@ -1645,7 +1645,7 @@ def regress(s, record, k):
         if kind == 0:
             linear = word
         if math.isfinite(word):
-            at = trusted + 3 * kind
+            at = reach + 2 + 3 * kind
             bias, left, far = s.numbers[at], s.numbers[at + 1], s.leverage[kind] + s.numbers[at + 2]
             more = left * ((2.0 + far) * far) if left > 0.0 else 0.0
             share = bias / (bias + more) if bias > 0.0 else 0.0

@@ -144,8 +144,9 @@ class Tape:
         modes stand in the order in which they win ties.
     latest
         Of every answer, where in the code it stands which mode held last, and where each mode stands.
-    trusted
-        Of every answer, where among the numbers it stands how far regressions are trusted; -1: there are none.
+    reaches
+        Of every answer, where among the numbers bounds of regressions' changes stand, and how far they are trusted; -1:
+        there are none.
     """
 
     code: NDArray[np.int64]
@@ -153,7 +154,7 @@ class Tape:
     roles: int
     votes: tuple[tuple[tuple[int, ...], int], ...] = ()
     latest: tuple[tuple[int, dict[int, int]], ...] = ()
-    trusted: tuple[int, ...] = ()
+    reaches: tuple[int, ...] = ()
 
     def space(self) -> NDArray[np.void]:
         """A work space with the tape in it, shape ``(1,)``."""
@@ -214,7 +215,7 @@ class _Writer:
         self.reads: set[int] = set()
         self.votes: list[tuple[tuple[int, ...], int]] = []
         self.latest: list[tuple[int, dict[int, int]]] = []
-        self.trusted: list[int] = []
+        self.reaches: list[int] = []
         self.fits: list[int] = []
         self.shown = 0
 
@@ -268,7 +269,7 @@ class _Writer:
             self.roles,
             tuple(self.votes),
             tuple(self.latest),
-            tuple(self.trusted),
+            tuple(self.reaches),
         )
 
     def _note_nexts(self) -> None:
@@ -532,15 +533,16 @@ class _Writer:
         return self.put(d, columns, at, len(reach), *reach)
 
     def _regression(self, r: ir.Regression | None) -> int:
-        """What it looks at, the present value's column, where bounds and weights stand, and how far it is trusted."""
+        """What it looks at, the present value's column, where bounds stand and how far it is trusted, and weights."""
         if r is None:
-            self.trusted.append(-1)
+            self.reaches.append(-1)
             return 0
-        bounds = self.num(r.least, r.most)
         weights = [self.num(*row) for row in r.weights]
-        trusted = self.num(*(v for each in r.trusted for v in (each.bias, each.left, each.least)))
-        self.trusted.append(trusted)
-        return self.put(self.fits[r.fit], *self.col(r.present), bounds, trusted, *weights)
+        reach = self.num(
+            r.least, r.most, *(v for each in r.trusted for v in (each.bias, each.left, each.least))
+        )
+        self.reaches.append(reach)
+        return self.put(self.fits[r.fit], *self.col(r.present), reach, *weights)
 
     def _feature(self, feature: ir.Feature) -> int:
         kinds = {"": 0, "sin": 1, "cos": 2}

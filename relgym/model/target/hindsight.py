@@ -179,9 +179,8 @@ class _Look:
         # Who says how large the noise is takes it for granted.
         self._least = WRONG if isinstance(noise, str) else max(WRONG, config.clustering.inlier_stds * noise)
         self._off: set[tuple[str, str]] = set()
-        self._times = self._stands = (
-            0  # predictions that came true, or as such ones do, that this one counts for
-        )
+        # How many predictions that came true, or that came out as such ones do, the present one counts for.
+        self._times = self._stands = 0
         self.counts: dict[Target, list[int]] = {}
         self.confirmed: dict[tuple[str, str], Confirmed] = {}
         self.counted = True
