@@ -1023,15 +1023,14 @@ _NOISE: Final = (
 def plan(protocol: Protocol) -> Plan:
     """The thesis' two presets on all experiments, roll-outs, transfer, box pushing and the scenes; and baselines.
 
-    Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces. Noise, of which there
-    is most, and experiment 3, whose trainings are the longest, in five batches at most; baselines, whose tests take
-    long, in three.
+    Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces. Experiment 3, whose
+    trainings are the longest, noise, of which there is most, and baselines, whose tests take long, in three batches at most.
     """
     protocol = replace(
         protocol,
         test_episodes=WHOLE_TEST,
-        noise_batches=min(protocol.noise_batches, 5),
-        long_batches=min(protocol.long_batches, 5),
+        noise_batches=min(protocol.noise_batches, 3),
+        long_batches=min(protocol.long_batches, 3),
         comparison_batches=min(protocol.comparison_batches, 3),
     )
     presets = ("original", "thesis")
