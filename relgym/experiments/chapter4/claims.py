@@ -1024,7 +1024,7 @@ def plan(protocol: Protocol) -> Plan:
     """The thesis' two presets on all experiments, roll-outs, transfer, box pushing and the scenes; and baselines.
 
     Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces. Experiment 3, whose
-    trainings are the longest, noise, of which there is most, and baselines, whose tests take long, in three batches at most.
+    trainings are the longest, noise, of which there is most, and baselines, whose tests take long, in three batches.
     """
     protocol = replace(
         protocol,
