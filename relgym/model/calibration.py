@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.constants import EVIDENCE, SUMMABLE
+from relgym.mixing import mixed_one
 
 __all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
 
@@ -673,7 +674,11 @@ class Calibration:
         missed = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
         likelihood = (1.0 - missed) / COVERED if held else missed / (1.0 - COVERED)
         cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
-        if cell.doubt < EVIDENCE and cell.passed + 1 < math.isqrt(cell.steady // MEMORY):
+        if cell.doubt == 2.0 * EVIDENCE:  # the longer, the more of those before were of another world
+            cell.steady -= cell.steady // FEW
+        # Drawn, not counted off: objects of a type come in an order, and none is to be left out.
+        drawn = mixed_one(cell.steady) % max(math.isqrt(cell.steady // MEMORY), 1) == 0
+        if cell.doubt < EVIDENCE and not drawn:
             self.trials += 1
             cell.passed += 1
             return 0

@@ -137,7 +137,7 @@ def _nothing_waits(parts: Parts) -> bool:
     """Whether nothing is under way, and nothing will be before something is learned."""
     if parts.looks or parts.inquiry is not None or parts.agenda.waiting:
         return False
-    return not any(parts.models[target].waits for target in parts.targets)
+    return not any(parts.models[target].waits for target in parts.targets if not parts.governs(target))
 
 
 def _go_on(parts: Parts, budget: Budget) -> None:
@@ -205,10 +205,10 @@ def _learn_object(
     weights: dict[str, int] = {}
     moved = False
     for target, model in parts.by_type[type_name]:
-        one, before = confirmed.get((name, target.property)), model.latest
+        one, before, asked = confirmed.get((name, target.property)), model.latest, model.asks_latest
         if one is None or one.weight or not model.take_for_known(one.mode):
             weights[target.property] = 1 if one is None else max(one.weight, 1)
-        moved |= model.latest != before and model.asks_latest
+        moved |= model.latest != before and (asked or model.asks_latest)
     if not weights:
         return moved
     situation = percept.situation(index)

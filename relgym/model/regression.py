@@ -201,7 +201,10 @@ class Regression:
             return None
         k = self.targets.index(target)
         least, most = self._bounds()[:, k].tolist()
-        return tuple(tuple(r.weights[k].tolist()) for r in self._ridges), (least, most)
+        weights = (  # a file may know those of some targets alone
+            r.weights[k].tolist() if k < len(r.weights) else [np.nan] * (r.columns + 1) for r in self._ridges
+        )
+        return tuple(map(tuple, weights)), (least, most)
 
     @property
     def trusted(self) -> NDArray[np.float64]:

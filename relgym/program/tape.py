@@ -217,6 +217,7 @@ class _Writer:
         self.latest: list[tuple[int, dict[int, int]]] = []
         self.reaches: list[int] = []
         self.fits: list[int] = []
+        self.spreads: dict[ir.Leverage, int] = {}
         self.shown = 0
 
     def put(self, *values: int) -> int:
@@ -525,11 +526,15 @@ class _Writer:
         reach = []
         for one in fit.leverage:
             width = len(one.mean)
+            self.shown = max(self.shown, width)
+            if one in self.spreads:  # other objects of the type have the same
+                reach.append(self.spreads[one])
+                continue
             entries = np.frombuffer(b64decode(one.spread), dtype="<f4").astype(np.float64)
             first, second = np.triu_indices(width)
             doubled = np.where(first == second, entries, 2.0 * entries)
             reach.append(self.num(*one.mean, *doubled.tolist()))
-            self.shown = max(self.shown, width)
+            self.spreads[one] = reach[-1]
         return self.put(d, columns, at, len(reach), *reach)
 
     def _regression(self, r: ir.Regression | None) -> int:

@@ -21,7 +21,6 @@ from relgym.model.prediction import Prediction, ScenePrediction
 
 if TYPE_CHECKING:
     from relgym.model.parts import Answer, Parts
-    from relgym.model.target.property_model import PropertyModel
     from relgym.scene.objects import Target
 
 __all__ = [
@@ -196,7 +195,7 @@ class _Look:
             return False
         lawful = self._parts.governs(target)
         if not lawful and model.coarse:
-            return self._passed(part, residual, record.key, model)
+            return self._passed(part, residual, answer, record.key)
         if not part.ok or not part.mode or record.speaker != OWN:
             return False
         within = self._rounding(part.value + residual) if lawful else model.clusterer.scale.tolerance
@@ -211,16 +210,30 @@ class _Look:
             self.counts.setdefault(target, [0, 0])[0] += 1
         return True
 
-    def _passed(self, part: Prediction, residual: float, key: Key, model: PropertyModel) -> bool:
-        """`repeats` of what is only roughly right; far outside of its interval lies news, which is never left out."""
+    def _passed(self, part: Prediction, residual: float, answer: Answer, key: Key) -> bool:
+        """`repeats` of what is only roughly right.
+
+        What lies far outside of its interval is news, which is learned from in any case; how right such predictions are
+        is learned from the same share of those as of others.
+        """
         if not self._parts.config.downsampling:
             return False
-        if not abs(residual) <= STDS * part.interval:
+        if not part.interval == part.interval:
             self._stands = 1
             return False
-        self._stands = model.calibration.thin(key, held=abs(residual) <= part.interval)
-        self.confirmed[part.object, part.property] = Confirmed(NOISE, self._stands)
-        return self._stands == 0
+        weight = self._stands = answer.model.calibration.thin(key, held=abs(residual) <= part.interval)
+        if abs(residual) <= STDS * part.interval:
+            self.confirmed[part.object, part.property] = Confirmed(NOISE, weight)
+        elif not weight:
+            self.counted = False
+        if not weight:
+            self._note(answer, residual, max(self._rounding(part.value + residual), self._least))
+        return weight == 0
+
+    def _note(self, answer: Answer, residual: float, rounding: float) -> None:
+        """Take note of what was off: predictions that rest on it aren't to blame."""
+        if not abs(residual) <= rounding:
+            self._off.add((answer.target.type, answer.target.property))
 
     def compare(self, part: Prediction, residual: float, answer: Answer) -> None:
         """Take in how far a prediction was off, and who would have known better."""
@@ -241,8 +254,7 @@ class _Look:
                 times=self._times,
                 stands=self._stands,
             )
-        if not abs(residual) <= rounding:
-            self._off.add((target.type, target.property))
+        self._note(answer, residual, rounding)
         if not part.mode or self._parts.governs(target) or self._misled(answer):
             return
         spread = STDS * part.spread if part.spread == part.spread else 0.0
