@@ -260,3 +260,35 @@ def test_models_of_what_is_roughly_known_are_hardly_worse_for_it() -> None:
         off = [model.predict_one(s.before).scene["a"]["v"] - s.after["a"]["v"] for s in fresh]
         left.append(float(np.sqrt(np.mean(np.square(off)))))
     assert left[0] < 1.05 * left[1]
+
+
+def test_what_rests_on_something_rough_that_was_left_out_is_not_to_blame() -> None:
+    ball, action = ObjectType("ball", ("v", "p")), ObjectType("action", ("u", "reset"))
+    given = Target("ball", "p", (("ball", "v"),))
+    schema = SceneSchema(
+        (ball, action), (("b", "ball"), ("action", "action")), targets=(Target("ball", "v"), given)
+    )
+    model, rng = WorldModel(schema), np.random.default_rng(0)
+    v, p, left_out = 0.3, 0.0, 0
+    for _ in range(5_200):
+        u, reset = rng.uniform(-1.0, 1.0), float(rng.random() < 0.1)
+        later = 0.8 * v + 0.4 * u + 3e-3 * rng.normal()
+        place = 0.0 if reset else p + later
+        before = schema.scene({"b": [v, p], "action": [u, reset]})
+        step = Transition(before, schema.scene({"b": [later, place], "action": [u, reset]}))
+        (report,) = learned(model, [step])
+        left_out += report.learned is not None and ("b", "v") not in report.learned.parts
+        v, p = later, place
+    assert left_out > 200
+    assert not model.property_model("ball", "p").undecided
+
+
+def test_weights_of_a_regression_that_are_missing_say_nothing() -> None:
+    model = WorldModel(BOX, targets=[Target("cart", "x"), SPEED])
+    learned(model, steps(200))
+    regression = model._parts.regressions["cart"]
+    for ridge in regression._ridges:
+        ridge.weights = ridge.weights[:1]
+    known = regression.sums(regression.targets[1])
+    assert known is not None
+    assert all(np.isnan(row).all() for row in known[0])
