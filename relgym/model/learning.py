@@ -42,7 +42,7 @@ class LearnReport:
     ----------
     parts
         Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice, nor for
-        what came as predicted and isn't learned from, since others stand for it (`Calibration.confirm`).
+        what came as predicted and isn't learned from, since others stand for it (`Calibration.confirm`, `thin`).
     work
         Deterministic units of work spent on re-learning classifiers.
     set_aside
@@ -93,7 +93,7 @@ def learn(
     told
         What was predicted, if somebody asked: it saves looking at what came as it was told.
     confirmed
-        What of it came true, by (object, property), if somebody looked back
+        What of it came out as such predictions do, by (object, property), if somebody looked back
         (`relgym.model.target.hindsight.look_back`).
     """
     before, after = transition.before, transition.after

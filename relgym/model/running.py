@@ -98,9 +98,9 @@ class Programs:
     def one(self, parts: Parts, scene: Scene, percept: Callable[[Scene], Percept]) -> ScenePrediction | None:
         """What the program says of one scene, whose numbers are finite; None: arrays must, or can say why not.
 
-        While the model learns, who gives a value is settled after the program has run. Where others than modes and
-        laws give many of them it can't tell what follows from those, and arrays answer after all: so after each time
-        in vain it rests for twice as many scenes as before, up to `SETTLING`.
+        While the model learns, who gives a value is settled after the program has run. Where laws depend on what isn't
+        known it can't tell, and arrays answer after all: so after each time in vain it rests for twice as many scenes
+        as before, up to `SETTLING`.
         """
         if self._resting and self._looked != self.changes:
             self._resting -= 1

@@ -267,7 +267,7 @@ class WorldModel:
         """`look_back` and `learn_one` in one: what came as predicted is only counted, and offered to what is kept.
 
         Parameters, errors and notes as there. The model is the same as if both had been called, but for what modes
-        predicted and came true: of that some is left out (`ModelConfig.downsampling`).
+        predicted and came true, and what is only roughly known: of that some is left out (`ModelConfig.downsampling`).
         """
         self._check_step(transition)
         numbers = 3 * len(transition.before.vector)

@@ -4,7 +4,8 @@
   many batches, test examples and checkpoints: the thesis' own, or `--fast`.
 - A *task* (`jobs/task.py`) is a function by name and plain arguments, seeds among them. Its key is a digest of both
   and of the code behind the function: every module of relgym that it imports, step by step, without comments and
-  docstrings. Drawing code is not behind what was measured, so a figure can change without a new measurement.
+  docstrings, and without what a task says it runs nothing of (`jobs/code.py`: `LEARNER`). Drawing code is not behind
+  what was measured, so a figure can change without a new measurement.
 - The *store* keeps one file per key, checksummed and written atomically. A run computes what is missing; a kill costs
   the tasks that were running. Several jobs share tasks: tables 4.2 to 4.8 rest on the same trainings.
 - Errors are pooled as histograms over twenty bins a decade, so that quantiles over 50 batches need no list of all.
