@@ -1013,19 +1013,19 @@ CLAIMS: Final = (
 
 
 _NOISE: Final = (
-    *((expected, true) for expected in (1e-15, 1e-10) for true in (1e-15, 1e-10, 1e-8, 1e-5)),
-    *((1e-8, true) for true in (1e-20, 1e-10, 1e-5)),
+    *((expected, true) for expected in (1e-15, 1e-10) for true in (1e-15, 1e-10)),
+    *((1e-8, true) for true in (1e-20, 1e-10)),
     (1e-5, 1e-15),
 )
-"""Variances, expected and true, that claims speak of."""
+"""Variances, expected and true, that are measured of those that claims speak of: where there is far more noise than is
+expected, nothing is ever explained, and a training takes seven minutes."""
 
 
 def plan(protocol: Protocol) -> Plan:
     """The thesis' two presets on all experiments, roll-outs, transfer, box pushing and the scenes; and baselines.
 
     Always tested on all 24,000 examples: in a tenth of them there are some twenty floor bounces. Experiment 3, whose
-    trainings are the longest, and baselines, whose tests take long, in three batches at most; noise in one, since where
-    more of it is expected than there is, or less, a training takes minutes.
+    trainings are the longest, and baselines, whose tests take long, in three batches at most, noise in one.
     """
     protocol = replace(
         protocol,
