@@ -1,7 +1,7 @@
 """What a program was lowered from: as long as a model holds the same, its program says what the model says.
 
 Most transitions change what is counted, not what is said: a program is lowered anew only when something else is read
-than before. Votes do change with every example, as do the mode that held last and how far regressions are trusted; they
+than before. Votes do change with every example, as do the mode that held last and how far regressions reach; they
 are no reason to lower, but written into the program that there is (`relgym.model.running.Runner.follow`).
 """
 

@@ -205,9 +205,14 @@ def _learn_object(
     weights: dict[str, int] = {}
     moved = False
     for target, model in parts.by_type[type_name]:
-        one, before, asked = confirmed.get((name, target.property)), model.latest, model.asks_latest
-        if one is None or one.weight or not model.take_for_known(one.mode):
-            weights[target.property] = 1 if one is None else max(one.weight, 1)
+        one = confirmed.get((name, target.property))
+        if one is None or one.weight:
+            weights[target.property] = 1 if one is None else one.weight
+            continue
+        before = model.latest
+        asked = before != one.mode and model.asks_latest
+        if not model.take_for_known(one.mode):
+            weights[target.property] = 1
         moved |= model.latest != before and (asked or model.asks_latest)
     if not weights:
         return moved

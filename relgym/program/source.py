@@ -549,6 +549,8 @@ class _Source:
             "# -2: of all other modes), and whose values there are (bits of EXPERTS): who speaks, and how sure that is"
         )
         add(f"EXPERTS = {ir.EXPERTS!r}")
+        if self.program.fits:
+            add("# what least squares look at: columns with centre and scale; what leverage is worked out from")
         for number, fit in enumerate(self.program.fits):
             self._fit(number, fit)
         for number, a in enumerate(self.program.answers):
@@ -847,11 +849,11 @@ def regressed(x, present, fit, weights, least, most, trusted):
         words = [in_order(np.array([1.0, *shown]) * np.array(row)) for shown, row in zip(both, weights)]
     words = [min(max(word, least), most) if word == word else word for word in words]
     whole = 0.0
-    for word, shown, (mean, text), (bias, left, least) in zip(words, both, reach, trusted):
+    for word, shown, (mean, text), (bias, left, midst) in zip(words, both, reach, trusted):
         off = np.array(shown) - np.array(mean)
         with np.errstate(over="ignore", invalid="ignore"):
             far = in_order(off * np.add.accumulate(spread(text, len(mean)) * off[:, None])[-1])
-        h = (far if far >= 0.0 else math.inf) + least
+        h = (far if far >= 0.0 else math.inf) + midst
         more = left * ((2.0 + h) * h) if left > 0.0 else 0.0
         share = bias / (bias + more) if bias > 0.0 else 0.0
         if math.isfinite(word):

@@ -470,7 +470,9 @@ class _Writer:
         state = ("modes", "lost", "none").index(a.state)
         latest = 0 if a.trust is None else a.trust.latest
         places = {
-            mode.id: at for mode, at in zip(a.modes, modes, strict=True) if mode.function and not mode.roles
+            mode.id: at
+            for mode, at in zip(a.modes, modes, strict=True)
+            if mode.function is not None and not mode.roles
         }
         at = self.put(
             a.column,  # 0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from relgym.config.constants import SUMMABLE
-from relgym.numeric.online_ridge import GROWTH, PENALTY, OnlineRidge, _inverse
+from relgym.numeric.online_ridge import GROWTH, PENALTY, OnlineRidge, _inverse, in_order
 
 
 def rows(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -146,3 +146,16 @@ def test_the_inverse_is_one_whatever_solves_it(columns: int) -> None:
     found = _inverse(matrix)
     assert np.abs(found @ matrix - np.eye(columns)).max(initial=0.0) < 1e-10
     assert (found == _inverse(matrix.copy(order="F"))).all()  # however it lies in memory
+
+
+@pytest.mark.parametrize(
+    "shape", [(1, 1), (5, 1), (300, 1), (1, 7), (9, 2), (300, 3), (130, 129), (1000, 40)]
+)
+def test_sums_in_order_are_those_of_a_loop(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(sum(shape))
+    terms = rng.normal(size=shape) * np.exp(20.0 * rng.normal(size=shape))
+    expected = np.zeros(shape[1])
+    for row in terms:
+        expected = expected + row
+    for laid in (terms, np.asfortranarray(terms)):
+        assert in_order(laid).tobytes() == expected.tobytes()

@@ -1058,7 +1058,7 @@ def plan(protocol: Protocol) -> Plan:
 
 
 def _baselines(protocol: Protocol) -> Plan:
-    """What the thesis compares its program with, of the libraries that are installed."""
+    """What the thesis compares its program with (§4.7)."""
     found: dict[str, Sequence[Any]] = {}
     for names, shown, planned in (
         (("lwr-50", "lwr-25"), ("thesis",), plans.regressions),

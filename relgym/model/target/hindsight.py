@@ -218,7 +218,7 @@ class _Look:
         """
         if not self._parts.config.downsampling:
             return False
-        if not part.interval == part.interval:
+        if math.isnan(part.interval):  # too few came out to tell
             self._stands = 1
             return False
         weight = self._stands = answer.model.calibration.thin(key, held=abs(residual) <= part.interval)
