@@ -550,7 +550,9 @@ class _Source:
         )
         add(f"EXPERTS = {ir.EXPERTS!r}")
         if self.program.fits:
-            add("# what least squares look at: columns with centre and scale; what leverage is worked out from")
+            add(
+                "# what least squares look at: columns with centre and scale; what leverage is worked out from"
+            )
         for number, fit in enumerate(self.program.fits):
             self._fit(number, fit)
         for number, a in enumerate(self.program.answers):
