@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import gymnasium as gym
@@ -109,9 +109,9 @@ class Follower:
         if look.scene is None:
             return look
         try:
-            return replace(look, outcome=self.view.with_outcome(look.scene, reward, terminated))
+            return Look(look.scene, self.view.with_outcome(look.scene, reward, terminated))
         except ObservationError as error:
-            return replace(look, trouble=error)
+            return Look(look.scene, trouble=error)
 
     def check(self, look: Look) -> None:
         """Raise `ObservationError` where a look shows something bad that isn't to be skipped."""

@@ -69,6 +69,13 @@ COVERED: Final = 0.95
 ENOUGH: Final = 19
 """Fewest errors that can tell such an interval: the largest of them does then."""
 
+_LESS: Final = math.sqrt(
+    1.0 - COVERED
+)  # half way, in logarithms, between as many as are to lie outside and all
+_HELD: Final = math.log2((1.0 - _LESS) / COVERED)
+_MISSED: Final = math.log2(_LESS / (1.0 - COVERED))
+"""Bits that an error within its interval, or outside of it, says for intervals' holding less often than they are to."""
+
 OCTAVE: Final = 4
 """Bins of errors' sizes in an octave: an interval is 19 % too wide at most."""
 
@@ -378,14 +385,17 @@ class Calibration:
         )
         self._everyone = tuple(range(self.experts))
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
+        self._verdicts: dict[tuple[Key, tuple[int, ...]], tuple[Assessment, bool]] = {}
         self._united: _Cell | None = None  # see `_whole`
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_assessed": {}, "_claimed": {}, "_least": {}, "_kinds": {}, "_united": None}
+        cached = ("_assessed", "_verdicts", "_claimed", "_least", "_kinds")
+        return self.__dict__ | {name: {} for name in cached} | {"_united": None}
 
     def _changed(self, *, cells: bool = True) -> None:
         """What was worked out from the cells is out of date; of which kinds there are, too, if cells came or went."""
         self._assessed.clear()
+        self._verdicts.clear()
         self._claimed.clear()
         self._least.clear()
         self._united = None
@@ -409,6 +419,14 @@ class Calibration:
     def assess(self, key: Key, values: Sequence[float]) -> Assessment:
         """Who gives the value of a prediction, and how far that can be relied on."""
         return self._known(key, tuple([k for k, value in enumerate(values) if math.isfinite(value)]))
+
+    def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
+        """`assess`, and whether such a prediction `claims`; worked out once between changes."""
+        able = tuple([k for k, value in enumerate(values) if math.isfinite(value)])
+        if (known := self._verdicts.get((key, able))) is None:
+            told = self._known(key, able)
+            known = self._verdicts[key, able] = told, self.claims(key, told)
+        return known
 
     def own_word(self, key: Key) -> Assessment | None:
         """What is made of a prediction if the winner has the word whatever others say; None where that depends."""
@@ -627,9 +645,10 @@ class Calibration:
                 cell.note(audit.speaker, errors, within, many)
             else:
                 cell.count(errors, within, many)
-        cell = self._cells[audit.key]
-        cell.heard += max(many, stands)
-        cell.steady *= times > 0 or stands > 0
+        self._cells[audit.key].heard += max(many, stands)
+        if not (times or stands) and errors[audit.speaker] > rounding:
+            for key in _levels(audit.key)[1:]:
+                self._cells[key].steady = 0
         self._changed(cells=len(self._cells) > known)
 
     def confirm(self, key: Key, share: float) -> int:
@@ -654,11 +673,11 @@ class Calibration:
     def thin(self, key: Key, *, held: bool) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
 
-        The more of a kind there are, the less one more tells. So of n, if these are many times more than `MEMORY`, one
-        of sqrt(n / `MEMORY`) is learned from: what is learned goes on becoming better, as if there were
-        1.5 sqrt(n `MEMORY`) of them in all, at a cost that falls. Where intervals hold less often than they are to, by
-        `EVIDENCE` bits, the world isn't what it was, and all is learned from (cumulative sums: Page 1954; the
-        alternative is that four to five times as many lie outside).
+        The more of a winner there are, the less one more tells: `MEMORY` of them tell what it leaves to 2 %.
+        So of n, one of n / `MEMORY` is learned from: of each twice as many, as many again. Kinds of few trials are
+        learned from in any case. Where intervals hold less often than they are to, by `EVIDENCE` bits, the world isn't
+        what it was, and all is learned from (cumulative sums: Page 1954; the alternative is that four to five times as
+        many lie outside).
 
         Parameters
         ----------
@@ -667,18 +686,18 @@ class Calibration:
         held
             Whether what came lay in its interval.
         """
-        cell = self._cells.get(key)
-        if cell is None:
+        kind = self._cells.get(key)
+        cell = self._cells.get(_winner(key)) if key.winner else kind
+        if cell is None or kind is None:
             return 1
         cell.steady += 1
-        missed = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
-        likelihood = (1.0 - missed) / COVERED if held else missed / (1.0 - COVERED)
-        cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
+        cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _MISSED)), 2.0 * EVIDENCE)
         if cell.doubt == 2.0 * EVIDENCE:  # the longer, the more of those before were of another world
             cell.steady -= cell.steady // FEW
-        # Drawn, not counted off: objects of a type come in an order, and none is to be left out.
-        drawn = mixed_one(cell.steady) % max(math.isqrt(cell.steady // MEMORY), 1) == 0
-        if cell.doubt < EVIDENCE and not drawn:
+        # Drawn, not counted off: objects of a type come in an order, and none is to be left out. By the number of the
+        # prediction, so that one step teaches most targets, and most steps none.
+        drawn = mixed_one(self.trials) * (cell.steady // MEMORY) < 1 << 64
+        if cell.doubt < EVIDENCE and not drawn and kind.squares[PERSISTENCE][0] >= FEW:
             self.trials += 1
             cell.passed += 1
             return 0

@@ -124,11 +124,13 @@ class Parts:
         self._kin: dict[int, SceneSchema] = {}
         self._known: dict[int, SceneLayout] = {}
         self._answers: dict[int, tuple[SceneLayout, dict[tuple[str, str], Answer]]] = {}
+        self._undiscovered: dict[int, tuple[SceneLayout, list[tuple[Target, int, int]]]] = {}
         for target in targets or ():
             self.add_target(target)
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_kin": {}, "_known": {}, "_answers": {}}  # keyed by identity, no copy's
+        by_identity = ("_kin", "_known", "_answers", "_undiscovered")  # a copy's objects are others
+        return self.__dict__ | {name: {} for name in by_identity}
 
     def admits(self, scene: object) -> bool:
         """Whether a scene is known to follow the schema and holds finite numbers; sizes aren't asked."""
@@ -236,24 +238,38 @@ class Parts:
 
         What the task says is asked for, and a target at once: of ends, that most steps are none is half the story.
         """
-        layout, way = before.layout, passage(before.layout, after.layout)
-        known = {(t.type, t.property) for t in self.targets}
-        known |= {(k.type, k.property) for k in self.schema.kinematics}
+        layout = before.layout
+        if not (still := self._still(layout)):
+            return
+        stays = passage(layout, after.layout).stays
         changed = before.vector != next_values(before, after)
-        found: list[Target] = []
-        for i, t in enumerate(layout.types):
-            if t.name == ACTION or not way.stays[i]:
-                continue
-            start = layout.offsets[i]
-            for k, prop in enumerate(t.properties):
-                if (t.name, prop) in known or not (changed[start + k] or t.name == TASK):
-                    continue
-                if prop not in t.exogenous:
-                    found.append(Target(t.name, prop))
-                    known.add((t.name, prop))
+        found = dict.fromkeys(
+            target
+            for target, index, column in still
+            if stays[index] and (changed[column] or target.type == TASK)
+        )
         check_number(len(self.targets) + len(found))
         for target in found:
             self.add_target(target)
+
+    def _still(self, layout: SceneLayout) -> list[tuple[Target, int, int]]:
+        """What may become a target, the object and the column of each; cached until there is another target."""
+        known = self._undiscovered.get(id(layout))
+        if known is not None and known[0] is layout:
+            return known[1]
+        taken = {(t.type, t.property) for t in self.targets}
+        taken |= {(k.type, k.property) for k in self.schema.kinematics}
+        found = [
+            (Target(t.name, prop), index, layout.offsets[index] + k)
+            for index, t in enumerate(layout.types)
+            if t.name != ACTION
+            for k, prop in enumerate(t.properties)
+            if (t.name, prop) not in taken and prop not in t.exogenous
+        ]
+        if len(self._undiscovered) >= MOST_LAYOUTS:
+            self._undiscovered.clear()
+        self._undiscovered[id(layout)] = layout, found
+        return found
 
     def retarget(self, target: Target, other: Target) -> None:
         """Put another target of the same property in a target's place; it begins anew, order included."""
@@ -284,6 +300,7 @@ class Parts:
         types = dict.fromkeys(t.type for t in targets)
         self.by_type = {name: tuple((t, self.models[t]) for t in targets if t.type == name) for name in types}
         self._answers.clear()
+        self._undiscovered.clear()
         read = {pair for t in targets if t.type != TASK for pair in t.given}
         for target, model in self.models.items():
             model.leaned_on = (target.type, target.property) in read

@@ -95,18 +95,24 @@ class Outcomes:
     @classmethod
     def of(cls, prediction: ScenePrediction, before: Scene, residuals: Mapping[Key, float]) -> Outcomes:
         """What became of a prediction; `residuals` are those of `compared`."""
-        told = [p for p in prediction.parts if (p.object, p.property) in residuals]
-        parts = tuple((p.object, p.property) for p in told)
-        off = tuple([residuals[key] for key in parts])
-        # Observed minus predicted plus predicted minus before; a turn is measured the short way, as its residual is.
-        places = before.layout.places
-        columns = [places[key] for key in parts]
-        moved = [p.value - was for p, was in zip(told, before.vector[columns].tolist(), strict=True)]
-        for k, column in enumerate(columns):
-            if column in before.layout.angles:
-                moved[k] = math.remainder(moved[k], 2.0 * math.pi)
-        changes = tuple([a + b for a, b in zip(off, moved, strict=True)])
-        return cls(parts, off, changes, tuple([p.ok for p in told]), tuple([p.spread for p in told]))
+        places, angles, vector = before.layout.places, before.layout.angles, before.vector
+        parts, offs, changes, claimed, spreads = list[Key](), [], [], [], []
+        for part in prediction.parts:
+            key = part.object, part.property
+            off = residuals.get(key)
+            if off is None:
+                continue
+            column = places[key]
+            # Observed minus predicted plus predicted minus before; a turn is measured the short way, as its residual.
+            moved = part.value - float(vector[column])
+            if column in angles:
+                moved = math.remainder(moved, 2.0 * math.pi)
+            parts.append(key)
+            offs.append(off)
+            changes.append(off + moved)
+            claimed.append(part.ok)
+            spreads.append(part.spread)
+        return cls(tuple(parts), tuple(offs), tuple(changes), tuple(claimed), tuple(spreads))
 
 
 class Prequential:

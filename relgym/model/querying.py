@@ -72,7 +72,9 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
     motion = None if parts.laws is None else parts.laws.speak(percept)
     for target in parts.targets:
         for index in layout.of_type(target.type):
+            lawful = False
             if motion is not None and parts.laws is not None and parts.laws.governs(target):
+                lawful = True
                 one = parts.laws.prediction(motion, percept, index, target)
             else:
                 one = parts.models[target].predict_one(percept, index, following)
@@ -83,7 +85,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
                 one = replace(one, outcome=outcome, mode=0, spread=np.nan)
-            one = settled(parts, target, percept, index, following, one)
+            one = settled(parts, target, percept, index, following, one, lawful=lawful)
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
@@ -101,6 +103,8 @@ def settled(
     following: NDArray[np.float64],
     one: Prediction | Said,
     values: tuple[float, ...] | None = None,
+    *,
+    lawful: bool,
 ) -> Prediction:
     """A prediction with the value of who codes such ones best, how right that will be, and what it is of.
 
@@ -114,24 +118,24 @@ def settled(
         What modes or laws say; its value is NaN where they say nothing.
     values
         What all experts say, if that is known already.
+    lawful
+        Whether laws say it (`Parts.governs`).
     """
     model = parts.models[target]
-    lawful = parts.governs(target)
     winner = -one.mode if lawful else one.mode
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
     key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
-    word = model.own_word(key) if math.isfinite(one.value) else None
+    word = model.own_word(key) if values is None and math.isfinite(one.value) else None
     record: Audit | LateAudit
-    if values is not None:
-        told = model.assess(key, values) if word is None else word
-        value, record = values[told.speaker], Audit(key, values, told.speaker)
-    elif word is not None:  # what others would have said is asked if somebody looks back
+    if word is not None:  # what others would have said is asked if somebody looks back
         told, value, present = word, one.value, following.copy()
+        claimed = model.claims(key, told)
         others = partial(_overruled, parts, target, percept, index, present, value, lawful=lawful, key=key)
         record = LateAudit(others, key, OWN)
     else:
-        values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
-        told = model.assess(key, values)
+        if values is None:
+            values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
+        told, claimed = model.verdict(key, values)
         value, record = values[told.speaker], Audit(key, values, told.speaker)
     mode, roles, spread = one.mode, one.roles, one.spread
     if told.speaker == LATEST and mode:
@@ -144,9 +148,7 @@ def settled(
         spread = spread if best is None else best.mode.sigma
     elif told.speaker != OWN:
         spread = math.nan if told.speaker == PERSISTENCE else told.spread
-    outcome = _outcome(
-        one, told.speaker, claimed=model.claims(key, told), known=bool(model.calibration.trials)
-    )
+    outcome = _outcome(one, told.speaker, claimed=claimed, known=bool(model.calibration.trials))
     return Prediction(
         percept.layout.names[index],
         target.property,

@@ -321,6 +321,7 @@ class Runner:
         need it, the program says what follows from it. The percept is for what isn't asked of the program.
         """
         now, given = scene.vector, dict[int, tuple[int, float]]()
+        numbers: list[float] = now.tolist()
         told = self._told(now, settling=False)
         if told is None:
             return None
@@ -330,11 +331,20 @@ class Runner:
             a = teller.answer
             after, outcomes, modes, margins, noted, players, _, _, experts = told
             said = experts[k]
-            raw = teller.tell(now, said[OWN], outcomes[k], modes[k], margins[k], noted[k], players[k])
+            raw = teller.tell(numbers, said[OWN], outcomes[k], modes[k], margins[k], noted[k], players[k])
             if raw is None:
                 return None
-            others = None if teller.model.candidates else teller.values(said, now)
-            one = settled(self._parts, teller.target, percept, teller.index, following, raw, others)
+            others = None if teller.model.candidates else teller.values(said, numbers)
+            one = settled(
+                self._parts,
+                teller.target,
+                percept,
+                teller.index,
+                following,
+                raw,
+                others,
+                lawful=a.component >= 0,
+            )
             following[a.column] = one.value
             found.append(one)
             same = one.value == after[a.column]
@@ -364,6 +374,7 @@ class Runner:
         if told is None:
             return None
         after, rows = told.following, zip(self._tellers, *told[1:], strict=True)
+        numbers: list[float] = now.tolist()
         found: list[Prediction] = []
         kinds = self._kinds
         for teller, outcome, mode, margin, noted, players, sure, believed, experts in rows:
@@ -371,8 +382,8 @@ class Runner:
             speaker, spread = teller.spoken[believed[1]]
             if speaker == GUESS:  # what it left isn't told
                 return None
-            values = teller.values(experts, now)
-            roles, own, frame = teller.known(now, mode, noted, players)
+            values = teller.values(experts, numbers)
+            roles, own, frame = teller.known(numbers, mode, noted, players)
             if speaker == LATEST and mode:
                 roles = roles[:1]
             if speaker != OWN:
@@ -482,7 +493,7 @@ class _Teller:
 
     def tell(
         self,
-        now: NDArray[np.float64],
+        now: list[float],
         value: float,
         outcome: int,
         mode: int,
@@ -506,13 +517,13 @@ class _Teller:
         """Take note of what is believed now."""
         self.spoken = [] if trust is None else [(b.speaker, b.spread) for b in ordered(trust.beliefs)]
 
-    def values(self, said: list[float], now: NDArray[np.float64]) -> tuple[float, ...]:
+    def values(self, said: list[float], now: list[float]) -> tuple[float, ...]:
         """What each of `EXPERTS` says, persistence too; NaN: nothing."""
         found = [value if math.isfinite(value) else math.nan for value in said]
-        return (*found, float(now[self.answer.column]))
+        return (*found, now[self.answer.column])
 
     def known(
-        self, now: NDArray[np.float64], mode: int, noted: int, players: _Bits
+        self, now: list[float], mode: int, noted: int, players: _Bits
     ) -> tuple[tuple[str, ...], float, str]:
         """Roles, spread and frame of what modes or laws say; arguments as of `tell`."""
         a = self.answer
@@ -540,10 +551,10 @@ class _Teller:
 
 def _spreads(
     spreads: Spreads, signature: SlotSignature, gather: list[int]
-) -> dict[int, Callable[[NDArray[np.float64]], float]]:
+) -> dict[int, Callable[[list[float]], float]]:
     """The spread of each mode as a function of the present state vector."""
     actions = [gather[k] for k in action_columns(signature).tolist()]
-    found: dict[int, Callable[[NDArray[np.float64]], float]] = {}
+    found: dict[int, Callable[[list[float]], float]] = {}
     for mode, spread in spreads.by_mode.items():
         place = None if spread.split is None else place_of(spread.split.name, signature)
         if spread.split is not None and place is not None:
@@ -555,15 +566,15 @@ def _spreads(
     return found
 
 
-def _split(of: Callable[[float], float], column: int) -> Callable[[NDArray[np.float64]], float]:
-    return lambda now: of(float(now[column]))
+def _split(of: Callable[[float], float], column: int) -> Callable[[list[float]], float]:
+    return lambda now: of(now[column])
 
 
 def _by_action(
     known: dict[tuple[float, ...], float], whole: float, columns: list[int]
-) -> Callable[[NDArray[np.float64]], float]:
-    return lambda now: known.get(tuple(float(now[c]) for c in columns), whole)
+) -> Callable[[list[float]], float]:
+    return lambda now: known.get(tuple([now[c] for c in columns]), whole)
 
 
-def _whole(value: float) -> Callable[[NDArray[np.float64]], float]:
+def _whole(value: float) -> Callable[[list[float]], float]:
     return lambda now: value

@@ -12,11 +12,12 @@ occurrences.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.model.scenes import MOST_LAYOUTS
 from relgym.scene.objects import SceneLayout
 
 __all__ = ["Screen"]
@@ -45,6 +46,26 @@ MOST = 1e75
 """Larger numbers are always set aside: searches square products of two, whose sums may overflow."""
 
 
+class _Marks(NamedTuple):
+    """What the numbers of a layout are held against.
+
+    Attributes
+    ----------
+    places
+        Number of the property of each column.
+    limits, known
+        Largest magnitude that is no gross error, and largest that is no news.
+    young
+        Whether too few scenes of it were seen so far.
+    """
+
+    layout: SceneLayout
+    places: NDArray[np.intp]
+    limits: NDArray[np.float64]
+    known: NDArray[np.float64]
+    young: bool
+
+
 class Screen:
     """Knows how large the numbers of each property are, and tells what is far larger.
 
@@ -68,6 +89,7 @@ class Screen:
         self._run: dict[int, int] = {}  # successive transitions with a suspicious number
         self._limits: NDArray[np.float64] | None = None
         self._columns: dict[int, tuple[SceneLayout, NDArray[np.intp]]] = {}
+        self._marks: dict[int, _Marks] = {}
 
     def admits(self, layout: SceneLayout, before: NDArray[np.float64], after: NDArray[np.float64]) -> bool:
         """Whether to learn from a transition; takes note of its numbers, and counts what is set aside.
@@ -79,15 +101,17 @@ class Screen:
         before, after
             State vectors, shape ``(layout.width,)``.
         """
-        places = self._places(layout)
-        sizes = np.maximum(np.abs(before), np.abs(after))
-        limits = self._limit()[places]
+        sizes, marks = np.maximum(np.abs(before), np.abs(after)), self._marked(layout)
+        if not marks.young and np.count_nonzero(sizes <= marks.known) == len(sizes):  # no news
+            self._run.clear()
+            return True
+        places, limits = marks.places, marks.limits
         within = np.count_nonzero(sizes <= limits) == len(sizes)
         if within:
             self._run.clear()
         else:
             self._suspect(places, np.where(np.abs(before) < np.abs(after), after, before), sizes > limits)
-            limits = self._limit()[places]
+            limits = self._marked(layout).limits
             within = bool((sizes <= limits).all())
         if np.count_nonzero(sizes > self._largest[places, 0]):  # one of both has news
             for vector in (before, after):
@@ -97,7 +121,7 @@ class Screen:
         young = self._scenes[places] < START
         if np.count_nonzero(young):
             self._scenes[np.unique(places[young])] += 1
-            self._limits = None
+            self._moved()
         if within:
             return True
         self.set_aside += 1
@@ -105,8 +129,24 @@ class Screen:
 
     def plausible(self, layout: SceneLayout, vector: NDArray[np.float64]) -> bool:
         """Whether a scene's numbers are as large as is known; takes note of nothing."""
-        places = self._places(layout)
-        return bool(np.count_nonzero(np.abs(vector) <= self._limit()[places]) == len(vector))
+        return bool(np.count_nonzero(np.abs(vector) <= self._marked(layout).limits) == len(vector))
+
+    def _marked(self, layout: SceneLayout) -> _Marks:
+        """What the numbers of a layout are held against; cached until one of it moves."""
+        marks = self._marks.get(id(layout))
+        if marks is None or marks.layout is not layout:
+            places = self._places(layout)
+            limits, known = self._limit()[places], self._largest[places, 0]
+            young = bool((self._scenes[places] < START).any())
+            if len(self._marks) >= MOST_LAYOUTS:
+                self._marks.clear()
+            marks = self._marks[id(layout)] = _Marks(layout, places, limits, np.minimum(limits, known), young)
+        return marks
+
+    def _moved(self) -> None:
+        """Something that limits depend on isn't what it was."""
+        self._limits = None
+        self._marks.clear()
 
     def _places(self, layout: SceneLayout) -> NDArray[np.intp]:
         """Number of the property of each column; cached."""
@@ -125,7 +165,7 @@ class Screen:
         if missing:
             self._largest = np.pad(self._largest, ((0, missing), (0, 0)))
             self._scenes = np.pad(self._scenes, (0, missing))
-            self._limits = None
+            self._moved()
 
     def _limit(self) -> NDArray[np.float64]:
         if self._limits is None:
@@ -149,7 +189,7 @@ class Screen:
             if size > row[0]:
                 row[0] = size
                 row.sort()
-                self._limits = None
+                self._moved()
 
     def _suspect(
         self, places: NDArray[np.intp], values: NDArray[np.float64], wild: NDArray[np.bool_]
@@ -168,7 +208,7 @@ class Screen:
             alike = sum(size / NEAR <= abs(other) <= size * NEAR for other in waiting)
             if alike >= ALIKE or waiting.count(value) >= REPEATED or self._run[place] >= RUN:
                 self._largest[place] = size  # known, as if so many had come
-                self._limits = None
+                self._moved()
                 del self._waiting[place], self._run[place]
 
     def absorb(self, other: Screen) -> None:
@@ -179,11 +219,11 @@ class Screen:
             both = np.concatenate([self._largest[place], other._largest[theirs]])
             self._largest[place] = np.sort(both)[-SUPPORT:]
             self._scenes[place] = min(START, int(self._scenes[place] + other._scenes[theirs]))
-        self._limits = None
+        self._moved()
         self.set_aside += other.set_aside
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_limits": None, "_columns": {}}
+        return self.__dict__ | {"_limits": None, "_columns": {}, "_marks": {}}
 
     # ------------------------------------------------------------------ saving
     def to_json(self) -> dict[str, Any]:
@@ -211,4 +251,5 @@ class Screen:
         self._scenes = np.array([row[2] for row in rows], dtype=np.int64)
         self._waiting = {k: [float(v) for v in row[4]] for k, row in enumerate(rows) if row[4]}
         self._run = {k: int(row[5]) for k, row in enumerate(rows) if row[5]}
-        self._limits, self._columns = None, {}
+        self._columns = {}
+        self._moved()

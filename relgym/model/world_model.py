@@ -292,9 +292,11 @@ class WorldModel:
         """The precision, once it is known that all three are what they should be: else nothing is begun."""
         if not isinstance(prediction, ScenePrediction):
             raise ObservationError(f"prediction={prediction!r}: expected what predict_one gives")
-        if not isinstance(residuals, Mapping) or not all(
-            isinstance(off, (int, float)) and math.isfinite(off) for off in residuals.values()
-        ):
+        try:
+            known = isinstance(residuals, Mapping) and all(map(math.isfinite, residuals.values()))
+        except TypeError:
+            known = False
+        if not known:
             raise ObservationError(f"residuals={residuals!r}: expected finite numbers by (object, property)")
         return self._precision(precision)
 
@@ -435,6 +437,8 @@ class WorldModel:
         return scored(self, found, self._precision(precision))
 
     def _precision(self, given: float | None) -> float:
+        if type(given) is float and 0.0 <= given < math.inf:
+            return given
         value = (
             self.schema.precision if given is None else float(array_of("precision", given, (), ConfigError))
         )

@@ -1118,53 +1118,87 @@ def test_of_two_models_together_all_is_learned_from_at_first() -> None:
     assert [both.confirm(KEY, 0.125) for _ in range(7)] == [1] * 7
 
 
+def thinned(known: Calibration, *, held: bool = True) -> int:
+    """How many a prediction that is only roughly right stands for; learned from if any."""
+    if weight := known.thin(KEY, held=held):
+        audit = Audit(KEY, values(own=1.3), OWN)
+        known.look_back(audit, 1.0, claimed=False, rounding=1e-9, error=0.05, stands=weight)
+    return weight
+
+
 def test_of_what_is_roughly_known_ever_fewer_are_learned_from() -> None:
-    # Of n one of the root of n / 1024: of two from the 4096th on, of three from the 9216th on.
-    known = right(1)
-    weights = [known.thin(KEY, held=True) for _ in range(16_000)]
-    assert weights[:4_095] == [1] * 4_095
+    # Of n one of n / 1024: of two from the 2048th on, of three from the 3072nd on.
+    known = right(FEW)
+    weights = [thinned(known) for _ in range(16_000)]
+    assert weights[:2_047] == [1] * 2_047
     taken = np.array(weights) > 0
-    assert abs(taken[4_095:9_215].mean() - 1.0 / 2.0) < 0.03
-    assert abs(taken[9_215:].mean() - 1.0 / 3.0) < 0.03
+    for many in (2, 3, 7, 15):
+        share = taken[1024 * many : 1024 * (many + 1)].mean()
+        assert abs(share - 1.0 / many) < 3.0 * math.sqrt(1.0 / many / 1024.0)
     assert sum(weights) == 16_000 - weights[::-1].index(
         next(w for w in weights[::-1] if w)
     )  # each stands for others
 
 
+def test_the_number_of_a_prediction_tells_for_all_targets_alike_whether_it_is_learned_from() -> None:
+    one, other = right(FEW), right(FEW)
+    for _ in range(2_000):
+        assert thinned(one) == thinned(other)
+    for _ in range(3_000):  # of the other one it is known for longer
+        thinned(other)
+    one.trials = other.trials
+    pairs = [(thinned(one) > 0, thinned(other) > 0) for _ in range(3_000)]
+    assert (True, False) in pairs
+    assert (False, True) not in pairs  # what teaches who needs less teaches who needs more
+
+
+def test_a_kind_of_few_trials_is_learned_from_however_long_its_winner_is_known() -> None:
+    known = right(FEW)
+    for _ in range(5_000):
+        thinned(known)
+    rare = KEY._replace(lead=KEY.lead - 1)
+    for _ in range(FEW):
+        weight = known.thin(rare, held=True)
+        assert weight
+        audit = Audit(rare, values(own=1.3), OWN)
+        known.look_back(audit, 1.0, claimed=False, rounding=1e-9, error=0.05, stands=weight)
+    assert 0 in [known.thin(rare, held=True) for _ in range(100)]
+
+
 def test_of_objects_that_take_turns_each_is_learned_from() -> None:
-    known = right(1)
-    taken = np.array([known.thin(KEY, held=True) > 0 for _ in range(12_000)])[5_000:]
+    known = right(FEW)
+    taken = np.array([thinned(known) > 0 for _ in range(12_000)])[5_000:]
     for objects in (2, 3, 4):
         shares = [taken[k::objects].mean() for k in range(objects)]
         assert max(shares) - min(shares) < 0.08
 
 
 def test_where_intervals_hold_less_often_all_is_learned_from() -> None:
-    known = right(1)
+    known = right(FEW)
     for _ in range(5_000):
-        known.thin(KEY, held=True)
+        thinned(known)
     # Outside of its interval each speaks for a change by log2(.22 / .05) = 2.2 bits; ten are enough.
-    outside = [known.thin(KEY, held=False) for _ in range(8)]
+    outside = [thinned(known, held=False) for _ in range(8)]
     assert 0 not in outside[4:]
     # Those that it holds speak against that by .3 bits each: after some, others are left out again.
-    held = [known.thin(KEY, held=True) for _ in range(200)]
+    held = [thinned(known) for _ in range(200)]
     assert 0 not in held[:20]
-    assert abs(held[-100:].count(0) - 50) < 20
+    assert abs(held[-100:].count(0) - 75) < 20
 
 
 def test_of_another_world_all_is_learned_from_for_long() -> None:
-    known = right(1)
+    known = right(FEW)
     for _ in range(30_000):
-        known.thin(KEY, held=True)
+        thinned(known)
     for _ in range(150):
-        known.thin(KEY, held=False)
-    assert 0 not in [known.thin(KEY, held=True) for _ in range(3_500)]
+        thinned(known, held=False)
+    assert 0 not in [thinned(known) for _ in range(1_500)]
 
 
 def test_one_in_twenty_outside_of_its_interval_is_as_it_should_be() -> None:
-    known, rng = right(1), np.random.default_rng(0)
-    weights = [known.thin(KEY, held=bool(held)) for held in rng.random(20_000) < COVERED]
-    assert weights[10_000:].count(0) > 0.6 * 10_000
+    known, rng = right(FEW), np.random.default_rng(0)
+    weights = [thinned(known, held=bool(held)) for held in rng.random(20_000) < COVERED]
+    assert weights[10_000:].count(0) > 0.8 * 10_000
 
 
 def test_what_a_rough_prediction_stands_for_counts_where_claims_are_rationed_and_nowhere_else() -> None:
@@ -1178,23 +1212,35 @@ def test_what_a_rough_prediction_stands_for_counts_where_claims_are_rationed_and
     assert cells[0].records == cells[1].records and cells[0].squares == cells[1].squares
     assert cells[1].heard == cells[0].heard + 4
     assert many._slips == [one._slips[0] + 4, one._slips[1] + 4]
-    assert (cells[0].steady, cells[1].steady) == (0, 3)
+    of_winner = KEY._replace(lead=OF_WINNER)
+    assert (one._cells[of_winner].steady, many._cells[of_winner].steady) == (0, 3)
 
 
 def test_how_roughly_things_are_known_is_kept() -> None:
-    known = right(1)
+    known = right(FEW)
     for k in range(5_003):
-        known.thin(KEY, held=k % 9 > 0)
+        thinned(known, held=k % 30 > 0)
     again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
     pattern = [bool(k % 7) for k in range(50)]
-    assert [again.thin(KEY, held=h) for h in pattern] == [known.thin(KEY, held=h) for h in pattern]
+    assert [thinned(again, held=h) for h in pattern] == [thinned(known, held=h) for h in pattern]
+
+
+def test_what_came_true_while_something_was_looked_for_ends_no_run() -> None:
+    known = right(1)
+    for _ in range(64):
+        known.confirm(KEY, 0.125)
+    audit = Audit(KEY, values(own=1.0), OWN)
+    known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05)
+    assert known._cells[KEY].steady == 64
+    known.look_back(audit, 1.01, claimed=True, rounding=1e-9, error=0.05)  # nearly isn't true
+    assert known._cells[KEY].steady == 0
 
 
 def test_each_prediction_that_somebody_looked_back_at_is_counted_once() -> None:
-    known = right(1)
-    left_out = sum(known.thin(KEY, held=True) == 0 for _ in range(5_000))
-    assert left_out > 400 and known.trials == 1 + left_out
+    known = right(FEW)
+    left_out = sum(thinned(known) == 0 for _ in range(5_000))
+    assert left_out > 1_000 and known.trials == FEW + 5_000
     audit = Audit(KEY, values(own=1.3), OWN)
     for stands in (0, 1, 3):
         known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, stands=stands)
-    assert known.trials == 4 + left_out
+    assert known.trials == FEW + 5_003

@@ -19,6 +19,7 @@ from relgym.model.motion import Laws
 from relgym.model.prediction import LateAudit
 from relgym.model.prequential import StepReport, compared
 from relgym.model.querying import predict
+from relgym.model.target.hindsight import Standing
 from relgym.model.target.property_model import PropertyModel
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, Target, Transition
@@ -241,7 +242,7 @@ def test_of_what_is_roughly_known_some_is_learned_from_until_the_world_changes()
     model = WorldModel(BOX, targets=[SPEED])
     learned(model, curve(4_200))
     known = model.property_model("cart", "v")
-    assert known.coarse and not known.settled
+    assert known.standing is Standing.COARSE
 
     def shares(some: Iterable[Transition]) -> list[float]:
         taken = [("a", "v") in r.learned.parts for r in learned(model, some) if r.learned is not None]

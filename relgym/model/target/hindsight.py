@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterable, Mapping
+from enum import Enum
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -31,6 +32,7 @@ __all__ = [
     "Confirmed",
     "Hindsight",
     "Retrospect",
+    "Standing",
     "calibration_to_json",
     "look_back",
     "restore_calibration",
@@ -46,6 +48,24 @@ SHARE, RECOVERED = 0.15, 0.075
 """With a larger share of the predictions wrong than the first, the clauses don't tell which mode holds; with a
 smaller one than the second they do again. In between it stays as it was: within one of Taxi's episodes a tenth is
 wrong, from one to the next a quarter."""
+
+
+class Standing(Enum):
+    """How much a prediction teaches that came out as such ones do.
+
+    Attributes
+    ----------
+    SETTLED
+        Nothing: modes are laws, and nothing is being looked for.
+    COARSE
+        Little: it is known only roughly what comes, and nothing tells more.
+    OPEN
+        As much as any.
+    """
+
+    SETTLED = 0
+    COARSE = 1
+    OPEN = 2
 
 
 class Confirmed(NamedTuple):
@@ -194,12 +214,15 @@ class _Look:
         if record is None:
             return False
         lawful = self._parts.governs(target)
-        if not lawful and model.coarse:
+        standing = Standing.SETTLED if lawful else model.standing
+        if standing is Standing.COARSE:
             return self._passed(part, residual, answer, record.key)
         if not part.ok or not part.mode or record.speaker != OWN:
             return False
         within = self._rounding(part.value + residual) if lawful else model.clusterer.scale.tolerance
-        if not abs(residual) <= within or not (lawful or (model.settled and not self._misled(answer))):
+        if not abs(residual) <= within or not (
+            lawful or (standing is Standing.SETTLED and not self._misled(answer))
+        ):
             return False
         self._times = model.calibration.confirm(record.key, self._parts.config.downsampling)
         if not lawful:

@@ -30,7 +30,7 @@ from relgym.model.target.conditions import Conditions, needed
 from relgym.model.target.fallback import Fallback
 from relgym.model.target.functions import ModeFunctions, Verdict, bodies_of
 from relgym.model.target.guess import Guesses
-from relgym.model.target.hindsight import Hindsight
+from relgym.model.target.hindsight import Hindsight, Standing
 from relgym.model.target.limits import Limits, find_limits
 from relgym.model.target.scope import EVERYWHERE, LEAF, Scope, find_scope
 from relgym.model.target.spread import Spreads, measure
@@ -200,14 +200,6 @@ class PropertyModel:
         return report
 
     @property
-    def settled(self) -> bool:
-        """Whether nothing is being looked for, and modes are laws: what comes as predicted teaches nothing new."""
-        c = self.clusterer
-        if c.approximate or c.population.chancy or c.searching or c.due or self.rough or self.undecided:
-            return False
-        return not (self.classifier.waits or self.casting.waits)
-
-    @property
     def waits(self) -> bool:
         """Whether something is being looked for, or is due."""
         c, fallback = self.clusterer, self.fallback
@@ -216,9 +208,16 @@ class PropertyModel:
         return self.candidates.due(c.seen) or (fallback.guessable and fallback.guesses.stale(c.seen))
 
     @property
-    def coarse(self) -> bool:
-        """Whether it is known only roughly what comes, and nothing tells more: of such steps some will do."""
-        return (self.clusterer.approximate or self.rough) and not self.undecided
+    def standing(self) -> Standing:
+        """How much a prediction teaches that came out as such ones do."""
+        if self.undecided:
+            return Standing.OPEN
+        c = self.clusterer
+        if c.approximate or self.rough:
+            return Standing.COARSE
+        if c.population.chancy or c.searching or c.due or self.classifier.waits or self.casting.waits:
+            return Standing.OPEN
+        return Standing.SETTLED
 
     def take_for_known(self, mode: int) -> bool:
         """Count an example for which others stand; false if the mode that predicted it is gone.
@@ -429,6 +428,11 @@ class PropertyModel:
     def assess(self, key: Key, values: Sequence[float]) -> Assessment:
         """Who gives the value of a prediction, and how right it will be."""
         return self.record.assess(key, values)
+
+    def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
+        """`assess`, and whether such a prediction `claims`."""
+        told, claimed = self.record.verdict(key, values)
+        return told, claimed and not (self.surmise and self.config.abstain)
 
     def own_word(self, key: Key) -> Assessment | None:
         """How right a prediction will be whose winner has the word whatever others say; None where that depends."""
