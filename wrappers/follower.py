@@ -221,7 +221,8 @@ class Follower:
     ) -> Look:
         try:
             scene = self.view.scene(observation, info, last=last, expected=expected)
-            check_sizes(scene)
+            if scene.layout.bodies:
+                check_sizes(scene)
         except (ObservationError, ShapeError) as error:
             return Look(trouble=error)
         return Look(scene)

@@ -87,7 +87,7 @@ class ModelConfig:
         as large a share as claims may be off in: all of the first 133 are learned from, then one of 2, from the 267th
         on one of 4. Range [0, 0.5]; 0: nothing is left out. Raising it learns in less time, and from fewer examples
         near a condition's border. Of n of what is only roughly known, by approximations and regressions, one of
-        ``sqrt(n / 1024)`` is learned from, as long as intervals hold as often as they are to.
+        ``n / 1024`` is learned from, as long as intervals hold as often as they are to.
     regression_columns
         Regressions on all that a target may depend on are made on at most so many columns, squares and products
         included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.

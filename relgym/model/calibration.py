@@ -544,7 +544,9 @@ class Calibration:
             self._least[who] = self._needed(who)
         like = [cell] if cell is not None else self._alike(key)
         claims, bits = (self.probability, self.allowed), self._bits(who)
-        share = min([c.sure(claims, bits) for c in like], default=told.probability)
+        # Nothing like it is left: what became of it is known, or it has never been tried.
+        others = 0.0 if _family(key) in self._cells else told.probability
+        share = min([c.sure(claims, bits) for c in like], default=others)
         if cell is None and told.probability >= 1.0 - self.allowed:  # rations aren't needed
             share = max(share, told.probability)
         return min(told.probability, share) > self.probability and share >= self._least[who]
@@ -870,14 +872,18 @@ def _levels(key: Key) -> tuple[Key, Key, Key]:
 def _mean(cell: _Cell | None, expert: int, prior: float = 0.5) -> float:
     """Posterior mean of an expert's hits in a cell; the prior where there is none.
 
-    Who makes no claims and never spoke there isn't right more often than those like him who did.
+    Who makes no claims and never spoke there is right as often as those like him who did, if he leaves no more than any
+    of them; else no more often.
     """
     if cell is None:
         return prior
     if (record := cell.records.get(expert)) is not None:
         return record.mean(prior)
-    others = [] if _makes_claims(expert) else [r for who, r in cell.records.items() if not _makes_claims(who)]
-    return min([prior, *(other.mean(prior) for other in others)])
+    others = {} if _makes_claims(expert) else {k: r for k, r in cell.records.items() if not _makes_claims(k)}
+    if cell.squares[expert][0] and all(cell.left(expert) <= cell.left(other) for other in others):
+        known = others.values()
+        return _Record(sum(r.trials for r in known), sum(r.hits for r in known)).mean(prior)
+    return min([prior, *(other.mean(prior) for other in others.values())])
 
 
 def _place(error: float) -> int:

@@ -172,7 +172,8 @@ class Parts:
             self._kin[id(schema)] = schema  # kept alive, so that its id stays its own
         if not np.isfinite(scene.vector).all():
             schema.scene(scene.values())  # raises, naming object and property
-        check_sizes(scene)
+        if scene.layout.bodies:
+            check_sizes(scene)
 
     def checked_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """State vectors as contiguous float64; `ObservationError` for other types or width, NaN or infinity."""

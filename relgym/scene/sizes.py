@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +14,9 @@ from relgym.scene.shapes import Sphere
 
 __all__ = ["check_sizes"]
 
-
-@dataclass(slots=True)
-class _Plan:
-    """What must be known of a layout to check the sizes of its bodies, and which ones were fine."""
-
-    axes: Axes
-    bodies: Bodies
-    columns: NDArray[np.intp]
-    constants: NDArray[np.float64]
-    spheres: NDArray[np.intp]
-    scaled: NDArray[np.intp]
-    fine: bytes | None = None
+_Plan: TypeAlias = tuple[
+    Axes, Bodies, NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]
+]
 
 
 def check_sizes(scene: Scene) -> None:
@@ -33,13 +24,14 @@ def check_sizes(scene: Scene) -> None:
 
     Cost O(bodies), some microseconds.
     """
-    plan = _plan(scene)
-    if len(plan.bodies.names):
-        sizes = scene.vector[plan.scaled].tobytes()
-        if sizes != plan.fine:  # sizes rarely change
-            padded = np.concatenate([scene.vector, plan.constants])
-            check_extents(plan.bodies, plan.axes, padded[plan.columns][:, :, None], plan.spheres)
-            plan.fine = sizes
+    axes, bodies, columns, constants, spheres, scaled = _plan(scene)
+    fine = f"_sizes-fine-{scene.schema.up}-{scene.schema.planar}"
+    if len(bodies.names):
+        sizes = scene.vector[scaled]
+        if sizes.tobytes() != scene.layout.__dict__.get(fine):
+            padded = np.concatenate([scene.vector, constants])
+            check_extents(bodies, axes, padded[columns][:, :, None], spheres)
+            scene.layout.__dict__[fine] = sizes.tobytes()  # sizes rarely change
 
 
 def _plan(scene: Scene) -> _Plan:
@@ -53,7 +45,7 @@ def _plan(scene: Scene) -> _Plan:
         bodies = Bodies(tuple(layout.names[i] for i in layout.bodies), shapes)
         extents = columns[:, 6:9]
         scaled = np.unique(extents[extents < layout.width])
-        known = layout.__dict__[key] = _Plan(
+        known = layout.__dict__[key] = (
             Axes.of(scene.schema),
             bodies,
             columns.T.copy(),

@@ -1244,3 +1244,32 @@ def test_each_prediction_that_somebody_looked_back_at_is_counted_once() -> None:
     for stands in (0, 1, 3):
         known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, stands=stands)
     assert known.trials == FEW + 5_003
+
+
+def test_a_new_mode_of_a_model_whose_modes_were_wrong_half_the_time_claims_nothing() -> None:
+    # Nothing like it is left that rations could be reckoned from, but what became of its like is known.
+    known = Calibration(probability=0.5)
+    for k in range(40):
+        seen(known, values(own=1.0 if k % 2 else 2.0), 1.0)
+    known.keep([])
+    new = KEY._replace(winner=KEY.winner + 1)
+    told = Assessment(OWN, 0.51, math.nan, math.nan)
+    assert not known.claims(new, told)
+    assert known.claims(new, told._replace(probability=0.999))
+
+
+def test_who_never_spoke_but_leaves_less_is_right_as_often_as_those_who_did() -> None:
+    known = Calibration()
+    for k in range(60):
+        said = [math.nan] * len(EXPERTS)
+        said[LINEAR] = 1.0 if k % 10 else 1.3
+        said[GUESS], said[PERSISTENCE] = 1.0 if k % 10 else 1.2, 0.0
+        known.look_back(
+            Audit(KEY._replace(winner=0), tuple(said), LINEAR), 1.0, claimed=False, rounding=1e-9, error=0.05
+        )
+    known.forget()
+    said = [math.nan] * len(EXPERTS)
+    said[GUESS], said[LINEAR], said[PERSISTENCE] = 1.2, 1.3, 0.0
+    told = known.assess(Key(2, 0, 0), said)
+    assert told.speaker == GUESS
+    assert 0.85 < told.probability < 0.95
