@@ -47,9 +47,9 @@ from relgym.scene.objects import Scene, SceneLayout
 
 __all__ = ["Programs", "Runner"]
 
-PATIENCE = 8
-"""Scenes that arrays answer after each change of what a model says before a program is lowered: that takes about as
-long."""
+PATIENCE = 2
+"""A program is lowered for the last of so many scenes that are asked since what a model says has changed; arrays answer
+those before it, which takes about as long as to lower it (rent or buy: Karlin et al. 1988)."""
 
 SETTLING = 128
 """Scenes asked one by one, since the model last changed, before the program is told how right its predictions were:
