@@ -34,7 +34,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.constants import EVIDENCE, SUMMABLE
-from relgym.mixing import mixed_one
 
 __all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
 
@@ -68,6 +67,9 @@ COVERED: Final = 0.95
 
 ENOUGH: Final = 19
 """Fewest errors that can tell such an interval: the largest of them does then."""
+
+DRAWS: Final = 1 << 64
+"""So many random numbers may be drawn."""
 
 _LESS: Final = math.sqrt(
     1.0 - COVERED
@@ -653,26 +655,36 @@ class Calibration:
                 self._cells[key].steady = 0
         self._changed(cells=len(self._cells) > known)
 
-    def confirm(self, key: Key, share: float) -> int:
+    def confirm(self, key: Key, share: float, draw: int) -> int:
         """Take note that a prediction came true; how many such ones it stands for, 0 if another one will for it.
 
         What comes true teaches little, and the less the longer all of its kind did. After r of them in a row half of
-        one in r is expected to fail (Jeffreys' prior). Where that is so many times less than `share`
-        (`ModelConfig.downsampling`), one of as many will do.
+        one in r is expected to fail (Jeffreys' prior). Where that is so many times less than `share`, one of as many
+        will do.
+
+        Parameters
+        ----------
+        key
+            Its kind.
+        share
+            `ModelConfig.downsampling`.
+        draw
+            A random number of 64 bits, one for all predictions of a step: what some are learned from, those of which
+            more are needed are, too, and of most steps none is. Drawn, not counted off: things take turns, and none is
+            to be left out.
         """
         self.trials += 1
         cell = self._cells.get(key)
         if cell is None:
             return 1
         cell.steady += 1
-        times = int(2.0 * share * cell.steady)
-        if times > 1 and cell.steady % (1 << (times.bit_length() - 1)):
+        if draw * int(2.0 * share * cell.steady) >= DRAWS:
             cell.passed += 1
             return 0
         weight, cell.passed = cell.passed + 1, 0
         return weight
 
-    def thin(self, key: Key, *, held: bool) -> int:
+    def thin(self, key: Key, draw: int, *, held: bool) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
 
         The more of a winner there are, the less one more tells: `MEMORY` of them tell what it leaves to 2 %.
@@ -685,6 +697,8 @@ class Calibration:
         ----------
         key
             Its kind.
+        draw
+            As of `confirm`.
         held
             Whether what came lay in its interval.
         """
@@ -696,10 +710,8 @@ class Calibration:
         cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _MISSED)), 2.0 * EVIDENCE)
         if cell.doubt == 2.0 * EVIDENCE:  # the longer, the more of those before were of another world
             cell.steady -= cell.steady // FEW
-        # Drawn, not counted off: objects of a type come in an order, and none is to be left out. By the number of the
-        # prediction, so that one step teaches most targets, and most steps none.
-        drawn = mixed_one(self.trials) * (cell.steady // MEMORY) < 1 << 64
-        if cell.doubt < EVIDENCE and not drawn and kind.squares[PERSISTENCE][0] >= FEW:
+        left_out = draw * (cell.steady // MEMORY) >= DRAWS
+        if left_out and cell.doubt < EVIDENCE and kind.squares[PERSISTENCE][0] >= FEW:
             self.trials += 1
             cell.passed += 1
             return 0

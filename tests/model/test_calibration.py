@@ -5,15 +5,19 @@ from __future__ import annotations
 import copy
 import json
 import math
+from collections.abc import Iterator
+from itertools import count, islice
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from relgym.mixing import GOLDEN, mixed_one
 from relgym.model.calibration import (
     _EXACT,
     COVERED,
+    DRAWS,
     ENOUGH,
     EXPERTS,
     FEW,
@@ -1031,40 +1035,53 @@ def test_bins_of_leads_are_the_same_in_arrays(margins: list[float]) -> None:
             assert 2.0 ** (place - 3) <= margin < 2.0 ** (place - 2)
 
 
+def draws() -> Iterator[int]:
+    """Random numbers of 64 bits, always the same."""
+    return (mixed_one(k * GOLDEN) for k in count(1))
+
+
 def test_of_predictions_that_come_true_ever_fewer_are_learned_from() -> None:
     # 1/8: after r of them one in r/4; until eight came true in a row that is less than one in two.
+    half, third = DRAWS // 2, DRAWS // 3 + 1
     known = right(1)
-    weights = [known.confirm(KEY, 0.125) for _ in range(33)]
-    assert weights[:7] == [1] * 7
-    assert weights[7:15] == [1, 0, 2, 0, 2, 0, 2, 0]
-    assert weights[15:] == [2, 0, 0, 0, 4, 0, 0, 0, 4, 0, 0, 0, 4, 0, 0, 0, 4, 0]
-    assert sum(weights) == 32  # each that is learned from stands for those before it, too
+    assert [known.confirm(KEY, 0.125, half) for _ in range(10)] == [1] * 7 + [0] * 3
+    # From the twelfth on it is one of three, and each stands for those before it, too.
+    assert [known.confirm(KEY, 0.125, third) for _ in range(3)] == [4, 0, 0]
+    assert [known.confirm(KEY, 0.125, 0) for _ in range(2)] == [3, 1]
+
+
+def test_one_of_as_many_is_learned_from() -> None:
+    known, drawn = right(1), draws()
+    taken = np.array([known.confirm(KEY, 0.0625, next(drawn)) > 0 for _ in range(8_000)])
+    expected = np.minimum(1.0, 1.0 / np.maximum(np.arange(1, 8_001) // 8, 1))
+    for part in (slice(0, 100), slice(100, 1_000), slice(1_000, 8_000)):
+        assert abs(taken[part].sum() - expected[part].sum()) < 3.0 * math.sqrt(expected[part].sum())
 
 
 def test_after_one_that_failed_all_are_learned_from_again() -> None:
     known = right(1)
-    first = [known.confirm(KEY, 0.125) for _ in range(30)]
+    first = [known.confirm(KEY, 0.125, DRAWS // 2) for _ in range(30)]
     seen(known, values(own=1.0), 2.0)
-    again = [known.confirm(KEY, 0.125) for _ in range(7)]
-    assert sum(first) == 28
-    assert again == [3, 1, 1, 1, 1, 1, 1]  # the first one for two that were left out before
+    again = [known.confirm(KEY, 0.125, DRAWS // 2) for _ in range(7)]
+    assert sum(first) == 7
+    assert again == [24, 1, 1, 1, 1, 1, 1]  # the first one for those that were left out before
 
 
 def test_of_a_kind_that_nobody_looked_back_at_all_are_learned_from() -> None:
-    assert [Calibration().confirm(KEY, 0.5) for _ in range(9)] == [1] * 9
+    assert [Calibration().confirm(KEY, 0.5, DRAWS - 1) for _ in range(9)] == [1] * 9
 
 
 def test_without_downsampling_all_are_learned_from() -> None:
     known = right(1)
-    assert [known.confirm(KEY, 0.0) for _ in range(1_000)] == [1] * 1_000
+    assert [known.confirm(KEY, 0.0, DRAWS - 1) for _ in range(1_000)] == [1] * 1_000
 
 
 @given(st.integers(0, 3_000), st.sampled_from([0.0075, 0.03, 0.125]))
 @settings(max_examples=60, deadline=None)
 def test_an_exception_is_rare_among_what_is_learned_from(length: int, share: float) -> None:
     """A run of what comes true, ended by an exception."""
-    known = right(1)
-    learned = sum(known.confirm(KEY, share) > 0 for _ in range(length)) + 1
+    known, drawn = right(1), draws()
+    learned = sum(known.confirm(KEY, share, next(drawn)) > 0 for _ in range(length)) + 1
     assert 1.0 / learned <= max(share, 1.0 / (length + 1))
 
 
@@ -1081,11 +1098,13 @@ def test_what_a_prediction_stands_for_counts_as_often() -> None:
 
 
 def test_how_many_came_true_in_a_row_is_kept() -> None:
-    known = right(1)
+    known, drawn = right(1), draws()
     for _ in range(30):
-        known.confirm(KEY, 0.125)
+        known.confirm(KEY, 0.125, next(drawn))
     again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
-    assert [again.confirm(KEY, 0.125) for _ in range(50)] == [known.confirm(KEY, 0.125) for _ in range(50)]
+    for _ in range(50):
+        number = next(drawn)
+        assert again.confirm(KEY, 0.125, number) == known.confirm(KEY, 0.125, number)
 
 
 def test_of_another_model_who_never_spoke_is_right_no_more_often_than_who_did() -> None:
@@ -1113,23 +1132,23 @@ def test_a_miss_that_a_law_explains_counts_once() -> None:
 def test_of_two_models_together_all_is_learned_from_at_first() -> None:
     known = right(1)
     for _ in range(1_000):
-        known.confirm(KEY, 0.125)
+        known.confirm(KEY, 0.125, DRAWS - 1)
     both = known.united(right(1))
-    assert [both.confirm(KEY, 0.125) for _ in range(7)] == [1] * 7
+    assert [both.confirm(KEY, 0.125, DRAWS - 1) for _ in range(7)] == [1] * 7
 
 
-def thinned(known: Calibration, *, held: bool = True) -> int:
+def thinned(known: Calibration, draw: int, *, held: bool = True, key: Key = KEY) -> int:
     """How many a prediction that is only roughly right stands for; learned from if any."""
-    if weight := known.thin(KEY, held=held):
-        audit = Audit(KEY, values(own=1.3), OWN)
+    if weight := known.thin(key, draw, held=held):
+        audit = Audit(key, values(own=1.3), OWN)
         known.look_back(audit, 1.0, claimed=False, rounding=1e-9, error=0.05, stands=weight)
     return weight
 
 
 def test_of_what_is_roughly_known_ever_fewer_are_learned_from() -> None:
     # Of n one of n / 1024: of two from the 2048th on, of three from the 3072nd on.
-    known = right(FEW)
-    weights = [thinned(known) for _ in range(16_000)]
+    known, drawn = right(FEW), draws()
+    weights = [thinned(known, next(drawn)) for _ in range(16_000)]
     assert weights[:2_047] == [1] * 2_047
     taken = np.array(weights) > 0
     for many in (2, 3, 7, 15):
@@ -1140,64 +1159,54 @@ def test_of_what_is_roughly_known_ever_fewer_are_learned_from() -> None:
     )  # each stands for others
 
 
-def test_the_number_of_a_prediction_tells_for_all_targets_alike_whether_it_is_learned_from() -> None:
-    one, other = right(FEW), right(FEW)
+def test_what_teaches_who_needs_less_teaches_who_needs_more() -> None:
+    old, young, exact, drawn = right(FEW), right(FEW), right(FEW), draws()
+    for _ in range(9_000):
+        thinned(old, next(drawn))
+    for _ in range(4_000):
+        thinned(young, next(drawn))
     for _ in range(2_000):
-        assert thinned(one) == thinned(other)
-    for _ in range(3_000):  # of the other one it is known for longer
-        thinned(other)
-    one.trials = other.trials
-    pairs = [(thinned(one) > 0, thinned(other) > 0) for _ in range(3_000)]
-    assert (True, False) in pairs
-    assert (False, True) not in pairs  # what teaches who needs less teaches who needs more
+        exact.confirm(KEY, 0.0075, next(drawn))
+    taken = [
+        (thinned(young, number) > 0, thinned(old, number) > 0, exact.confirm(KEY, 0.0075, number) > 0)
+        for number in islice(drawn, 1_000)
+    ]
+    assert set(taken) == {(True, True, True), (True, True, False), (True, False, False), (False,) * 3}
 
 
 def test_a_kind_of_few_trials_is_learned_from_however_long_its_winner_is_known() -> None:
-    known = right(FEW)
+    known, rare = right(FEW), KEY._replace(lead=KEY.lead - 1)
     for _ in range(5_000):
-        thinned(known)
-    rare = KEY._replace(lead=KEY.lead - 1)
-    for _ in range(FEW):
-        weight = known.thin(rare, held=True)
-        assert weight
-        audit = Audit(rare, values(own=1.3), OWN)
-        known.look_back(audit, 1.0, claimed=False, rounding=1e-9, error=0.05, stands=weight)
-    assert 0 in [known.thin(rare, held=True) for _ in range(100)]
-
-
-def test_of_objects_that_take_turns_each_is_learned_from() -> None:
-    known = right(FEW)
-    taken = np.array([thinned(known) > 0 for _ in range(12_000)])[5_000:]
-    for objects in (2, 3, 4):
-        shares = [taken[k::objects].mean() for k in range(objects)]
-        assert max(shares) - min(shares) < 0.08
+        thinned(known, DRAWS - 1)
+    assert 0 not in [thinned(known, DRAWS - 1, key=rare) for _ in range(FEW)]
+    assert thinned(known, DRAWS - 1, key=rare) == 0
 
 
 def test_where_intervals_hold_less_often_all_is_learned_from() -> None:
-    known = right(FEW)
+    known, drawn = right(FEW), draws()
     for _ in range(5_000):
-        thinned(known)
+        thinned(known, next(drawn))
     # Outside of its interval each speaks for a change by log2(.22 / .05) = 2.2 bits; ten are enough.
-    outside = [thinned(known, held=False) for _ in range(8)]
+    outside = [thinned(known, next(drawn), held=False) for _ in range(8)]
     assert 0 not in outside[4:]
     # Those that it holds speak against that by .3 bits each: after some, others are left out again.
-    held = [thinned(known) for _ in range(200)]
+    held = [thinned(known, next(drawn)) for _ in range(200)]
     assert 0 not in held[:20]
     assert abs(held[-100:].count(0) - 75) < 20
 
 
 def test_of_another_world_all_is_learned_from_for_long() -> None:
-    known = right(FEW)
+    known, drawn = right(FEW), draws()
     for _ in range(30_000):
-        thinned(known)
+        thinned(known, next(drawn))
     for _ in range(150):
-        thinned(known, held=False)
-    assert 0 not in [thinned(known) for _ in range(1_500)]
+        thinned(known, next(drawn), held=False)
+    assert 0 not in [thinned(known, next(drawn)) for _ in range(1_500)]
 
 
 def test_one_in_twenty_outside_of_its_interval_is_as_it_should_be() -> None:
-    known, rng = right(FEW), np.random.default_rng(0)
-    weights = [thinned(known, held=bool(held)) for held in rng.random(20_000) < COVERED]
+    known, rng, drawn = right(FEW), np.random.default_rng(0), draws()
+    weights = [thinned(known, next(drawn), held=bool(held)) for held in rng.random(20_000) < COVERED]
     assert weights[10_000:].count(0) > 0.8 * 10_000
 
 
@@ -1206,7 +1215,7 @@ def test_what_a_rough_prediction_stands_for_counts_where_claims_are_rationed_and
     audit = Audit(KEY, values(own=1.3), OWN)
     for known, stands in ((one, 0), (many, 5)):
         for _ in range(3):
-            known.thin(KEY, held=True)
+            known.thin(KEY, 0, held=True)
         known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, stands=stands)
     cells = one._cells[KEY], many._cells[KEY]
     assert cells[0].records == cells[1].records and cells[0].squares == cells[1].squares
@@ -1217,18 +1226,20 @@ def test_what_a_rough_prediction_stands_for_counts_where_claims_are_rationed_and
 
 
 def test_how_roughly_things_are_known_is_kept() -> None:
-    known = right(FEW)
+    known, drawn = right(FEW), draws()
     for k in range(5_003):
-        thinned(known, held=k % 30 > 0)
+        thinned(known, next(drawn), held=k % 30 > 0)
     again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
     pattern = [bool(k % 7) for k in range(50)]
-    assert [thinned(again, held=h) for h in pattern] == [thinned(known, held=h) for h in pattern]
+    for held in pattern:
+        number = next(drawn)
+        assert thinned(again, number, held=held) == thinned(known, number, held=held)
 
 
 def test_what_came_true_while_something_was_looked_for_ends_no_run() -> None:
     known = right(1)
     for _ in range(64):
-        known.confirm(KEY, 0.125)
+        known.confirm(KEY, 0.125, DRAWS - 1)
     audit = Audit(KEY, values(own=1.0), OWN)
     known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05)
     assert known._cells[KEY].steady == 64
@@ -1237,8 +1248,8 @@ def test_what_came_true_while_something_was_looked_for_ends_no_run() -> None:
 
 
 def test_each_prediction_that_somebody_looked_back_at_is_counted_once() -> None:
-    known = right(FEW)
-    left_out = sum(thinned(known) == 0 for _ in range(5_000))
+    known, drawn = right(FEW), draws()
+    left_out = sum(thinned(known, next(drawn)) == 0 for _ in range(5_000))
     assert left_out > 1_000 and known.trials == FEW + 5_000
     audit = Audit(KEY, values(own=1.3), OWN)
     for stands in (0, 1, 3):

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import STDS
+from relgym.mixing import GOLDEN, mixed_one
 from relgym.model.calibration import OWN, Calibration, Key
 from relgym.model.prediction import Prediction, ScenePrediction
 
@@ -198,6 +199,8 @@ class _Look:
         # Who says how large the noise is takes it for granted.
         self._least = WRONG if isinstance(noise, str) else max(WRONG, config.clustering.inlier_stds * noise)
         self._off: set[tuple[str, str]] = set()
+        # Of this step; the same again where what is known is the same.
+        self._draw = mixed_one(sum([model.calibration.trials for model in parts.models.values()]) * GOLDEN)
         # How many predictions that came true, or that came out as such ones do, the present one counts for.
         self._times = self._stands = 0
         self.counts: dict[Target, list[int]] = {}
@@ -224,7 +227,7 @@ class _Look:
             lawful or (standing is Standing.SETTLED and not self._misled(answer))
         ):
             return False
-        self._times = model.calibration.confirm(record.key, self._parts.config.downsampling)
+        self._times = model.calibration.confirm(record.key, self._parts.config.downsampling, self._draw)
         if not lawful:
             self.confirmed[part.object, part.property] = Confirmed(part.mode, self._times)
         if self._times:
@@ -244,7 +247,8 @@ class _Look:
         if math.isnan(part.interval):  # too few came out to tell
             self._stands = 1
             return False
-        weight = self._stands = answer.model.calibration.thin(key, held=abs(residual) <= part.interval)
+        held = abs(residual) <= part.interval
+        weight = self._stands = answer.model.calibration.thin(key, self._draw, held=held)
         if abs(residual) <= STDS * part.interval:
             self.confirmed[part.object, part.property] = Confirmed(NOISE, weight)
         elif not weight:
