@@ -40,6 +40,12 @@ def test_no_threshold_between_a_number_and_itself_computed_in_another_way() -> N
     assert bins.index.tolist() == [[0, 0, 1, 1]]
 
 
+def test_no_threshold_between_distances_of_what_touches() -> None:
+    # Differences of positions of some hundred units, all of them zero but for rounding.
+    bins = bin_values(np.array([[0.0, 5.7e-14, 1.1e-13, -5e-15]]), split=2)
+    assert bins.count == 1
+
+
 def test_the_number_of_bins_is_bounded() -> None:
     values = np.arange(2000.0)
     alternating = np.concatenate([values[::2], values[1::2]])[np.newaxis]
