@@ -69,11 +69,10 @@ ENOUGH: Final = 19
 """Fewest errors that can tell such an interval: the largest of them does then."""
 
 DRAWS: Final = 1 << 64
-"""So many random numbers may be drawn."""
+"""Random numbers of 64 bits are smaller than this."""
 
-_LESS: Final = math.sqrt(
-    1.0 - COVERED
-)  # half way, in logarithms, between as many as are to lie outside and all
+# Half way, in logarithms, between as many as are to lie outside and all.
+_LESS: Final = math.sqrt(1.0 - COVERED)
 _HELD: Final = math.log2((1.0 - _LESS) / COVERED)
 _MISSED: Final = math.log2(_LESS / (1.0 - COVERED))
 """Bits that an error within its interval, or outside of it, says for intervals' holding less often than they are to."""
@@ -713,9 +712,9 @@ class Calibration:
         left_out = draw * (cell.steady // MEMORY) >= DRAWS
         if left_out and cell.doubt < EVIDENCE and kind.squares[PERSISTENCE][0] >= FEW:
             self.trials += 1
-            cell.passed += 1
+            kind.passed += 1
             return 0
-        weight, cell.passed = cell.passed + 1, 0
+        weight, kind.passed = kind.passed + 1, 0
         return weight
 
     def keep(self, modes: Collection[int]) -> None:
