@@ -68,15 +68,6 @@ COVERED: Final = 0.95
 ENOUGH: Final = 19
 """Fewest errors that can tell such an interval: the largest of them does then."""
 
-DRAWS: Final = 1 << 64
-"""Random numbers of 64 bits are smaller than this."""
-
-# Half way, in logarithms, between as many as are to lie outside and all.
-_LESS: Final = math.sqrt(1.0 - COVERED)
-_HELD: Final = math.log2((1.0 - _LESS) / COVERED)
-_MISSED: Final = math.log2(_LESS / (1.0 - COVERED))
-"""Bits that an error within its interval, or outside of it, says for intervals' holding less often than they are to."""
-
 OCTAVE: Final = 4
 """Bins of errors' sizes in an octave: an interval is 19 % too wide at most."""
 
@@ -654,7 +645,7 @@ class Calibration:
                 self._cells[key].steady = 0
         self._changed(cells=len(self._cells) > known)
 
-    def confirm(self, key: Key, share: float, draw: int) -> int:
+    def confirm(self, key: Key, share: float, draw: float) -> int:
         """Take note that a prediction came true; how many such ones it stands for, 0 if another one will for it.
 
         What comes true teaches little, and the less the longer all of its kind did. After r of them in a row half of
@@ -668,7 +659,7 @@ class Calibration:
         share
             `ModelConfig.downsampling`.
         draw
-            A random number of 64 bits, one for all predictions of a step: what some are learned from, those of which
+            A random number from 0 to 1, one for all predictions of a step: where one is learned from, those of which
             more are needed are, too, and of most steps none is. Drawn, not counted off: things take turns, and none is
             to be left out.
         """
@@ -677,13 +668,13 @@ class Calibration:
         if cell is None:
             return 1
         cell.steady += 1
-        if draw * int(2.0 * share * cell.steady) >= DRAWS:
+        if draw * int(2.0 * share * cell.steady) > 1.0:
             cell.passed += 1
             return 0
         weight, cell.passed = cell.passed + 1, 0
         return weight
 
-    def thin(self, key: Key, draw: int, *, held: bool) -> int:
+    def thin(self, key: Key, draw: float, *, held: bool) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
 
         The more of a winner there are, the less one more tells: `MEMORY` of them tell what it leaves to 2 %.
@@ -706,10 +697,12 @@ class Calibration:
         if cell is None or kind is None:
             return 1
         cell.steady += 1
-        cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _MISSED)), 2.0 * EVIDENCE)
+        missed = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
+        likelihood = (1.0 - missed) / COVERED if held else missed / (1.0 - COVERED)
+        cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
         if cell.doubt == 2.0 * EVIDENCE:  # the longer, the more of those before were of another world
             cell.steady -= cell.steady // FEW
-        left_out = draw * (cell.steady // MEMORY) >= DRAWS
+        left_out = draw * (cell.steady // MEMORY) > 1.0
         if left_out and cell.doubt < EVIDENCE and kind.squares[PERSISTENCE][0] >= FEW:
             self.trials += 1
             kind.passed += 1

@@ -17,7 +17,6 @@ from relgym.mixing import GOLDEN, mixed_one
 from relgym.model.calibration import (
     _EXACT,
     COVERED,
-    DRAWS,
     ENOUGH,
     EXPERTS,
     FEW,
@@ -1035,14 +1034,14 @@ def test_bins_of_leads_are_the_same_in_arrays(margins: list[float]) -> None:
             assert 2.0 ** (place - 3) <= margin < 2.0 ** (place - 2)
 
 
-def draws() -> Iterator[int]:
-    """Random numbers of 64 bits, always the same."""
-    return (mixed_one(k * GOLDEN) for k in count(1))
+def draws() -> Iterator[float]:
+    """Random numbers, always the same."""
+    return (mixed_one(k * GOLDEN) / 2**64 for k in count(1))
 
 
 def test_of_predictions_that_come_true_ever_fewer_are_learned_from() -> None:
     # 1/8: after r of them one in r/4; until eight came true in a row that is less than one in two.
-    half, third = DRAWS // 2, DRAWS // 3 + 1
+    half, third = 0.51, 0.34
     known = right(1)
     assert [known.confirm(KEY, 0.125, half) for _ in range(10)] == [1] * 7 + [0] * 3
     # From the twelfth on it is one of three, and each stands for those before it, too.
@@ -1060,20 +1059,20 @@ def test_one_of_as_many_is_learned_from() -> None:
 
 def test_after_one_that_failed_all_are_learned_from_again() -> None:
     known = right(1)
-    first = [known.confirm(KEY, 0.125, DRAWS // 2) for _ in range(30)]
+    first = [known.confirm(KEY, 0.125, 0.51) for _ in range(30)]
     seen(known, values(own=1.0), 2.0)
-    again = [known.confirm(KEY, 0.125, DRAWS // 2) for _ in range(7)]
+    again = [known.confirm(KEY, 0.125, 0.51) for _ in range(7)]
     assert sum(first) == 7
     assert again == [24, 1, 1, 1, 1, 1, 1]  # the first one for those that were left out before
 
 
 def test_of_a_kind_that_nobody_looked_back_at_all_are_learned_from() -> None:
-    assert [Calibration().confirm(KEY, 0.5, DRAWS - 1) for _ in range(9)] == [1] * 9
+    assert [Calibration().confirm(KEY, 0.5, 1.0) for _ in range(9)] == [1] * 9
 
 
 def test_without_downsampling_all_are_learned_from() -> None:
     known = right(1)
-    assert [known.confirm(KEY, 0.0, DRAWS - 1) for _ in range(1_000)] == [1] * 1_000
+    assert [known.confirm(KEY, 0.0, 1.0) for _ in range(1_000)] == [1] * 1_000
 
 
 @given(st.integers(0, 3_000), st.sampled_from([0.0075, 0.03, 0.125]))
@@ -1132,12 +1131,12 @@ def test_a_miss_that_a_law_explains_counts_once() -> None:
 def test_of_two_models_together_all_is_learned_from_at_first() -> None:
     known = right(1)
     for _ in range(1_000):
-        known.confirm(KEY, 0.125, DRAWS - 1)
+        known.confirm(KEY, 0.125, 1.0)
     both = known.united(right(1))
-    assert [both.confirm(KEY, 0.125, DRAWS - 1) for _ in range(7)] == [1] * 7
+    assert [both.confirm(KEY, 0.125, 1.0) for _ in range(7)] == [1] * 7
 
 
-def thinned(known: Calibration, draw: int, *, held: bool = True, key: Key = KEY) -> int:
+def thinned(known: Calibration, draw: float, *, held: bool = True, key: Key = KEY) -> int:
     """How many a prediction that is only roughly right stands for; learned from if any."""
     if weight := known.thin(key, draw, held=held):
         audit = Audit(key, values(own=1.3), OWN)
@@ -1177,9 +1176,9 @@ def test_what_teaches_who_needs_less_teaches_who_needs_more() -> None:
 def test_a_kind_of_few_trials_is_learned_from_however_long_its_winner_is_known() -> None:
     known, rare = right(FEW), KEY._replace(lead=KEY.lead - 1)
     for _ in range(5_000):
-        thinned(known, DRAWS - 1)
-    assert 0 not in [thinned(known, DRAWS - 1, key=rare) for _ in range(FEW)]
-    assert thinned(known, DRAWS - 1, key=rare) == 0
+        thinned(known, 1.0)
+    assert 0 not in [thinned(known, 1.0, key=rare) for _ in range(FEW)]
+    assert thinned(known, 1.0, key=rare) == 0
 
 
 def test_where_intervals_hold_less_often_all_is_learned_from() -> None:
@@ -1239,7 +1238,7 @@ def test_how_roughly_things_are_known_is_kept() -> None:
 def test_what_came_true_while_something_was_looked_for_ends_no_run() -> None:
     known = right(1)
     for _ in range(64):
-        known.confirm(KEY, 0.125, DRAWS - 1)
+        known.confirm(KEY, 0.125, 1.0)
     audit = Audit(KEY, values(own=1.0), OWN)
     known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05)
     assert known._cells[KEY].steady == 64

@@ -249,7 +249,8 @@ def test_of_what_is_roughly_known_some_is_learned_from_until_the_world_changes()
         return [float(np.mean(part)) for part in np.array_split(taken, 4)]
 
     assert max(shares(curve(800, seed=1))[1:]) < 0.75
-    assert min(shares(curve(400, sign=-1.0, seed=2))) > 0.9
+    first, *others = shares(curve(400, sign=-1.0, seed=2))
+    assert first > 0.85 and min(others) == 1.0  # it takes some outside of their intervals to notice
 
 
 def test_models_of_what_is_roughly_known_are_hardly_worse_for_it() -> None:

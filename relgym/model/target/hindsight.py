@@ -15,6 +15,8 @@ from enum import Enum
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import STDS
 from relgym.mixing import GOLDEN, mixed_one
@@ -200,7 +202,8 @@ class _Look:
         self._least = WRONG if isinstance(noise, str) else max(WRONG, config.clustering.inlier_stds * noise)
         self._off: set[tuple[str, str]] = set()
         # Of this step; the same again where what is known is the same.
-        self._draw = mixed_one(sum([model.calibration.trials for model in parts.models.values()]) * GOLDEN)
+        trials = sum([model.calibration.trials for model in parts.models.values()])
+        self._draw = mixed_one(trials * GOLDEN) / int(np.iinfo(np.uint64).max)
         # How many predictions that came true, or that came out as such ones do, the present one counts for.
         self._times = self._stands = 0
         self.counts: dict[Target, list[int]] = {}
