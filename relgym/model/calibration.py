@@ -242,9 +242,10 @@ class _Cell:
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials
     heard: float = 0.0  # predictions, those of long ago counting less
-    steady: int = 0  # predictions in a row, up to now, that came out as such ones do
-    passed: int = 0  # of these, how many the next one that is learned from stands for, too
-    doubt: float = 0.0  # bits by which intervals held less often lately than they are to
+    # Predictions in a row, up to now, that came out as such ones do; of rough ones in the cell of their winner.
+    steady: int = 0
+    passed: int = 0  # predictions left out lately: the next one that is learned from stands for these, too
+    doubt: float = 0.0  # bits by which a winner's intervals held less often lately than they are to
     _sure: tuple[float, float] | None = field(
         default=None, repr=False, compare=False
     )  # by bits, since the last trial
@@ -410,11 +411,11 @@ class Calibration:
     # ------------------------------------------------------------------ what is made of a prediction
     def assess(self, key: Key, values: Sequence[float]) -> Assessment:
         """Who gives the value of a prediction, and how far that can be relied on."""
-        return self._known(key, tuple([k for k, value in enumerate(values) if math.isfinite(value)]))
+        return self._known(key, _able(values))
 
     def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
-        """`assess`, and whether such a prediction `claims`; worked out once between changes."""
-        able = tuple([k for k, value in enumerate(values) if math.isfinite(value)])
+        """What `assess` and `claims` say of a prediction; worked out once between changes."""
+        able = _able(values)
         if (known := self._verdicts.get((key, able))) is None:
             told = self._known(key, able)
             known = self._verdicts[key, able] = told, self.claims(key, told)
@@ -842,6 +843,11 @@ class Calibration:
                 float(each.get("doubt", 0.0)),
             )
         return found
+
+
+def _able(values: Sequence[float]) -> tuple[int, ...]:
+    """Places of the experts that have a value."""
+    return tuple([k for k, value in enumerate(values) if math.isfinite(value)])
 
 
 def _makes_claims(speaker: int) -> bool:

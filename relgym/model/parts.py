@@ -240,20 +240,20 @@ class Parts:
         What the task says is asked for, and a target at once: of ends, that most steps are none is half the story.
         """
         layout = before.layout
-        if not (still := self._still(layout)):
+        if not (open_ := self._undiscovered_in(layout)):
             return
         stays = passage(layout, after.layout).stays
         changed = before.vector != next_values(before, after)
         found = dict.fromkeys(
             target
-            for target, index, column in still
+            for target, index, column in open_
             if stays[index] and (changed[column] or target.type == TASK)
         )
         check_number(len(self.targets) + len(found))
         for target in found:
             self.add_target(target)
 
-    def _still(self, layout: SceneLayout) -> list[tuple[Target, int, int]]:
+    def _undiscovered_in(self, layout: SceneLayout) -> list[tuple[Target, int, int]]:
         """What may become a target, the object and the column of each; cached until there is another target."""
         known = self._undiscovered.get(id(layout))
         if known is not None and known[0] is layout:

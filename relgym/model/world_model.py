@@ -292,11 +292,9 @@ class WorldModel:
         """The precision, once it is known that all three are what they should be: else nothing is begun."""
         if not isinstance(prediction, ScenePrediction):
             raise ObservationError(f"prediction={prediction!r}: expected what predict_one gives")
-        try:
-            known = isinstance(residuals, Mapping) and all(map(math.isfinite, residuals.values()))
-        except TypeError:
-            known = False
-        if not known:
+        if not isinstance(residuals, Mapping) or not all(
+            [isinstance(off, (int, float)) and math.isfinite(off) for off in residuals.values()]
+        ):
             raise ObservationError(f"residuals={residuals!r}: expected finite numbers by (object, property)")
         return self._precision(precision)
 

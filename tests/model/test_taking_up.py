@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
+from relgym.errors import ObservationError
 from relgym.experiments.body_worlds import Setting, body_rooms
 from relgym.model.files.archive import parts_to_arrays, parts_to_json
 from relgym.model.fitting import compare_and_learn
@@ -250,7 +253,7 @@ def test_of_what_is_roughly_known_some_is_learned_from_until_the_world_changes()
 
     assert max(shares(curve(800, seed=1))[1:]) < 0.75
     first, *others = shares(curve(400, sign=-1.0, seed=2))
-    assert first > 0.85 and min(others) == 1.0  # it takes some outside of their intervals to notice
+    assert first >= 0.9 and min(others) == 1.0  # it takes some outside of their intervals to notice
 
 
 def test_models_of_what_is_roughly_known_are_hardly_worse_for_it() -> None:
@@ -294,3 +297,15 @@ def test_weights_of_a_regression_that_are_missing_say_nothing() -> None:
     known = regression.sums(regression.targets[1])
     assert known is not None
     assert all(np.isnan(row).all() for row in known[0])
+
+
+@pytest.mark.parametrize("off", [Decimal("0.5"), np.float32(0.5), "0.5", math.nan, None])
+def test_residuals_that_are_no_finite_numbers_are_refused_before_anything_is_learned(off: Any) -> None:
+    model = WorldModel(BOX, targets=[SPEED])
+    learned(model, steps(20))
+    before = written(model)
+    (step,) = steps(1, seed=1)
+    said = model.predict_one(step.before)
+    with pytest.raises(ObservationError, match="expected finite numbers by"):
+        model.take_up(step, said, {("a", "v"): off})
+    assert written(model) == before

@@ -201,7 +201,7 @@ class _Look:
         # Who says how large the noise is takes it for granted.
         self._least = WRONG if isinstance(noise, str) else max(WRONG, config.clustering.inlier_stds * noise)
         self._off: set[tuple[str, str]] = set()
-        # Of this step; the same again where what is known is the same.
+        # A number from 0 to 1 for this step; a model that is loaded again draws the same.
         trials = sum([model.calibration.trials for model in parts.models.values()])
         self._draw = mixed_one(trials * GOLDEN) / int(np.iinfo(np.uint64).max)
         # How many predictions that came true, or that came out as such ones do, the present one counts for.

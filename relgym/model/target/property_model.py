@@ -425,12 +425,8 @@ class PropertyModel:
         """
         return len(self.classifier.modes) > 1 and self.hindsight.undecided
 
-    def assess(self, key: Key, values: Sequence[float]) -> Assessment:
-        """Who gives the value of a prediction, and how right it will be."""
-        return self.record.assess(key, values)
-
     def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
-        """`assess`, and whether such a prediction `claims`."""
+        """Who gives the value of a prediction, how right it will be, and whether it is claimed."""
         told, claimed = self.record.verdict(key, values)
         return told, claimed and not (self.surmise and self.config.abstain)
 
