@@ -17,6 +17,7 @@ from relgym.logic.clause import ANY, Literal
 from relgym.logic.cuts import Cuts, best_cuts
 from relgym.logic.facts import Float, Int
 from relgym.logic.growing import Counts, Growing, Score, Weights
+from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import NumericStack, Tables
 from relgym.logic.templates import Template
 from relgym.logic.thresholds import simplest_between
@@ -63,7 +64,9 @@ class Block:
         return np.array([template.name for template in self.templates], dtype=np.str_)
 
 
-def blocks(tables: Tables, growing: Growing, weights: Weights, score: Score, max_new: int) -> Iterator[Block]:
+def blocks(
+    tables: Tables, growing: Growing, weights: Weights, score: Score, config: FoilConfig
+) -> Iterator[Block]:
     """Yield every literal that may be added to a clause, with its counts.
 
     Parameters
@@ -74,16 +77,16 @@ def blocks(tables: Tables, growing: Growing, weights: Weights, score: Score, max
         The clause so far.
     score
         Chooses the thresholds.
-    max_new
-        Most existential variables that the clause may have.
+    config
+        Tells how many existential variables the clause may have, and whether thresholds are among the literals.
     """
-    room = max_new - growing.existentials
+    room = config.max_new_variables - growing.existentials
     if growing.bindings.size * tables.facts.objects > _CELLS:
         room = 0
     for width in tables.widths:
         for variables in itertools.permutations(range(growing.existentials), width):
             yield from _relational(tables, growing, weights, variables, room)
-    for width in tables.numeric_widths:
+    for width in tables.numeric_widths if config.numeric else ():
         stack = tables.numeric_stack(width)
         for variables in itertools.permutations(range(growing.existentials), width):
             yield from _bound_numeric(stack, growing, weights, score, variables, tables.arity)

@@ -55,7 +55,7 @@ class Cover:
         self._problem = Problem(tables.facts, tables.tuples, weights, positive)
         names = len(tables.facts.relations) + len(tables.functions)
         self._length = DescriptionLength(names, tables.size, _typical(weights, tables.split))
-        self._harvests: dict[bytes, Harvest] = {}
+        self._harvests: dict[tuple[bool, bytes], Harvest] = {}
         self._work = 0
 
     def swapped(self) -> Cover:
@@ -69,30 +69,35 @@ class Cover:
             # a single class: the clause without literals covers it
             return self._definition([Clause((), self._tables.arity)] if everything.positives > 0 else [])
         if not self._config.mdl:
-            return self._definition((yield from self._clauses(True, math.inf)))
-        best = self._definition((yield from self._clauses(False, limit)))
-        if best.errors > EPS or sum(map(len, best.clauses)) > _SHORT:
-            other = self._definition((yield from self._clauses(True, min(limit, best.bits))))
+            return self._definition((yield from self._clauses(self._config, math.inf, pure=True)))
+        # relations alone first: thresholds that tell most tuples apart would crowd them out of the beam
+        best = self._definition((yield from self._clauses(replace(self._config, numeric=False), limit)))
+        looks = [(False, 1), (True, _SHORT)] if self._tables.functions else [(True, _SHORT)]
+        for pure, enough in looks:
+            if best.errors <= EPS and sum(map(len, best.clauses)) <= enough:
+                break
+            clauses = yield from self._clauses(self._config, min(limit, best.bits), pure=pure)
+            other = self._definition(clauses)
             best = other if other.bits < best.bits - EPS else best
         return replace(best, work=self._work)
 
-    def _clauses(self, pure: bool, limit: float) -> Steps[list[Clause]]:
+    def _clauses(self, config: FoilConfig, limit: float, *, pure: bool = False) -> Steps[list[Clause]]:
         """Add clauses, `pure` ones if any, until all is covered or they cost more bits than `limit`."""
         alive = np.ones(self._tables.size, dtype=np.bool_)
         clauses: list[Clause] = []
         while len(clauses) < self._config.max_clauses and self._problem.count(alive).positives > EPS:
-            clause = yield from self._acceptable(alive, pure)
+            clause = yield from self._acceptable(alive, config, pure=pure)
             if clause is None or self._length.clauses([*clauses, clause]) > limit:
                 break
             clauses.append(clause)
             alive &= ~self._problem.matches(clause)
         return self._without_redundant(clauses)
 
-    def _acceptable(self, alive: Bool, pure: bool) -> Steps[Clause | None]:
+    def _acceptable(self, alive: Bool, config: FoilConfig, *, pure: bool) -> Steps[Clause | None]:
         """The best clause that tells enough about the tuples left."""
         problem = self._problem
         rest = replace(problem, weights=np.where(alive | ~problem.positive, problem.weights, 0.0))
-        for growing in (yield from self._ranked(alive, pure))[:_ATTEMPTS]:
+        for growing in (yield from self._ranked(alive, config, pure=pure))[:_ATTEMPTS]:
             clause = prune(Clause.of(growing.literals, self._tables.arity), rest)
             clause = center_thresholds(clause.connected(), rest)
             covered = problem.count(alive & problem.matches(clause))
@@ -101,10 +106,10 @@ class Cover:
                 return clause
         return None
 
-    def _ranked(self, alive: Bool, pure: bool) -> Steps[list[Growing]]:
-        key = alive.tobytes()
+    def _ranked(self, alive: Bool, config: FoilConfig, *, pure: bool) -> Steps[list[Growing]]:
+        key = (config.numeric and bool(self._tables.functions), alive.tobytes())
         if key not in self._harvests:
-            harvest = self._harvests[key] = yield from self._harvest(alive)
+            harvest = self._harvests[key] = yield from self._harvest(alive, config)
             self._work += harvest.work
         whole = self._problem.count(alive)
         information = Score(whole.positives, whole.negatives).information
@@ -117,7 +122,7 @@ class Cover:
             keys[place] = (not clean, -round(value, TALLY_DIGITS), round(bits, TALLY_DIGITS), place)
         return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
 
-    def _harvest(self, alive: Bool) -> Steps[Harvest]:
+    def _harvest(self, alive: Bool, config: FoilConfig) -> Steps[Harvest]:
         """Search among the tuples left. Where many are gone it is cheaper to lay out the others anew."""
         tables, weights = self._tables, self._problem.weights
         if alive.mean() < _RELAID:
@@ -125,7 +130,7 @@ class Cover:
         else:
             weights = np.where(alive, weights, 0.0)
         classes = Weights(weights[: tables.split], weights[tables.split :], self._swapped)
-        return grow.steps(tables, classes, self._config, self._length)
+        return grow.steps(tables, classes, config, self._length)
 
     def _accepts(self, clause: Clause, covered: Coverage, whole: Coverage) -> bool:
         if covered.positives <= covered.negatives + EPS or covered.precision < self._config.min_precision:

@@ -65,8 +65,9 @@ def learn(
     -----
     Deviations from the thesis: clauses are found by beam search and FOIL's gain, not by negatives alone; all
     tuples evaluate a clause, not a random quarter; a rejected clause doesn't end learning; description length
-    decides what is noise. Two strategies are tried, clauses without any negatives first and clauses that
-    compress best; the definition that takes fewer bits is kept.
+    decides what is noise. Three searches are made as long as one errs or needs many literals: for clauses of
+    relations alone that compress best, for such clauses with thresholds, and for those without any negatives first;
+    the definition that takes fewest bits is kept.
     Deterministic. Cost: see `search.grow`, per clause.
     """
     return (yield from _cover(facts, positives, negatives, pos_weights, neg_weights, config).solve())

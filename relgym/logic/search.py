@@ -24,7 +24,8 @@ __all__ = ["GROUP", "LITERAL", "Harvest", "grow"]
 
 
 _PATIENCE: Final = 2
-"""A search ends after so many literals that saved no bits; one that connects pays only with the next."""
+"""A search ends after so many literals that told neither tuples nor bindings apart better; one that connects pays only
+with the next."""
 
 
 LITERAL, GROUP = 12, 150_000
@@ -84,7 +85,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
         if config.mdl:
             beam = [each for each in beam if _may_pay(each, tables.arity, length, whole)]
             saved.append(
-                max((_saving(each, tables.arity, length, whole) for each in pool.values()), default=0.0)
+                max((_worth(each, tables.arity, length, whole, score) for each in pool.values()), default=0.0)
             )
         if not beam or (config.mdl and len(saved) > _PATIENCE and saved[-1] <= saved[-1 - _PATIENCE]):
             break
@@ -122,6 +123,12 @@ def _saving(growing: Growing, arity: int, length: DescriptionLength, whole: Cove
     return length.saving(length.literals(growing.literals, arity), left, whole)
 
 
+def _worth(growing: Growing, arity: int, length: DescriptionLength, whole: Coverage, score: Score) -> float:
+    """Bits that the clause saves, or that its bindings do: they are told apart before the tuples are."""
+    bits = length.literals(growing.literals, arity)
+    return max(_saving(growing, arity, length, whole), float(score(growing.left)) - bits)
+
+
 class _Candidates:
     """All literals that may be added to any clause of the beam, as parallel arrays."""
 
@@ -139,7 +146,7 @@ class _Candidates:
         self._blocks = [
             (growing, block)
             for growing in beam
-            for block in blocks(tables, growing, weights, score, config.max_new_variables)
+            for block in blocks(tables, growing, weights, score, config)
             if block.templates
         ]
         self.groups = len(self._blocks)

@@ -202,6 +202,31 @@ def test_relations_are_preferred_to_numbers_that_say_the_same() -> None:
         assert str(learn(facts, tuples[red], tuples[~red], config=config)) == "red(A)"
 
 
+def test_numbers_that_tell_most_tuples_apart_hide_no_relations_that_tell_all() -> None:
+    # a truck, then three or four boxes in a row: two of four aren't touched by what stands in front and not next
+    rng, n = np.random.default_rng(3), 200
+    four = np.arange(n) % 3 > 0
+    exists = np.ones((n, 5), dtype=np.bool_)
+    exists[~four, 4] = False
+    place = np.arange(5)
+    there = exists[:, :, None] & exists[:, None, :]
+    relations = {
+        "box": exists & (place > 0),
+        "behind": there & (place[:, None] > place) & (place > 0),
+        "touches": there & (np.abs(place[:, None] - place) == 1),
+        "parallel": there & (place[:, None] != place),
+    }
+    speed = np.where(four, rng.uniform(0.0, 1.1, n), rng.uniform(0.9, 2.0, n))
+    facts = Facts(
+        relations, exists, {"speed": speed, "size": rng.random((n, 5))}, relative=frozenset({"speed"})
+    )
+    tuples = np.stack([np.arange(n), np.zeros(n, dtype=np.int64)], axis=1)
+    weights = {"pos_weights": np.full(four.sum(), 5.0), "neg_weights": np.full((~four).sum(), 5.0)}
+    definition = learn_both(facts, tuples[four], tuples[~four], **weights)
+    assert definition.errors == 0
+    assert all(literal.op is None for clause in definition.clauses for literal in clause)
+
+
 def test_numbers_of_one_tuple_are_evidence_once_however_much_it_weighs() -> None:
     rng = np.random.default_rng(7)
     red = np.arange(200) < 100

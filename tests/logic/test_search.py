@@ -44,7 +44,7 @@ def _coverage(
 def test_counts_of_candidates_are_those_of_the_clauses_they_make(seed: int, swapped: bool) -> None:
     facts, tables, weights = _problem(seed, swapped)
     for growing in grow(tables, weights, CONFIG, LENGTH).clauses[:4]:
-        for block in blocks(tables, growing, weights, Score(6.0, 6.0), 2):
+        for block in blocks(tables, growing, weights, Score(6.0, 6.0), FoilConfig()):
             for row in range(0, len(block.templates), 3):
                 literals = (*growing.literals, block.literal(row))
                 found = [block.counts.positives[row], block.counts.negatives[row]]
