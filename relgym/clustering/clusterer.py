@@ -59,7 +59,7 @@ class ModeClusterer:
     floor
         Rounding noise, the least that is possible, in units of the target.
     due
-        Whether an approximation is to be sought at the next opportunity, or is being sought.
+        Whether an approximation is to be sought at the next opportunity, once the one under way, if any, is found.
 
     Notes
     -----
@@ -74,6 +74,7 @@ class ModeClusterer:
         self.floor = 1e-12
         self.due = False
         self._resort: Resort | None = None  # the search for an approximation, under way
+        self._sought = 0  # after so many examples the latest one began
         self._estimating = False  # whether the noise is to be estimated anew
         self._largest = 0.0  # number among the columns and the target's values
         self._reach = 0.0  # value of the target
@@ -99,6 +100,21 @@ class ModeClusterer:
     def approximate(self) -> bool:
         """Whether the noise assumed is what an approximation leaves, no exact law being known."""
         return self.population.approximate
+
+    @property
+    def waits(self) -> bool:
+        """Whether a search for modes or for an approximation is under way, or one for an approximation is due."""
+        return self.search.under_way or self.approximating or self.due
+
+    @property
+    def approximating(self) -> bool:
+        """Whether a search for an approximation is under way."""
+        return self._resort is not None
+
+    @property
+    def turn(self) -> tuple[bool, int]:
+        """Of several targets the least one's approximation is sought first: one under way, or the oldest."""
+        return not self.approximating, self._sought
 
     @property
     def clusters(self) -> dict[int, Cluster]:
@@ -181,7 +197,7 @@ class ModeClusterer:
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
             self.search.discover(table, example, budget)
         reassigned = review_due(self.seen) and self._review(table)
-        self.due |= self._hopeless(table)
+        self.due |= self._timely(table)
         self.approximate_now(table, budget)
         after = set(self.clusters)
         fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
@@ -198,9 +214,14 @@ class ModeClusterer:
         """Whether a search for modes is under way."""
         return self.search.under_way
 
-    def go_on(self, table: ExampleTable, budget: Budget) -> bool:
-        """Go on with the search for modes, as far as the budget goes; whether they are others than before."""
+    def go_on(self, table: ExampleTable, budget: Budget, *, begin: bool = False) -> bool:
+        """Go on with the search for modes, as far as the budget goes; whether they are others than before.
+
+        To `begin`, one is begun where all examples are news and the next one would begin it.
+        """
         before = set(self.clusters)
+        if begin and not self.search.begun and len(self.population.noise()):
+            self.search.discover(table, int(self.population.noise()[-1]), budget)
         self.search.pursue(table, budget)
         return before != set(self.clusters)
 
@@ -306,33 +327,41 @@ class ModeClusterer:
     def retarget(self, target: Target) -> None:
         """Be given other next values: the examples stay, modes are searched again."""
         self.population.target = target
-        self._spread, self.population.approximate, self.due, self._resort = 0.0, False, False, None
+        self.due |= self.approximating  # what waited goes on waiting
+        self._spread, self.population.approximate, self._resort = 0.0, False, None
         self._assume(self.floor)
         self._start_over()
 
     # ------------------------------------------------------------------ the last resort
-    def _hopeless(self, table: ExampleTable) -> bool:
+    @property
+    def _hopeless(self) -> bool:
+        """Whether exact laws explain too little."""
+        # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
+        return 2 * self.noise_examples > self.seen or self._spread > 0.0
+
+    def _timely(self, table: ExampleTable) -> bool:
         """Whether it is time to look for an approximation, since exact laws explain too little."""
         if self.config.noise_std != "auto" or not timely(self.population, table, again=self.approximate):
             return False
-        # Where noise was assumed to be larger than rounding, that may have been a curve that features would follow.
-        return 2 * self.noise_examples > self.seen or self._spread > 0.0
+        return self._hopeless
 
     def approximate_now(self, table: ExampleTable, budget: Budget) -> bool:
         """Look for an approximation, the law of last resort, if one is due; whether it is found and taken.
 
-        As far as the budget goes: it is called again until `due` no longer holds.
+        As far as the budget goes: it is called again until none is `approximating` or `due`.
         """
-        if not self.due:
-            return False
-        if self._resort is None and not budget.left:
-            return False  # what waits holds no data
         if self._resort is None:
+            if not self.due or not budget.left or not self.search.begun:
+                return False  # what waits holds no data
+            self.due = False
+            if not self._hopeless:
+                return False
             self._resort = Resort.of(self.population, table, floor=self.floor)
+            self._sought = self.seen
         if not budget.work(self._resort.task):
             return False
         found = self._resort.found(self.population, table, floor=self.floor, again=self.approximate)
-        self._resort, self.due = None, False
+        self._resort = None
         if found is None:
             return False
         self._spread, self.population.approximate = found.sigma, True
@@ -393,7 +422,7 @@ class ModeClusterer:
             "spread": self._spread,
             "rounding": self.floor,
             "approximate": self.approximate,
-            **({"due": True} if self.due else {}),
+            **({"due": True} if self.due or self.approximating else {}),
             **({"chancy": True} if self.population.chancy else {}),
             **({"estimating": True} if self._estimating else {}),
             **({"passed": passed} if passed else {}),

@@ -108,6 +108,11 @@ class ModeSearch:
         """Whether there is a search to be gone on with."""
         return self._hunt is not None
 
+    @property
+    def begun(self) -> bool:
+        """Whether there has been any news to search since the examples were."""
+        return bool(self._searches)
+
     def start_over(self) -> None:
         """All examples are news again."""
         self._hunt = None

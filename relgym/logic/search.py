@@ -73,21 +73,20 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
     score = Score(whole.positives, whole.negatives, config.choice)
     beam = [Growing((), everything, Counts.of(everything, weights))]
     pool: dict[bytes, Growing] = {}
-    saved: list[float] = []
+    worth: list[float] = []
     work = 0
     for depth in range(1, config.max_literals + 1):
         found = _Candidates(tables, beam, weights, score, config, length)
         work += tables.size * found.size
         yield GROUP * found.groups + LITERAL * tables.size * found.size
         lookahead = config.lookahead if depth < config.max_literals else 0
-        beam = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
-        beam = _promising(beam, pool.values())
+        new = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
+        beam = _promising(new, pool.values())
         if config.mdl:
             beam = [each for each in beam if _may_pay(each, tables.arity, length, whole)]
-            saved.append(
-                max((_worth(each, tables.arity, length, whole, score) for each in pool.values()), default=0.0)
-            )
-        if not beam or (config.mdl and len(saved) > _PATIENCE and saved[-1] <= saved[-1 - _PATIENCE]):
+            values = (_worth(each, tables.arity, length, whole, score) for each in new)
+            worth.append(max((*worth[-1:], *values), default=0.0))
+        if not beam or (len(worth) > _PATIENCE and worth[-1] <= worth[-1 - _PATIENCE]):
             break
     return Harvest(tuple(pool.values()), work)
 

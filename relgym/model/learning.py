@@ -142,9 +142,10 @@ def _nothing_waits(parts: Parts) -> bool:
 
 def _go_on(parts: Parts, budget: Budget) -> None:
     """Go on with what is under way: what is sure to end soon, then searches for modes, the oldest first."""
+    for target in sorted(parts.targets, key=lambda each: parts.models[each].clusterer.turn):
+        parts.models[target].approximate(parts.tables[target.type], budget)
     for target in parts.targets:
         table, model = parts.tables[target.type], parts.models[target]
-        model.approximate(table, budget)
         if model.fallback.guesses.underway or model.candidates.under_way:
             model.reconsider(table, budget)
     searches = budget.part(SEARCHES)

@@ -152,9 +152,15 @@ def consensus(
     chosen = yield from _forward_batch(x[:, columns], y, samples, terms=terms, sigma=sigma, loose=loose)
     best: Consensus | None = None
     tried: set[tuple[tuple[int, ...], bytes]] = set()  # what is refined depends on columns and inliers alone
+    told: dict[tuple[int, ...], list[NDArray[np.bool_]]] = {}  # inliers of functions, by columns
     for sample, picked in _distinct(samples, chosen, limit):
-        fit = least_squares(x[sample], y[sample], tuple(int(columns[c]) for c in picked))
+        names = tuple(int(columns[c]) for c in picked)
+        known = told.setdefault(names, [])
+        if any(inliers[sample].all() for inliers in known):
+            continue  # it would tell the same function again
+        fit = least_squares(x[sample], y[sample], names)
         found = Consensus(fit, np.abs(y - fit.predict(x)) <= loose * tolerance)
+        known.append(found.inliers)
         key = (fit.columns, found.inliers.tobytes())
         if best is None or (found.size, -found.fit.terms) > (best.size, -best.fit.terms):
             if key not in tried:
@@ -198,8 +204,8 @@ def _forward_batch(
     choose = _choose_among_many if x.shape[1] > MANY else _choose
     every = np.empty((draws, max(terms, 1)), dtype=np.intp)
     for part in _pieces(draws, CHUNK, size * x.shape[1]):
-        a, b = x[samples[part]], y[samples[part]]
-        a -= a.mean(axis=1, keepdims=True)
+        a, b = x[samples[part].T], y[samples[part]]
+        a -= a.mean(axis=0)
         chosen, left = choose(a, b - b.mean(axis=1, keepdims=True), terms, sigma, enough)
         chosen[left > enough, 0] = -2
         every[part] = chosen
@@ -210,26 +216,31 @@ def _forward_batch(
 def _choose(
     a: NDArray[np.float64], residual: NDArray[np.float64], terms: int, sigma: float, enough: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Columns for each sample, ``(draws, terms)``, and what they leave; what is chosen is swept out of all others."""
-    draws, size, _ = a.shape
-    sizes = np.square(a).sum(axis=1)
+    """Columns for each sample, ``(draws, terms)``, and what they leave; what is chosen is swept out of all others.
+
+    `a` has the shape ``(size, draws, d)``, for sums over a sample's rows are of long vectors then; `residual` has
+    ``(draws, size)``.
+    """
+    _, draws, d = a.shape
+    sizes = np.square(a).sum(axis=0)
     chosen = np.full((draws, max(terms, 1)), -1, dtype=np.intp)
-    for t in range(min(terms, a.shape[2])):
+    for t in range(min(terms, d)):
         left = np.square(residual).sum(axis=1)
         open_ = left > enough
         if not open_.any():
             break
-        pivots = np.square(a).sum(axis=1)
+        pivots = np.square(a).sum(axis=0)
         usable = (pivots > 1e-16 * sizes) & (sizes > 0.0)
-        gains = np.square((a * residual[:, :, None]).sum(axis=1)) / np.where(usable, pivots, np.inf)
-        best, found = _best_columns(gains, usable, left, size * sigma**2)
+        gains = np.square((a * residual.T[:, :, None]).sum(axis=0)) / np.where(usable, pivots, np.inf)
+        best, found = _best_columns(gains, usable, left, len(a) * sigma**2)
         take = open_ & found
         chosen[take, t] = best[take]
-        q = np.where(take[:, None], a[np.arange(draws), :, best], 0.0)
+        q = np.where(take[:, None], a[:, np.arange(draws), best].T, 0.0)
         length = np.sqrt(np.square(q).sum(axis=1))
         q /= np.where(length > 0.0, length, 1.0)[:, None]
         residual = residual - (q * residual).sum(axis=1)[:, None] * q
-        a -= q[:, :, None] * (q[:, :, None] * a).sum(axis=1)[:, None, :]
+        across = np.ascontiguousarray(q.T)[:, :, None]
+        a -= across * (across * a).sum(axis=0)
     return chosen, np.square(residual).sum(axis=1)
 
 
@@ -237,6 +248,7 @@ def _choose_among_many(
     a: NDArray[np.float64], residual: NDArray[np.float64], terms: int, sigma: float, enough: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """The same at a fraction of the cost, a little less exact: see `relgym.numeric.stepwise`."""
+    a = np.ascontiguousarray(a.swapaxes(0, 1))
     draws, size, _ = a.shape
     sizes = np.einsum("dij,dij->dj", a, a)
     pivots, basis = sizes.copy(), list[NDArray[np.float64]]()
@@ -285,8 +297,8 @@ def _distinct(
     seen: dict[tuple[int, ...], int] = {}
     verified = np.flatnonzero(chosen[:, 0] != -2)
     order = verified[np.argsort((chosen[verified] >= 0).sum(axis=1), kind="stable")]
-    for i in order:
-        picked = sorted(int(c) for c in chosen[i] if c >= 0)
+    for i, columns in zip(order.tolist(), chosen[order].tolist(), strict=True):
+        picked = sorted(c for c in columns if c >= 0)
         key = tuple(picked)
         seen[key] = seen.get(key, 0) + 1
         if seen[key] <= 6:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import copy
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from relgym.clustering.examples import ExampleTable
+from relgym.clustering.last_resort import Resort
+from relgym.clustering.population import Population
 from relgym.config import ModelConfig
 from relgym.model.files.archive import parts_to_json
 from relgym.model.world_model import WorldModel
@@ -113,3 +117,54 @@ def test_little_by_little_comes_to_the_same_laws() -> None:
     patient.finish(), hasty.finish()
     formulas = [{mode.formula() for mode in model.modes("point", "a")} for model in (patient, hasty)]
     assert formulas[0] == formulas[1] == {"a' = 0.5 a + d", "a' = a - b"}
+
+
+# --- approximations, which take many steps and are sought for one target after the other --------------------
+
+CURVES = SceneSchema((ObjectType("curve", ("a", "b", "c")),), (("q", "curve"),))
+FEATURES = ModelConfig(
+    features=("trig", "products"), cells_per_step=60_000, most_cells=60_000, saved_cells=60_000
+)
+
+
+def curves(n: int) -> list[Transition]:
+    """Nearly, but not quite, what a few features say."""
+    rng = np.random.default_rng(8)
+    found = []
+    for now in rng.uniform(-2.0, 2.0, size=(n, 3)):
+        a, b, c = now
+        after = [a + np.sin(b + 0.01 * a**3), b + np.sin(c + 0.01 * a**3), c + np.sin(a + 0.01 * b**3)]
+        found.append(Transition(CURVES.scene({"q": now}), CURVES.scene({"q": after})))
+    return found
+
+
+def test_the_oldest_approximation_is_sought_anew_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[str] = []
+    of = Resort.of.__func__  # type: ignore[attr-defined]
+
+    def spied(cls: type[Resort], population: Population, table: ExampleTable, *, floor: float) -> Resort:
+        begun.append(population.target.property)
+        found: Resort = of(cls, population, table, floor=floor)
+        return found
+
+    monkeypatch.setattr(Resort, "of", classmethod(spied))
+    model = WorldModel(CURVES, FEATURES)
+    for transition in curves(1_100):
+        model.learn_one(transition)
+    assert begun[:3] == ["a", "b", "c"]
+    model.finish()
+    # what came due while others were sought is made up for, with the examples there are by then
+    assert {prop: begun.count(prop) >= 2 for prop in "abc"} == dict.fromkeys("abc", True)
+    assert not any(part.clusterer.waits for part in model._parts.models.values())
+
+
+def test_what_begins_anew_at_the_end_is_searched_and_approximated() -> None:
+    model = WorldModel(CURVES, FEATURES)
+    for transition in curves(400):
+        model.learn_one(transition)
+    part = next(m for t, m in model._parts.models.items() if t.property == "b")
+    part.clusterer.due = True
+    model._parts.retarget(part.target, replace(part.target, given=(("curve", "a"),)))
+    assert not part.modes
+    model.finish()
+    assert part.modes and part.clusterer.approximate

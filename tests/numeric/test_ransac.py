@@ -223,7 +223,8 @@ def test_among_many_columns_samples_choose_what_they_choose_among_few(terms: int
     picked = np.array([rng.choice(50, terms, replace=False) for _ in range(20)])
     weights = rng.uniform(0.5, 2.0, size=(20, terms)) * rng.choice([-1.0, 1.0], size=(20, terms))
     y = (np.take_along_axis(a, picked[:, None, :], axis=2) * weights[:, None]).sum(axis=2)
-    told = [choose(a.copy(), y.copy(), terms, 1e-9, 1e-16) for choose in (_choose, _choose_among_many)]
+    rows = a.swapaxes(0, 1)
+    told = [choose(rows.copy(), y.copy(), terms, 1e-9, 1e-16) for choose in (_choose, _choose_among_many)]
     np.testing.assert_array_equal(told[0][0], told[1][0])
     np.testing.assert_allclose(told[0][1], told[1][1], rtol=1e-6, atol=1e-20)
     for (columns, left), sample in ((each, k) for each in told for k in range(20)):
@@ -239,10 +240,38 @@ def test_a_verified_sample_stops_choosing() -> None:
     a -= a.mean(axis=1, keepdims=True)
     y = np.array([[1.0, 5.0, -2.0, 0.5], [2.0, -2.0, 2.0, -2.0], [0.0, 0.0, 0.0, 0.0]])
     y -= y.mean(axis=1, keepdims=True)
-    chosen, left = _choose(a.copy(), y, 1, 1e-9, 1e-12)
+    chosen, left = _choose(a.swapaxes(0, 1).copy(), y, 1, 1e-9, 1e-12)
     assert chosen[1:].tolist() == [[1], [-1]]
     assert chosen[0, 0] >= 0 and left[0] > 1.0
     assert left[1:] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_samples_that_tell_a_known_function_again_are_not_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=(60, 4))
+    y = np.where(np.arange(60) % 2 == 0, 2.0 * x[:, 0] - x[:, 1], x[:, 2])
+    fitted: list[tuple[int, ...]] = []
+
+    def spied(rows: np.ndarray, values: np.ndarray, columns: tuple[int, ...]) -> LinearFit:
+        fitted.append(columns)
+        return least_squares(rows, values, columns)
+
+    monkeypatch.setattr("relgym.numeric.ransac.least_squares", spied)
+    found = consensus(
+        x,
+        y,
+        sigma=1e-12,
+        tolerance=4e-12,
+        terms=3,
+        size=6,
+        draws=600,
+        rng=np.random.default_rng(1),
+        strata=np.arange(60) % 2,
+    )
+    assert found is not None and found.size == 30
+    # six samples of a set of columns may be tried; each function is fitted once, and refined
+    assert fitted.count((2,)) <= 3
+    assert fitted.count((0, 1)) <= 3
 
 
 def test_of_the_same_columns_few_samples_are_tried() -> None:

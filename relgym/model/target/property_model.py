@@ -203,7 +203,7 @@ class PropertyModel:
     def waits(self) -> bool:
         """Whether something is being looked for, or is due."""
         c, fallback = self.clusterer, self.fallback
-        if c.searching or c.due or self.classifier.waits or self.casting.waits:
+        if c.waits or self.classifier.waits or self.casting.waits:
             return True
         return self.candidates.due(c.seen) or (fallback.guessable and fallback.guesses.stale(c.seen))
 
@@ -215,7 +215,7 @@ class PropertyModel:
         c = self.clusterer
         if c.approximate or self.rough:
             return Standing.COARSE
-        if c.population.chancy or c.searching or c.due or self.classifier.waits or self.casting.waits:
+        if c.population.chancy or c.waits or self.classifier.waits or self.casting.waits:
             return Standing.OPEN
         return Standing.SETTLED
 
@@ -315,14 +315,15 @@ class PropertyModel:
 
     def approximate(self, table: ExampleTable, budget: Budget) -> None:
         """Look for an approximation if one is due, as far as the budget goes."""
-        if self.clusterer.due and self.clusterer.approximate_now(table, budget):
+        if self.clusterer.approximate_now(table, budget):
             self.follow(table)
 
     def search(self, table: ExampleTable, budget: Budget) -> None:
-        """Finish the searches that are under way or due."""
-        changed = False
-        while self.clusterer.searching or self.clusterer.due:
-            changed |= self.clusterer.go_on(table, budget) | self.clusterer.approximate_now(table, budget)
+        """Finish the searches that are under way or due, those of a target that has begun anew among them."""
+        changed = self.clusterer.go_on(table, budget, begin=True)
+        for _ in range(2):  # an approximation may be under way, and another one due
+            changed |= self.clusterer.approximate_now(table, budget)
+            changed |= self.clusterer.go_on(table, budget, begin=True)
         if changed:
             self.follow(table)
 

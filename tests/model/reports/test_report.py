@@ -163,8 +163,8 @@ def test_truck_clauses_are_perfect_as_in_table_3_2(truck: tuple[WorldModel, Scen
     for pair in velocity.pairs:
         *clauses, otherwise = pair.rows
         # Not exact: a classifier remembers a sample of its examples, each with a weight.
-        assert sum(row.correct for row in clauses) == pytest.approx(counts[pair.mode], rel=0.02)
-        assert otherwise.correct == pytest.approx(counts[pair.other], rel=0.02)
+        assert sum(row.correct for row in clauses) == pytest.approx(counts[pair.mode], rel=0.05)
+        assert otherwise.correct == pytest.approx(counts[pair.other], rel=0.05)
 
 
 def test_truck_roles_as_in_figure_3_8(truck: tuple[WorldModel, Scene]) -> None:
