@@ -69,34 +69,52 @@ class Counts:
         """Count from the number of bindings left to each tuple, shape (…, n)."""
         return Counts(*weights.total(bindings > 0), *weights.total(bindings))
 
+    @staticmethod
+    def joined(parts: Sequence[Counts]) -> Counts:
+        """Put the counts of several lists of literals behind each other."""
+        return Counts(
+            *(
+                np.concatenate([getattr(part, name) for part in parts])
+                for name in ("positives", "negatives", "good", "bad")
+            )
+        )
+
     def take(self, index: Any) -> Counts:
         """Return the counts at an index of all four arrays."""
         parts = (self.positives, self.negatives, self.good, self.bad)
         return Counts(*(np.asarray(part[index]) for part in parts))
 
 
-@dataclass(frozen=True, slots=True)
 class Score:
     """How good a literal is: FOIL's gain, or Algorithm 2's count of negatives filtered out.
 
     The gain is measured from the empty clause, so that clauses of different lengths compare:
     (weight of positives left) x (information of a positive before - after), over expanded tuples.
+
+    Parameters
+    ----------
+    positives, negatives
+        Weights of the tuples before any literal.
+    choice
+        What is maximised.
+
+    Attributes
+    ----------
+    information : float
+        Bits that it takes to say of a tuple that it is positive, before any literal.
     """
 
-    positives: float
-    negatives: float
-    choice: Literal["gain", "negatives"] = "gain"
-
-    @property
-    def information(self) -> float:
-        """Bits that it takes to say of a tuple that it is positive, before any literal."""
-        return float(np.log2((self.positives + self.negatives) / self.positives))
+    def __init__(
+        self, positives: float, negatives: float, choice: Literal["gain", "negatives"] = "gain"
+    ) -> None:
+        self._negatives, self._choice = negatives, choice
+        self.information = float(np.log2((positives + negatives) / positives))
 
     def __call__(self, counts: Counts) -> Float:
         """Return the scores, rounded so that sums in another order rank the same."""
         some = counts.positives > EPS
-        if self.choice == "negatives":
-            return _rounded(np.where(some, self.negatives - counts.negatives, -np.inf))
+        if self._choice == "negatives":
+            return _rounded(np.where(some, self._negatives - counts.negatives, -np.inf))
         good = np.where(some, counts.good, 1.0)
         gain = counts.positives * (self.information - np.log2((good + np.maximum(counts.bad, 0.0)) / good))
         return _rounded(np.where(some, gain, -np.inf))

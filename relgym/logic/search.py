@@ -149,31 +149,40 @@ class _Candidates:
             if block.templates
         ]
         self.groups = len(self._blocks)
-        self._ends = np.cumsum([len(block.templates) for _, block in self._blocks], dtype=np.int64)
+        sizes = [len(block.templates) for _, block in self._blocks]
+        self._ends = np.cumsum(sizes, dtype=np.int64)
         self.size = int(self._ends[-1]) if self._blocks else 0
         if self.size:
-            self._score = self._join(lambda growing, block: score(block.counts) - self._price(growing, block))
-            self._positives = self._join(lambda _, block: np.round(block.counts.positives, TALLY_DIGITS))
-            self._negatives = self._join(lambda _, block: np.round(block.counts.negatives, TALLY_DIGITS))
-            self._introduced = self._join(lambda _, block: block.introduced())
-            self._useful = (self._positives > EPS) & self._join(_changes)
-            names = self._join(lambda _, block: block.names)
-            negated = self._join(lambda _, block: np.full(len(block.templates), block.negated))
-            numeric = self._join(lambda _, block: np.full(len(block.templates), block.op is not None))
-            of_one = self._join(lambda _, block: block.of_one())
+            counts = Counts.joined([block.counts for _, block in self._blocks])
+            negated, numeric = (
+                np.repeat([flag(block) for _, block in self._blocks], sizes)
+                for flag in (lambda block: block.negated, lambda block: block.op is not None)
+            )
+            bindings = np.repeat([float(g.left.good + g.left.bad) for g, _ in self._blocks], sizes)
+            self._introduced = self._join(Block.introduced)
+            self._score = score(counts) - self._prices(sizes)
+            self._positives = np.round(counts.positives, TALLY_DIGITS)
+            self._negatives = np.round(counts.negatives, TALLY_DIGITS)
+            # useful is what introduces a variable or leaves fewer bindings than there were
+            fewer = bindings - counts.good - counts.bad > EPS
+            self._useful = (self._positives > EPS) & ((self._introduced > 0) | fewer)
+            names, of_one = self._join(lambda block: block.names), self._join(Block.of_one)
             self._ties = (names, of_one, -self._positives, self._introduced, negated, numeric)
 
-    def _price(self, growing: Growing, block: Block) -> NDArray[np.float64]:
+    def _prices(self, sizes: Sequence[int]) -> NDArray[np.float64]:
         """Bits of the thresholds: a gain must pay for them, or numbers would stand in for plain relations."""
-        price = np.zeros(len(block.templates))
         if self._length is None:
-            return price
-        if block.gaps is not None:
-            price += np.where(signs_differ(*block.gaps), self._length.sign, self._length.threshold)
-        return price + sum(self._length.number(each) for each in growing.literals)
+            return np.zeros(self.size)
+        paid = {id(g): sum(self._length.number(each) for each in g.literals) for g, _ in self._blocks}
+        prices = np.repeat([float(paid[id(growing)]) for growing, _ in self._blocks], sizes)
+        for (_, block), end, size in zip(self._blocks, self._ends, sizes, strict=True):
+            if block.gaps is not None:
+                signs = signs_differ(*block.gaps)
+                prices[end - size : end] += np.where(signs, self._length.sign, self._length.threshold)
+        return prices
 
-    def _join(self, part: Callable[[Growing, Block], NDArray[Any]]) -> NDArray[Any]:
-        return np.concatenate([part(growing, block) for growing, block in self._blocks])
+    def _join(self, part: Callable[[Block], NDArray[Any]]) -> NDArray[Any]:
+        return np.concatenate([part(block) for _, block in self._blocks])
 
     def best(self) -> Iterator[Growing]:
         """Yield the clauses extended by one literal, best score first."""
@@ -198,9 +207,3 @@ class _Candidates:
         growing, block = self._blocks[place]
         row = index - int(self._ends[place]) + len(block.templates)
         return extend(self._tables, growing, block.literal(row), block.counts.take(row))
-
-
-def _changes(growing: Growing, block: Block) -> NDArray[np.bool_]:
-    """Which candidates introduce a variable or leave fewer bindings than there were."""
-    lost = growing.left.good + growing.left.bad - block.counts.good - block.counts.bad
-    return np.asarray((block.introduced() > 0) | (lost > EPS))

@@ -7,6 +7,7 @@ one class form one *bin*. Counting then takes a histogram instead of a sort for 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -27,7 +28,7 @@ _CLEAR: Final = 0.01
 """A number counts as inside a gap if it keeps this share of the gap's width from either end."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class Bins:
     """Histogram bins of F functions.
 
@@ -46,7 +47,7 @@ class Bins:
     low: Float
     high: Float
 
-    @property
+    @cached_property
     def merits(self) -> Float:
         """Shape (F, B - 1): `merit` of the gap from one bin to the next, NaN behind a function's last bin."""
         return merit(self.high[:, :-1], self.low[:, 1:])
