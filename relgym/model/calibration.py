@@ -46,6 +46,12 @@ OWN, GUESS, LINEAR, PRODUCTS, LATEST, PERSISTENCE = range(len(EXPERTS))
 _KNOWN: Final = (LINEAR, PRODUCTS, PERSISTENCE)
 """What anybody would try first."""
 
+_FITTED: Final = (LINEAR, PRODUCTS)
+"""Who errs the less the more was learned from: of n trials the i-th counts for i / n."""
+
+_VALUES: Final = (GUESS, LINEAR, PRODUCTS, PERSISTENCE)
+"""Who makes no claims."""
+
 _BY_DEFAULT: Final = (OWN, GUESS, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
 
@@ -165,6 +171,16 @@ class _Record:
     )  # over: trials in those of misses, of hits; how many
     _even: tuple[float, float, float] | None = field(default=None, repr=False, compare=False)
 
+    def add(self, hit: bool, times: int, *, fitted: bool) -> None:
+        """Take in a value that nobody claims, so that no run of hits or misses needs to be noticed at once."""
+        if fitted and self.trials:  # weights of i / n sum to n / 2
+            kept = max(1.0 - times / (2.0 * self.trials), 0.5)
+            self.trials, self.hits = kept * self.trials, kept * self.hits
+        self.trials += times
+        self.hits += times * hit
+        if self.trials > MEMORY:
+            self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+
     def count(self, error: float, within: float, times: int = 1) -> bool:
         """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
         self.errors = _counted(self.errors, _place(error), times)
@@ -237,7 +253,9 @@ class _Cell:
     """Predictions of one kind."""
 
     speaker: int
-    records: dict[int, _Record]  # of the winner and of the speaker
+    records: dict[
+        int, _Record
+    ]  # of the winner, of the speaker, and of all who make no claims; errors of the former
     squares: list[
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials
@@ -258,16 +276,26 @@ class _Cell:
         """Take in whether the winner and the speaker were right, no more; so many times."""
         self._sure = None
         for expert in {OWN, speaker}:
-            if errors[expert] == errors[expert]:
-                self.records.setdefault(expert, _Record()).count(errors[expert], within, times)
+            self._hear(expert, errors[expert], within, times, speaks=True)
+
+    def _hear(self, expert: int, error: float, within: float, times: int, *, speaks: bool) -> None:
+        """Take in what one expert was off by, if it had a value."""
+        if error != error:
+            return
+        record = self.records.setdefault(expert, _Record())
+        if _makes_claims(expert):
+            if record.count(error, within, times):
+                self.squares[expert] = [0.0, 0.0, 0.0]
+            return
+        record.add(error <= within, times, fitted=expert in _FITTED)
+        if speaks:
+            record.errors = _counted(record.errors, _place(error), times)
 
     def count(self, errors: Sequence[float], within: float, times: int = 1) -> None:
         """Take in what each expert was off by, so many times; the best one speaks, if it leads by enough."""
         self._sure = None
-        for expert in (OWN,) if self.speaker == OWN else (OWN, self.speaker):
-            if errors[expert] == errors[expert]:
-                if self.records.setdefault(expert, _Record()).count(errors[expert], within, times):
-                    self.squares[expert] = [0.0, 0.0, 0.0]
+        for expert in {OWN, self.speaker, *_VALUES}:
+            self._hear(expert, errors[expert], within, times, speaks=expert in (OWN, self.speaker))
         base = errors[PERSISTENCE] ** 2
         for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
@@ -280,7 +308,9 @@ class _Cell:
             return  # nobody is better than who was never off
         best = min((k for k, error in enumerate(errors) if error == error), key=self.left)
         if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
-            self.records = {OWN: self.records[OWN]} if OWN in self.records else {}
+            self.records = {k: r for k, r in self.records.items() if k in (OWN, *_VALUES)}
+            if self.speaker in _VALUES:
+                self.records[self.speaker].errors = {}
             self.speaker = best
 
     @classmethod
@@ -852,7 +882,7 @@ def _able(values: Sequence[float]) -> tuple[int, ...]:
 
 def _makes_claims(speaker: int) -> bool:
     """Whether an expert is a mode, a law, or a law of a hypothesis class that was added; others have values only."""
-    return speaker in (OWN, LATEST) or speaker >= len(EXPERTS)
+    return speaker not in _VALUES
 
 
 def _who(key: Key) -> int:

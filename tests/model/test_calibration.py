@@ -88,7 +88,7 @@ def test_the_probability_is_the_posterior_mean() -> None:
 
 def test_laws_are_believed_as_far_as_they_describe_what_came_in_fewer_bits() -> None:
     law, known = Key(0, -1, 7), right(4)
-    assert known.assess(law, values(own=1.0)).probability == 0.5
+    assert known.assess(law, values(own=1.0)).probability == 0.5 / 5  # nothing stayed as it was, of 4
     known.vouch(3.0)  # always right by 8 to 1
     told = known.assess(law, values(own=1.0))
     assert told.probability == pytest.approx(1.0 - 0.5 / 9.0)
@@ -100,8 +100,9 @@ def test_laws_are_believed_as_far_as_they_describe_what_came_in_fewer_bits() -> 
 def test_a_new_kind_of_prediction_begins_with_what_the_others_tell() -> None:
     known = right(50)
     assert known.assess(Key(0, 2, 3), values(own=1.0)).probability == pytest.approx(50.5 / 51)
-    assert known.assess(Key(0, -1, 7), values(own=1.0)).probability == 0.5  # modes say nothing of laws
-    assert known.assess(Key(3, 0, 0), values(own=1.0)).probability == 0.5  # nor is another outcome's known
+    told = known.assess(Key(0, -1, 7), values(own=1.0))  # modes say nothing of laws
+    assert (told.speaker, told.probability) == (PERSISTENCE, 0.5 / 51)
+    assert known.assess(Key(3, 0, 0), values(own=1.0)) == told  # nor of another outcome
 
 
 def test_a_new_mode_speaks_once_it_was_right_whoever_was_better_than_those_before_it() -> None:
@@ -213,7 +214,7 @@ def test_an_expert_without_a_value_is_no_speaker() -> None:
     assert known.assess(KEY, values(own=5.0, linear=1.0)).speaker == LINEAR
     told = known.assess(KEY, values(own=5.0))
     assert told.speaker == PERSISTENCE  # which is off by 1, not by 4
-    assert told.probability == 0.5  # that nothing changes was never counted here
+    assert told.probability == 0.5 / 41  # and never was right, though it never spoke
     for _ in range(60):  # what the regression knew is learned by a law, and nobody asks it any more
         seen(known, values(own=1.0), 1.0)
     told = known.assess(KEY, values(own=1.0))
@@ -588,8 +589,9 @@ def test_another_expert_takes_over_at_ten_bits() -> None:
         found.count(errors, 0.5)
         spoke.append(found.speaker)
     assert spoke == [OWN] * 9 + [LINEAR] * 2
-    # Its record begins where it takes over; that of the winner stays.
-    assert (found.records[OWN].trials, found.records[LINEAR].trials) == (11.0, 1.0)
+    # Its record goes back to where it had a value, of which late trials count for more; of its errors it begins now.
+    assert (found.records[OWN].trials, found.records[LINEAR].trials) == (11.0, 6.0)
+    assert sum(found.records[LINEAR].errors.values()) == 1.0
 
 
 def test_squares_of_many_trials_are_halved() -> None:
@@ -861,7 +863,9 @@ def test_all_modes_know_how_often_each_was_right_who_spoke() -> None:
         seen(known, said, 1.0)
     (family,) = [c for key, c in known._cells.items() if key.lead == OF_FAMILY]
     assert spoke.count(LINEAR) > 20
-    assert (family.records[LINEAR].trials, family.records[LINEAR].hits) == (spoke.count(LINEAR),) * 2
+    assert (family.records[LINEAR].trials, family.records[LINEAR].hits) == (
+        0.5 * (spoke.count(LINEAR) + 1),
+    ) * 2
     assert (family.records[OWN].trials, family.records[OWN].hits) == (30, 0)
 
 
@@ -884,7 +888,7 @@ def test_what_another_model_says_is_no_known_kind() -> None:
     known.forget()
     assert (known.trials, known.change) == (40, change)
     told = known.assess(KEY, values(own=1.0))
-    assert (told.speaker, told.probability) == (PERSISTENCE, 0.5)  # what is known of that is still true
+    assert (told.speaker, told.probability) == (PERSISTENCE, 0.5 / 41)  # what is known of that is still true
     assert told.spread == 1.0
     assert not known.claims(KEY, told)
     seen(known, values(own=1.0), 1.0)
@@ -1283,3 +1287,24 @@ def test_who_never_spoke_but_leaves_less_is_right_as_often_as_those_who_did() ->
     told = known.assess(Key(2, 0, 0), said)
     assert told.speaker == GUESS
     assert 0.85 < told.probability < 0.95
+
+
+def test_of_who_learns_on_late_trials_count_for_more() -> None:
+    fitted, constant = _Record(), _Record()
+    for k in range(40):
+        fitted.add(k >= 20, 1, fitted=True)
+        constant.add(k >= 20, 1, fitted=False)
+    # the i-th of 40 counts for i / 40
+    assert fitted.trials == pytest.approx(sum(range(1, 41)) / 40)
+    assert fitted.hits == pytest.approx(sum(range(21, 41)) / 40)
+    assert (constant.trials, constant.hits) == (40.0, 20.0)
+
+
+def test_of_who_makes_no_claims_no_run_ends_the_record() -> None:
+    """Hits come in runs where little happens: the share of all trials is what the next one tells."""
+    found, errors = _Cell.new(PERSISTENCE, len(EXPERTS)), [math.nan] * len(EXPERTS)
+    for k in range(200):
+        errors[PERSISTENCE] = 0.0 if 100 <= k < 160 else 1.0
+        found.count(errors, 0.5)
+    record = found.records[PERSISTENCE]
+    assert (record.trials, record.hits) == (200.0, 60.0)
