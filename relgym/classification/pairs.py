@@ -14,7 +14,7 @@ from relgym.classification.learning import SHORT, Lesson, learn_pair
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
-from relgym.logic.search import GROUP, LITERAL
+from relgym.logic.search import GROUP, UNIT
 from relgym.scheduling.work import Task
 
 __all__ = ["PairState", "covered_by", "pair_labels"]
@@ -103,7 +103,7 @@ class PairState:
             grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
             mendable = not grown and all(lesson.counts)
             mended = mend(self.classifier, lesson, self.errors, config) if mendable else None
-            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + GROUP // LITERAL
+            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + GROUP // UNIT
             if mended is not None:
                 self._adopt(mended, lesson, mended=True)
                 return work + mended.work
@@ -111,7 +111,7 @@ class PairState:
             self._taught = lesson.counts
             if mendable:
                 return work
-        work = self.draft.advance(int(min(budget * LITERAL, 2**62))) // LITERAL + 1
+        work = self.draft.advance(int(min(budget * UNIT, 2**62))) // UNIT + 1
         if self.draft.done:
             found = self.draft.result
             self.learned = self._taught

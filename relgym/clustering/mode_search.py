@@ -192,7 +192,7 @@ class ModeSearch:
             rows=part,
             apart=table.differences(rows[part]) if several else None,
         )
-        budget.spend(CALL + len(rows) * len(order) + several * len(part) ** 2)
+        budget.spend((CALL + len(rows) * len(order) + several * len(part) ** 2) // 2)
 
     def _wanted(self, table: ExampleTable, signature: int, fit: LinearFit) -> bool:
         """Whether a function still explains enough of what none explains."""

@@ -16,6 +16,7 @@ from relgym.baselines.changes import ONLINE, predicted_changes, titles
 from relgym.config import ModelConfig
 from relgym.experiments.any_env_data import STUDIES, Lesson, collect, recommended
 from relgym.experiments.criterion import Measure, measured
+from relgym.model.fitting import compare_and_learn
 from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 
@@ -66,18 +67,16 @@ def _sizes(lesson: Lesson, *, quick: bool) -> dict[str, NDArray[np.float64]]:
 
 
 def ahead(lesson: Lesson, features: tuple[str, ...] = ()) -> tuple[NDArray[np.float64], WorldModel]:
-    """Changes that the model predicted, shape ``(n, d)``, and the model."""
+    """Changes that the model predicted, each before it was compared and learned from, ``(n, d)``, and the model."""
     model = WorldModel(lesson.view.schema, ModelConfig(features=features))
     found = np.zeros_like(lesson.change)
     kind = lesson.view.schema.type_of("self")
     turning = np.array([name in kind.angles for name in kind.properties])
     for k, transition in enumerate(lesson.transitions):
-        change = (
-            model.predict_one(transition.before).scene.vector[lesson.own]
-            - lesson.transitions[k].before["self"].values
-        )
+        said = model.predict_one(transition.before)
+        change = said.scene.vector[lesson.own] - transition.before["self"].values
         found[k] = np.where(turning, np.remainder(change + np.pi, 2.0 * np.pi) - np.pi, change)
-        model.learn_one(transition)
+        compare_and_learn(model, transition, said, precision=lesson.view.precision)
     return found, model
 
 

@@ -20,7 +20,7 @@ from relgym.logic.tables import Tables
 from relgym.logic.thresholds import signs_differ
 from relgym.scheduling.work import Steps, resumable
 
-__all__ = ["GROUP", "LITERAL", "Harvest", "grow"]
+__all__ = ["GROUP", "UNIT", "Harvest", "grow"]
 
 
 _PATIENCE: Final = 2
@@ -28,8 +28,12 @@ _PATIENCE: Final = 2
 with the next."""
 
 
-LITERAL, GROUP = 12, 150_000
-"""What a literal tried on a tuple costs, and a group of literals tried on a clause however few its tuples, in cells."""
+GROUP: Final = 32_000
+"""What a group of literals tried on a clause costs however few its tuples, in cells; beside it two literals tried
+on a tuple cost one."""
+
+UNIT: Final = 12
+"""Cells that one unit of `ModelConfig.work_per_step` stands for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +82,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
     for depth in range(1, config.max_literals + 1):
         found = _Candidates(tables, beam, weights, score, config, length)
         work += tables.size * found.size
-        yield GROUP * found.groups + LITERAL * tables.size * found.size
+        yield GROUP * found.groups + tables.size * found.size // 2
         lookahead = config.lookahead if depth < config.max_literals else 0
         new = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
         beam = _promising(new, pool.values())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
 from relgym.html import html_table
-from relgym.logic.search import LITERAL
+from relgym.logic.search import UNIT
 from relgym.model.chaining import CHECK_AT, due, inquire, revise
 from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
@@ -187,7 +187,7 @@ def finish(parts: Parts) -> int:
         if not parts.governs(target):
             work += parts.models[target].refresh(None)
             parts.models[target].reconsider(parts.tables[target.type], budget)
-    return work + budget.spent // LITERAL
+    return work + budget.spent // UNIT
 
 
 def _learn_object(
@@ -242,13 +242,13 @@ def _refresh(parts: Parts, budget: Budget) -> int:
     """Re-learn stale classifiers and guess anew within both budgets; the work spent on classifiers."""
     spent = 0
     for target in parts.targets:
-        allowed = min(parts.config.work_per_step - spent, budget.left // LITERAL)
+        allowed = min(parts.config.work_per_step - spent, budget.left // UNIT)
         if allowed <= 0:
             break
         if not parts.governs(target):  # no clause is asked where laws predict
             model = parts.models[target]
             work = model.refresh(allowed)
-            budget.spend(LITERAL * work)
+            budget.spend(UNIT * work)
             spent += work
             model.reconsider(parts.tables[target.type], budget)
     return spent
