@@ -183,7 +183,7 @@ class _Search:
     def _approximation(self, fit: LinearFit, counted: NDArray[np.bool_]) -> Steps[Approximation | None]:
         """A function as an approximation, of which some rows count; None if it leaves too much, or too many."""
         explained = self._explained(fit)
-        yield CALL // 2
+        yield CALL
         if explained.mean() < NEARLY_ALL:
             return None
         kept = explained & counted

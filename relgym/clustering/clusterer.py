@@ -13,7 +13,7 @@ from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import Scale, least_examples
 from relgym.clustering.em import Cluster, refit
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.last_resort import Resort, timely
+from relgym.clustering.last_resort import APPROXIMATE_AT, Resort, timely
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.mode_search import ModeSearch
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
@@ -75,6 +75,7 @@ class ModeClusterer:
         self.due = False
         self._resort: Resort | None = None  # the search for an approximation, under way
         self._sought = 0  # after so many examples the latest one began
+        self._anew = False  # whether laws of other next values are to be searched for first
         self._estimating = False  # whether the noise is to be estimated anew
         self._largest = 0.0  # number among the columns and the target's values
         self._reach = 0.0  # value of the target
@@ -220,8 +221,8 @@ class ModeClusterer:
         To `begin`, one is begun where all examples are news and the next one would begin it.
         """
         before = set(self.clusters)
-        if begin and not self.search.begun and len(self.population.noise()):
-            self.search.discover(table, int(self.population.noise()[-1]), budget)
+        if begin:
+            self.search.begin(table, budget)
         self.search.pursue(table, budget)
         return before != set(self.clusters)
 
@@ -327,7 +328,8 @@ class ModeClusterer:
     def retarget(self, target: Target) -> None:
         """Be given other next values: the examples stay, modes are searched again."""
         self.population.target = target
-        self.due |= self.approximating  # what waited goes on waiting
+        self.due |= self.approximating or self.approximate  # of what it is given now there may be a law, too
+        self._anew = True
         self._spread, self.population.approximate, self._resort = 0.0, False, None
         self._assume(self.floor)
         self._start_over()
@@ -351,12 +353,15 @@ class ModeClusterer:
         As far as the budget goes: it is called again until none is `approximating` or `due`.
         """
         if self._resort is None:
-            if not self.due or not budget.left or not self.search.begun:
+            if self._anew and self.search.tried:  # for laws, in vain
+                self._anew = False
+                self.due |= self.config.noise_std == "auto" and self.seen >= APPROXIMATE_AT[0]
+            if not self.due or not budget.left or self._anew:
                 return False  # what waits holds no data
             self.due = False
             if not self._hopeless:
                 return False
-            self._resort = Resort.of(self.population, table, floor=self.floor)
+            self._resort = Resort.of(self.population, table, floor=self.floor, again=self.approximate)
             self._sought = self.seen
         if not budget.work(self._resort.task):
             return False

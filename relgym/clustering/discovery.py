@@ -317,7 +317,7 @@ def searched(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
 
 def law_cells(found: Consensus, own: int) -> int:
     """What `is_law` costs, in cells."""
-    return CALL // 2 + own * min(found.size, SEARCH) ** 2
+    return CALL + 2 * own * min(found.size, SEARCH) ** 2
 
 
 @resumable

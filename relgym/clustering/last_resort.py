@@ -4,12 +4,13 @@ After 256, 1,024, ... examples, oftener among features unless noise is what is l
 than half, the best sparse function is taken that leaves at most 10 % of the change (1 % without features), or with
 features up to half of it where what it leaves is noise: residuals of neighbours are not alike. The wider the library,
 the more terms it may have. What it leaves becomes the target's noise, and the report says so. A later approximation
-replaces it if it is better on nearly all recent rows, or as good and shorter, and it replaces k modes that explain
-most if it leaves no more than k times what they do: so much would k slices of noise leave. Rows without a law, a
-lander's touches, make most of the squares, and terms for them hold nowhere else. So a term that serves few rows must
-explain most of them, or it and they are left aside; a second search sees changes no larger than most to begin with;
-and columns that are no features are searched alone, too. Of what is as good within 10 % the shortest is taken: ``th'
-= th + 0.05 w'``, where there were five sines before, or seven terms of the legs.
+replaces it if it is better on nearly all of the rows that it wasn't fitted to, or as good and shorter, and it
+replaces modes that explain most if errors take fewer bits then, of k modes k times what they leave: so much less
+would k slices of noise. Rows without a law, a lander's touches, make most of the squares, and terms for them hold
+nowhere else. So a term that serves few rows must explain most of them, or it and they are left aside; a second search
+sees changes no larger than most to begin with; and columns that are no features are searched alone, too. Of what is
+as good within 10 % the shortest is taken: ``th' = th + 0.05 w'``, where there were five sines before, or seven terms
+of the legs.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from relgym.clustering.unification import reordered
 from relgym.numeric.stepwise import LinearFit
 from relgym.scheduling.work import Task
 
-__all__ = ["LastResort", "Resort", "last_resort", "timely"]
+__all__ = ["APPROXIMATE_AT", "LastResort", "Resort", "last_resort", "timely"]
 
 APPROXIMATE_AT = (256, 1024, 4096, 16384)
 """Numbers of examples after which an approximation is sought, if most of them are unexplained."""
@@ -44,6 +45,9 @@ OFTENER_AT = (512, 1536, 2048, 3072, 6144, 8192, 12288)
 
 MOST_ROWS = 1500
 """At most so many rows, the newest, determine an approximation."""
+
+UNSEEN = 8
+"""Of the rows one of so many, the newest, is kept from an approximation that is to be compared with another one."""
 
 BETTER = 0.95
 """An approximation gives way to one whose errors are smaller by this factor, or to a shorter one that is as good."""
@@ -84,23 +88,29 @@ def last_resort(
     again
         Whether the present modes are approximations too.
     """
-    resort = Resort.of(population, table, floor=floor)
+    resort = Resort.of(population, table, floor=floor, again=again)
     resort.task.advance(2**62)
     return resort.found(population, table, floor=floor, again=again)
 
 
 @dataclass(frozen=True, slots=True)
 class Resort:
-    """The search for an approximation, under way: of which signature, with its columns in this order."""
+    """The search for an approximation, under way: of which signature, with its columns in this order.
+
+    None of a target's examples later than the first so many that there ever were is `fitted` to.
+    """
 
     signature: int
     order: NDArray[np.intp]
     task: Task[Approximation | None]
+    fitted: int
 
     @classmethod
-    def of(cls, population: Population, table: ExampleTable, *, floor: float) -> Resort:
-        """Begin one among a target's newest examples."""
+    def of(cls, population: Population, table: ExampleTable, *, floor: float, again: bool) -> Resort:
+        """Begin one among a target's newest examples; parameters as of `last_resort`."""
         signature, recent = _recent(population, table)
+        if again:  # who was fitted to rows errs less there than it will
+            recent = recent[: len(recent) - len(recent) // UNSEEN]
         slots, rows, y = table.signatures[signature], population.rows[recent], population.y[recent]
         order, stages = slots.preference(population.target)
         order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
@@ -115,7 +125,8 @@ class Resort:
             left=LEFT if slots.features else LEFT_LINEAR,
             noisy=stages[0] if slots.features else 0,
         )
-        return cls(signature, order, task)
+        later = len(population.y) - 1 - int(recent[-1])
+        return cls(signature, order, task, population.seen - later)
 
     def found(
         self, population: Population, table: ExampleTable, *, floor: float, again: bool
@@ -140,15 +151,20 @@ def _accepted(
         return None  # examples look otherwise by now
     if again and slots.features:  # few examples choose among many features badly
         modes = list(population.clusters.values())
+        unseen = recent >= len(population.y) - (population.seen - resort.fitted)
+        rows, y = rows[unseen], y[unseen]
+        own = np.abs(y - found.fit.predict(slots.matrix(table.x[rows], resort.order)))
         errors = [c.errors(table, rows, y, population.scale)[0] for c in modes]
         shorter = found.fit.terms < sum(c.mode.parameters for c in modes)
         allowed = EQUAL if shorter else BETTER
-        if modes and found.reach > allowed * reach(np.min(errors, axis=0), floor):
+        if modes and reach(own, floor) > allowed * reach(np.min(errors, axis=0), floor):
             return None
     elif 2 * population.noise_examples <= population.seen:
-        # So many modes that merely slice noise leave that much less of it; one alone explains what it explains.
-        count = len(population.clusters)
-        if found.sigma > (count if count > 1 else 0.5) * population.scale.sigma:
+        spread = max(float((y - slots.present(table.x[rows], population.target)).std()), found.sigma)
+        explained, count = 1.0 - population.noise_examples / population.seen, len(population.clusters)
+        # Bits that errors take. So many modes that merely slice noise leave that much less of it.
+        modes = explained * np.log2(count * population.scale.sigma / spread)
+        if float(found.inliers.mean()) * np.log2(found.sigma / spread) >= modes:
             return None
     return LastResort(resort.signature, reordered(found.fit, resort.order), found.sigma)
 

@@ -109,9 +109,9 @@ class ModeSearch:
         return self._hunt is not None
 
     @property
-    def begun(self) -> bool:
-        """Whether there has been any news to search since the examples were."""
-        return bool(self._searches)
+    def tried(self) -> bool:
+        """Whether a search has been in vain since the examples were news."""
+        return any(search.failures for search in self._searches.values())
 
     def start_over(self) -> None:
         """All examples are news again."""
@@ -133,6 +133,16 @@ class ModeSearch:
                 self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)
             return
         self._hunt = Hunt(signature, search.waiting)
+        self.pursue(table, budget)
+
+    def begin(self, table: ExampleTable, budget: Budget) -> None:
+        """Search all examples for modes, where all are news and the next one would begin to."""
+        population, unexplained = self.population, self.population.noise()
+        if self._searches or not len(unexplained):
+            return
+        ids = table.signature_ids[population.rows[unexplained]]
+        search = self._searches[int(ids[-1])] = Search(waiting=int((ids == ids[-1]).sum()))
+        self._hunt = Hunt(int(ids[-1]), search.waiting)
         self.pursue(table, budget)
 
     def pursue(self, table: ExampleTable, budget: Budget) -> None:
@@ -192,7 +202,7 @@ class ModeSearch:
             rows=part,
             apart=table.differences(rows[part]) if several else None,
         )
-        budget.spend((CALL + len(rows) * len(order) + several * len(part) ** 2) // 2)
+        budget.spend(CALL + len(rows) * len(order) + several * len(part) ** 2)
 
     def _wanted(self, table: ExampleTable, signature: int, fit: LinearFit) -> bool:
         """Whether a function still explains enough of what none explains."""

@@ -179,6 +179,9 @@ def finish(parts: Parts) -> int:
     budget, parts.idle = Budget(), False
     while parts.looks or parts.inquiry is not None:
         _inquire(parts, budget)
+        for target in parts.targets:  # what has begun anew is to be known before the next look
+            if not parts.models[target].modes:
+                parts.models[target].search(parts.tables[target.type], budget)
     for target in parts.targets:
         parts.models[target].search(parts.tables[target.type], budget)
     parts.agenda.waiting = ()

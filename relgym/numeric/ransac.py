@@ -95,7 +95,7 @@ def draw_samples(
             keys += np.where(how == 2, age // (2 * size), 0.0)
             keys[np.arange(len(base)), base] = -1.0
             found[piece][part] = np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
-        yield CALL // 2 + len(first[piece]) * n
+        yield CALL + 2 * len(first[piece]) * n
     return found
 
 
@@ -166,7 +166,7 @@ def consensus(
             if key not in tried:
                 tried.add(key)
                 best = yield from refine.steps(x, y, found, sigma=sigma, tolerance=tolerance)
-        yield (CALL + n * len(picked)) // 2
+        yield CALL + n * len(picked)
     return best
 
 
@@ -209,7 +209,7 @@ def _forward_batch(
         chosen, left = choose(a, b - b.mean(axis=1, keepdims=True), terms, sigma, enough)
         chosen[left > enough, 0] = -2
         every[part] = chosen
-        yield CALL // 2 + 2 * a.size * max(terms, 1)
+        yield CALL + 4 * a.size * max(terms, 1)
     return every
 
 

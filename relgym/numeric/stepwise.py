@@ -114,7 +114,7 @@ def least_squares(
 
 def fitting_cells(rows: int, terms: int) -> int:
     """What `least_squares` of so many rows and terms costs, in cells: each term is taken out of all others, twice."""
-    return (CALL + terms * (CALL // 4 + rows * (terms + 1))) // 2
+    return CALL + terms * (CALL // 4 + rows * (terms + 1))
 
 
 def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -239,7 +239,7 @@ def forward_order(
     candidates = varying_columns(x) if n else np.empty(0, dtype=np.intp)
     a = x[:, candidates] - x[:, candidates].mean(axis=0) if len(candidates) else np.empty((n, 0))
     choose = _choose_among_many if len(candidates) > MANY else _choose
-    yield (CALL + x.size) // 2
+    yield CALL + x.size
     chosen = (yield from choose(a, y - y.mean(), sigma, limit)) if n else []
     return tuple(int(candidates[c]) for c in chosen)
 
@@ -262,7 +262,7 @@ def _choose(
         residual = residual - (q * residual).sum() * q
         a -= q[:, None] * (q[:, None] * a).sum(axis=0)
         a[:, best] = 0.0
-        yield CALL // 2 + 2 * a.size
+        yield CALL + 4 * a.size
     return chosen
 
 
@@ -290,7 +290,7 @@ def _choose_among_many(
         residual = residual - (basis[-1] * residual).sum() * basis[-1]
         pivots -= np.square(np.einsum("i,ij->j", basis[-1], a))
         pivots[best] = 0.0
-        yield CALL // 2 + a.size // 4  # two passes, and nothing else of this size
+        yield CALL + a.size // 2  # two passes, and nothing else of this size
     return chosen
 
 

@@ -6,6 +6,7 @@ import copy
 import pickle
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -142,9 +143,9 @@ def test_the_oldest_approximation_is_sought_anew_first(monkeypatch: pytest.Monke
     begun: list[str] = []
     of = Resort.of.__func__  # type: ignore[attr-defined]
 
-    def spied(cls: type[Resort], population: Population, table: ExampleTable, *, floor: float) -> Resort:
+    def spied(cls: type[Resort], population: Population, table: ExampleTable, **options: Any) -> Resort:
         begun.append(population.target.property)
-        found: Resort = of(cls, population, table, floor=floor)
+        found: Resort = of(cls, population, table, **options)
         return found
 
     monkeypatch.setattr(Resort, "of", classmethod(spied))
