@@ -152,7 +152,8 @@ def _accepted(
     if again and slots.features:  # few examples choose among many features badly
         modes = list(population.clusters.values())
         unseen = recent >= len(population.y) - (population.seen - resort.fitted)
-        rows, y = rows[unseen], y[unseen]
+        if unseen.any():
+            rows, y = rows[unseen], y[unseen]
         own = np.abs(y - found.fit.predict(slots.matrix(table.x[rows], resort.order)))
         errors = [c.errors(table, rows, y, population.scale)[0] for c in modes]
         shorter = found.fit.terms < sum(c.mode.parameters for c in modes)
@@ -161,10 +162,10 @@ def _accepted(
             return None
     elif 2 * population.noise_examples <= population.seen:
         spread = max(float((y - slots.present(table.x[rows], population.target)).std()), found.sigma)
-        explained, count = 1.0 - population.noise_examples / population.seen, len(population.clusters)
+        explained, count = 1.0 - population.noise_examples / population.seen, max(len(population.clusters), 1)
         # Bits that errors take. So many modes that merely slice noise leave that much less of it.
-        modes = explained * np.log2(count * population.scale.sigma / spread)
-        if float(found.inliers.mean()) * np.log2(found.sigma / spread) >= modes:
+        bits = explained * np.log2(count * population.scale.sigma / spread)
+        if float(found.inliers.mean()) * np.log2(found.sigma / spread) >= bits:
             return None
     return LastResort(resort.signature, reordered(found.fit, resort.order), found.sigma)
 

@@ -10,7 +10,8 @@ import pytest
 from points import learned, schema_of, transitions
 
 from relgym.clustering.discovery import Scale
-from relgym.clustering.last_resort import last_resort, timely
+from relgym.clustering.last_resort import Resort, last_resort, timely
+from relgym.clustering.mode import NOISE
 from relgym.model.world_model import WorldModel
 
 SHIP = schema_of(("v", "th"), ("fire",))
@@ -105,8 +106,22 @@ def test_slices_of_noise_give_way_to_one_function() -> None:
 
     assert found(3, 2.5)  # three slices of noise would leave a third of it
     assert not found(3, 4.0)
-    assert not found(1, 0.9)  # of one mode by another, if it errs half as much
-    assert found(1, 0.4)
+    assert not found(1, 1.1)
+    assert found(1, 0.9)
+    clusterer.labels[::2] = NOISE  # errors of half of the examples take as many bits as if nothing were known
+    assert found(1, 1.1)
+    assert not found(1, 100.0)  # a law
+
+
+def test_what_is_compared_was_fitted_to_other_examples() -> None:
+    model = fly(400, 0, features=("trig", "products"))
+    clusterer = model.property_model("self", "v").clusterer
+    table = model._parts.tables["self"]
+    begun = {
+        again: Resort.of(clusterer.population, table, floor=clusterer.floor, again=again)
+        for again in (False, True)
+    }
+    assert {again: resort.fitted for again, resort in begun.items()} == {False: 400, True: 350}
 
 
 def test_a_shorter_approximation_is_taken_if_it_is_as_good() -> None:
