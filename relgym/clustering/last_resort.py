@@ -24,6 +24,7 @@ from relgym.clustering.approximation import (
     EQUAL,
     LEFT,
     LEFT_LINEAR,
+    NEARLY_ALL,
     Approximation,
     approximate,
     reach,
@@ -45,9 +46,6 @@ OFTENER_AT = (512, 1536, 2048, 3072, 6144, 8192, 12288)
 
 MOST_ROWS = 1500
 """At most so many rows, the newest, determine an approximation."""
-
-UNSEEN = 8
-"""Of the rows one of so many, the newest, is kept from an approximation that is to be compared with another one."""
 
 BETTER = 0.95
 """An approximation gives way to one whose errors are smaller by this factor, or to a shorter one that is as good."""
@@ -109,8 +107,8 @@ class Resort:
     def of(cls, population: Population, table: ExampleTable, *, floor: float, again: bool) -> Resort:
         """Begin one among a target's newest examples; parameters as of `last_resort`."""
         signature, recent = _recent(population, table)
-        if again:  # who was fitted to rows errs less there than it will
-            recent = recent[: len(recent) - len(recent) // UNSEEN]
+        if again:  # it is compared on the others: who was fitted to rows errs less there than it will
+            recent = recent[: max(1, int(NEARLY_ALL * len(recent)))]
         slots, rows, y = table.signatures[signature], population.rows[recent], population.y[recent]
         order, stages = slots.preference(population.target)
         order = order[: stages[min(1, len(stages) - 1)] if slots.features else stages[0]]
