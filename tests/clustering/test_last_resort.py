@@ -78,7 +78,7 @@ def test_it_is_sought_oftener_among_features_unless_noise_is_what_is_left(featur
 
 
 def test_an_approximation_gives_way_to_a_better_one_only() -> None:
-    model = fly(400, 0, features=("trig", "products"))
+    model = fly(1_200, 0, features=("trig", "products"))
     clusterer = model.property_model("self", "v").clusterer
     table = model._parts.tables["self"]
     again = last_resort(clusterer.population, table, floor=clusterer.floor, again=True)
