@@ -292,7 +292,7 @@ def test_who_lies_on_the_floor_lies_there_in_float32_too(dtype: type, tmp_path: 
     learner = ModelLearner(env, view=view, targets=["crate.vx"])
     run(learner, 300, length=5)
     wrong = learner.prequential.recent
-    assert wrong < 0.12  # what is claimed waits for a record of what came true
+    assert wrong < 0.15  # what is claimed waits for a record of what came true
     learner.save(tmp_path / "crates.json")
     loaded = WorldModel.load(tmp_path / "crates.json")
     assert loaded.schema.precision == view.precision == (0.0 if dtype is np.float64 else view.precision)
