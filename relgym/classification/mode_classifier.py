@@ -238,7 +238,7 @@ class ModeClassifier:
     def refresh(self, budget: float = math.inf) -> int:
         """Learn stale pairs anew, the most contradicted first, until the budget is spent; the work spent.
 
-        Work is counted in FOIL's units (tuples x candidate literals), never in time: the result is the same
+        Work is counted in units of twelve cells, never in time: the result is the same
         on any machine. A pair is learned in pieces (`Task`), and a piece is finished once begun: one call can
         overdraw the budget, and a pair may be finished by a later call.
         """

@@ -75,7 +75,9 @@ class ModeClusterer:
         self.due = False
         self._resort: Resort | None = None  # the search for an approximation, under way
         self._sought = 0  # after so many examples the latest one began
-        self._anew = False  # whether laws of other next values are to be searched for first
+        self._anew = (
+            False  # other next values are given since the latest approximation: laws are searched for first
+        )
         self._estimating = False  # whether the noise is to be estimated anew
         self._largest = 0.0  # number among the columns and the target's values
         self._reach = 0.0  # value of the target
@@ -113,9 +115,10 @@ class ModeClusterer:
         return self._resort is not None
 
     @property
-    def turn(self) -> tuple[bool, int]:
-        """Of several targets the least one's approximation is sought first: one under way, or the oldest."""
-        return not self.approximating, self._sought
+    def turn(self) -> tuple[bool, int] | None:
+        """Sorting key: approximations under way, then those whose latest is oldest; None where none is wanted."""
+        wanted = self.approximating or self.due or self._anew
+        return (not self.approximating, self._sought) if wanted else None
 
     @property
     def clusters(self) -> dict[int, Cluster]:
@@ -222,7 +225,7 @@ class ModeClusterer:
         """
         before = set(self.clusters)
         if begin:
-            self.search.begin(table, budget)
+            self.search.search_all(table, budget)
         self.search.pursue(table, budget)
         return before != set(self.clusters)
 
@@ -328,7 +331,8 @@ class ModeClusterer:
     def retarget(self, target: Target) -> None:
         """Be given other next values: the examples stay, modes are searched again."""
         self.population.target = target
-        self.due |= self.approximating or self.approximate  # of what it is given now there may be a law, too
+        # Who waited for an approximation, or had one, needs one again, unless there is a law now.
+        self.due |= self.approximating or self.approximate
         self._anew = True
         self._spread, self.population.approximate, self._resort = 0.0, False, None
         self._assume(self.floor)

@@ -135,8 +135,8 @@ class ModeSearch:
         self._hunt = Hunt(signature, search.waiting)
         self.pursue(table, budget)
 
-    def begin(self, table: ExampleTable, budget: Budget) -> None:
-        """Search all examples for modes, where all are news and the next one would begin to."""
+    def search_all(self, table: ExampleTable, budget: Budget) -> None:
+        """Search where all examples are news; else the next one would begin that, with itself in each sample."""
         population, unexplained = self.population, self.population.noise()
         if self._searches or not len(unexplained):
             return

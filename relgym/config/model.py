@@ -33,13 +33,13 @@ class ModelConfig:
         instead of being predicted, and one where no mode explained what followed *unexplained*
         (`relgym.model.target.scope`). Default true; false: the votes decide there as everywhere.
     work_per_step
-        Budget for re-learning classifiers after one transition, in deterministic units (tuples times candidate
-        literals examined). Default 400,000, some 20 ms, range 0 to 10**12. Raising it makes rules fresher and single
+        Budget for re-learning classifiers after one transition, in deterministic units of twelve cells (see
+        `cells_per_step`). Default 400,000, 20 ms at most, range 0 to 10**12. Raising it makes rules fresher and single
         steps slower.
     cells_per_step
         What each transition earns for searches (for modes, approximations, causal order, guesses, and what
-        `work_per_step` counts), in cells: numbers looked at, of which a thousand million take some four seconds.
-        Default 500,000, some 2 ms, range 1 to 10**15. A search that takes more than there is goes on after the next
+        `work_per_step` counts), in cells: numbers looked at, of which a thousand million take one to four seconds.
+        Default 500,000, 2 ms at most, range 1 to 10**15. A search that takes more than there is goes on after the next
         transitions. Raising it finds sooner what is hard to find and makes every step of a world that isn't
         understood slower.
     most_cells
@@ -47,7 +47,7 @@ class ModelConfig:
         some 20 ms, so that no step takes longer than a frame at 25 Hz.
     saved_cells
         Cells that are saved for later where nothing is to be searched, and that there are to begin with. Default
-        1,000,000,000, some 4 s: worlds that can be understood are, before it is spent.
+        1,000,000,000, 4 s at most: worlds that can be understood are, before it is spent.
     frames
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes

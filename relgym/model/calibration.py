@@ -13,8 +13,9 @@ of its winner where there are few trials. Of a cell
   no more than `ModelConfig.claim_error` of what mostly changes;
 - the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
 
-A run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a law that changed is
-doubted at once, and a mode whose conditions were found is believed at once.
+Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a
+law that changed is doubted at once, and a mode whose conditions were found is believed at once. Who makes none is known
+by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
 
 A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
 Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
@@ -253,9 +254,8 @@ class _Cell:
     """Predictions of one kind."""
 
     speaker: int
-    records: dict[
-        int, _Record
-    ]  # of the winner, of the speaker, and of all who make no claims; errors of the former
+    # Of the winner, of the speaker and of all who make no claims; only those who speak have bins of errors.
+    records: dict[int, _Record]
     squares: list[
         list[float]
     ]  # for each expert: trials, its squares, those of persistence in the same trials

@@ -142,7 +142,11 @@ def _nothing_waits(parts: Parts) -> bool:
 
 def _go_on(parts: Parts, budget: Budget) -> None:
     """Go on with what is under way: what is sure to end soon, then searches for modes, the oldest first."""
-    for target in sorted(parts.targets, key=lambda each: parts.models[each].clusterer.turn):
+    turns = [
+        (turn, k) for k, t in enumerate(parts.targets) if (turn := parts.models[t].clusterer.turn) is not None
+    ]
+    for _, k in sorted(turns):
+        target = parts.targets[k]
         parts.models[target].approximate(parts.tables[target.type], budget)
     for target in parts.targets:
         table, model = parts.tables[target.type], parts.models[target]

@@ -1,7 +1,7 @@
 """Computations that can be interrupted: generators that yield the work done since the last time.
 
 Work is counted in *cells*, numbers looked at, never in seconds: so what is done in which step is the same on every
-machine. A thousand million cells take some four seconds of one core; a piece should have no more than a few million.
+machine. A thousand million cells take one to four seconds of one core; a piece should have no more than a few million.
 """
 
 from __future__ import annotations
