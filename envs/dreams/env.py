@@ -283,7 +283,7 @@ class LearnedModelEnv(gym.Env[Any, Any]):
         """Why a prediction can't be followed; None if it can."""
         if (told := explained(parts_of(prediction), self._min_margin, self._evaluator.overruled)) is not None:
             return told
-        left = self._setting.shown.outside(after)
+        (left,) = self._setting.shown.outside(after.layout, after.vector[None])
         return (Cause.LEFT, left) if left else None
 
     def _onward(self, after: Scene) -> Scene:

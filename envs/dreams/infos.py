@@ -32,8 +32,9 @@ def told_of(step: DreamStep, stepped: Stepped, going: NDArray[np.bool_] | None) 
         reasons, names = (np.full(count, None, dtype=object) for _ in range(2))
         out = stepped.causes == _HORIZON
         reasons[out], names[out] = step.out_of_time, _NAMES[_HORIZON]
-        for k in np.flatnonzero(stepped.truncated & ~out).tolist():
-            reasons[k], names[k] = step.reason(stepped, k), _NAMES[stepped.causes[k]]
+        rows = np.flatnonzero(stepped.truncated & ~out)
+        reasons[rows] = step.reasons(stepped, rows)
+        names[rows] = [_NAMES[cause] for cause in stepped.causes[rows].tolist()]
         mask = stepped.truncated.copy()
         infos |= {"reason": reasons, "_reason": mask, "cause": names, "_cause": mask.copy()}
     if stepped.success is not None:

@@ -208,7 +208,8 @@ class Setting:
             )
         # Through this schema: scenes of an equal one, or of another with the same objects, do too.
         fitted = self.schema.scene(values)
-        if left := self.shown.outside(fitted):
+        (left,) = self.shown.outside(fitted.layout, fitted.vector[None])
+        if left:
             raise ObservationError(f"a dream can't begin here: {left}")
         return fitted
 

@@ -79,8 +79,8 @@ class Shown(Protocol):
         """Which of n scenes lie there that did one step before; (object, property) pairs may have changed since."""
         ...
 
-    def outside(self, scene: Scene) -> str:
-        """What of a scene lies outside the observation space, as a sentence; empty if nothing does."""
+    def outside(self, layout: SceneLayout, vectors: Float2D) -> list[str]:
+        """What of each of n scenes lies outside the observation space, as a sentence; empty if nothing does."""
         ...
 
 
@@ -230,19 +230,16 @@ class BoxesShown:
             self._changing[parts] = np.array(sorted(layout.column(*pair) for pair in pairs), dtype=np.intp)
         return self._boxes.inside_at(self.layout, vectors, self._changing[parts])
 
-    def outside(self, scene: Scene) -> str:
+    def outside(self, layout: SceneLayout, vectors: Float2D) -> list[str]:
         """Which properties lie outside the observation space."""
-        vector, (low, high) = (
-            self._boxes.rounded(scene.layout, scene.vector),
-            self._boxes.limits(scene.layout),
-        )
-        left = np.flatnonzero(~((low <= vector) & (vector <= high)))
-        if not len(left):
-            return ""
-        names = self._names(scene.layout)
-        return "; ".join(
-            f"{names[k]} = {vector[k]:g} left the observation space [{low[k]:g}, {high[k]:g}]" for k in left
-        )
+        (low, high), numbers = self._boxes.limits(layout), self._boxes.rounded(layout, vectors)
+        told: list[list[str]] = [[] for _ in vectors]
+        for row, k in np.argwhere(~((low <= numbers) & (numbers <= high))).tolist():
+            limits = f"[{low[k]:g}, {high[k]:g}]"
+            told[row].append(
+                f"{self._names(layout)[k]} = {numbers[row, k]:g} left the observation space {limits}"
+            )
+        return ["; ".join(each) for each in told]
 
     def _names(self, layout: SceneLayout) -> list[str]:
         if self._columns is None or self._columns[0] is not layout:
@@ -295,14 +292,17 @@ class ViewShown:
         """Which of n scenes lie in the observation space, shape ``(n,)``."""
         if (found := shown_at_once(self._view, self.layout, vectors)) is not None:
             return found[1]
-        return np.array([not self.outside(self._scene(vector)) for vector in vectors], dtype=np.bool_)
+        return np.array([not left for left in self.outside(self.layout, vectors)], dtype=np.bool_)
 
     def still_inside(self, vectors: Float2D, parts: tuple[tuple[str, str], ...]) -> NDArray[np.bool_]:
         """Which of n scenes lie in the observation space; views may show anything of what changed."""
         return self.inside(vectors)
 
-    def outside(self, scene: Scene) -> str:
-        """The observation, if it lies outside the observation space."""
+    def outside(self, layout: SceneLayout, vectors: Float2D) -> list[str]:
+        """The observations, where they lie outside the observation space."""
+        return [self._outside(Scene(self._schema, layout, vector.copy())) for vector in vectors]
+
+    def _outside(self, scene: Scene) -> str:
         try:
             observation = self.observation(scene)
         except ObservationError as error:  # numbers that the space's dtype can't hold

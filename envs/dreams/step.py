@@ -14,11 +14,11 @@ from relgym.envs.dreams.rewards import BatchStepEvaluator, TaskFunctions
 from relgym.envs.dreams.setting import Setting
 from relgym.envs.dreams.shown import Deeds
 from relgym.model.prediction import BatchPrediction
-from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
+from relgym.scene.objects import Float1D, Float2D, SceneLayout
 
 __all__ = ["DreamStep", "Stepped"]
 
-_HORIZON, _NO_REWARD = CAUSES.index(Cause.HORIZON), CAUSES.index(Cause.NO_REWARD)
+_HORIZON, _NO_REWARD, _LEFT = (CAUSES.index(c) for c in (Cause.HORIZON, Cause.NO_REWARD, Cause.LEFT))
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,18 +168,23 @@ class DreamStep:
         """The sentence for those that have lasted as long as they may."""
         return horizon_reached(self.horizon)
 
-    def reason(self, stepped: Stepped, row: int) -> str:
-        """Why a dream was truncated, in a sentence that names objects and properties."""
-        if stepped.causes[row] == _HORIZON:
-            return self.out_of_time
-        if stepped.causes[row] == _NO_REWARD:
-            return Cause.NO_REWARD.value
-        told = explained(parts_of_row(stepped.prediction, row), self.min_margin, self.evaluator.overruled)
-        if told is not None:
-            return told[1]
-        return self.setting.shown.outside(
-            Scene(self.setting.schema, self.setting.layout, stepped.foreseen[row].copy())
-        )
+    def reasons(self, stepped: Stepped, rows: NDArray[np.intp]) -> list[str]:
+        """Why some dreams were truncated: for each a sentence that names objects and properties."""
+        left = self.setting.shown.outside(self.setting.layout, stepped.foreseen[rows])
+        found = []
+        for row, beyond in zip(rows.tolist(), left, strict=True):
+            cause = int(stepped.causes[row])
+            if cause == _HORIZON:
+                found.append(self.out_of_time)
+            elif cause == _NO_REWARD:
+                found.append(Cause.NO_REWARD.value)
+            elif cause == _LEFT:
+                found.append(beyond)
+            else:
+                parts = parts_of_row(stepped.prediction, row)
+                told = explained(parts, self.min_margin, self.evaluator.overruled)
+                found.append(beyond if told is None else told[1])
+        return found
 
 
 def _read_only(vectors: Float2D) -> Float2D:

@@ -318,9 +318,8 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         vectors[:, place.brought] = 0.0
         if not (inside := place.shown.inside(vectors)).all():  # false for NaN, too
             row = int(np.flatnonzero(~inside)[0])
-            raise ObservationError(
-                f"{what}: dream {row} can't begin here: {place.shown.outside(self._scene(vectors[row]))}"
-            )
+            (left,) = place.shown.outside(place.layout, vectors[row : row + 1])
+            raise ObservationError(f"{what}: dream {row} can't begin here: {left}")
         return vectors
 
     def _begin(self, rows: _Rows, first: Float2D, *, told: bool = True) -> None:

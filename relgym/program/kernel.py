@@ -16,6 +16,7 @@ import numpy as np
 from relgym.program.tape import (
     ANGLES,
     ANSWERS,
+    ASKED,
     AT_ANGLES,
     AT_ANSWERS,
     AT_BODIES,
@@ -56,6 +57,9 @@ __all__ = ["run", "see"]
 
 PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
 """Outcomes, in the order of `relgym.model.prediction.OUTCOMES`."""
+
+lanes = range
+"""A range whose rounds don't wait for each other: compiled, several are made at once."""
 
 BAD_SIZE = 1
 """A body's extents can't be: arrays say which."""
@@ -158,13 +162,15 @@ def look(s):
                 return BAD_SIZE
             if s.code[at + SHAPE] == 0 and max(abs(depth - width), abs(height - width)) > ROUND * width:
                 return BAD_SIZE
-            for d in range(3, 6):
-                if s.code[at + SHAPE] != 0 and x[s.code[at + POSE + d]] != 0.0:
-                    return TURNED
-            for d in range(3):
-                body[k, BX + d] = x[s.code[at + COL_X + d]]
-                half = 0.5 * (width if s.code[at + SHAPE] == 0 else x[s.code[at + COL_SX + d]])
-                body[k, LOW_X + d], body[k, HIGH_X + d] = -half, half
+            if s.code[at + SHAPE] != 0:
+                for d in (3, 4, 5):
+                    if x[s.code[at + POSE + d]] != 0.0:
+                        return TURNED
+            else:
+                height = depth = width
+            body[k, BX + 2] = x[s.code[at + COL_Z]]
+            body[k, LOW_X], body[k, LOW_X + 1], body[k, LOW_X + 2] = -0.5 * width, -0.5 * height, -0.5 * depth
+            body[k, HIGH_X], body[k, HIGH_X + 1], body[k, HIGH_X + 2] = 0.5 * width, 0.5 * height, 0.5 * depth
         elif s.code[at + SHAPE] == 0:
             if abs(height - width) > ROUND * width:
                 return BAD_SIZE
@@ -336,7 +342,7 @@ def solids(s, i, j, kind):
     gap_z = abs(z) - (s.body[i, HIGH_X + 2] + s.body[j, HIGH_X + 2])
     depth = max(max(gap_x, gap_y), gap_z)
     nx = ny = nz = 0.0
-    if depth > 0.0:
+    if max(min(gap_x, max(gap_y, gap_z)), min(gap_y, gap_z)) > 0.0:  # two of them are
         nx, ny, nz = max(gap_x, 0.0), max(gap_y, 0.0), max(gap_z, 0.0)
         depth = math.sqrt(nx * nx + ny * ny + nz * nz)
         nx, ny, nz = nx / depth, ny / depth, nz / depth
@@ -391,12 +397,14 @@ def measure(s, i, j):
 
 def apart(s, i, j):
     """Gap of the bounding boxes of two bodies: no more than their distance, but for rounding."""
-    body, widest = s.body, -math.inf
-    for d in range(s.code[DIMENSIONS]):
-        x = body[i, BX + d] - body[j, BX + d]
-        gap = max(body[i, LOW_X + d] + x - body[j, HIGH_X + d], body[j, LOW_X + d] - x - body[i, HIGH_X + d])
-        widest = max(widest, gap)
-    return widest
+    widest = max(clearance(s.body, i, j, 0), clearance(s.body, i, j, 1))
+    return max(widest, clearance(s.body, i, j, 2)) if s.code[DIMENSIONS] == 3 else widest
+
+
+def clearance(body, i, j, d):
+    """Gap of two bounding boxes along one axis."""
+    x = body[i, BX + d] - body[j, BX + d]
+    return max(body[i, LOW_X + d] + x - body[j, HIGH_X + d], body[j, LOW_X + d] - x - body[i, HIGH_X + d])
 
 
 def limit(s, i, j, least, size):
@@ -411,13 +419,17 @@ def touch(s, i, j):
     if i > j:
         i, j = j, i
     now = s.masks[5]
-    if s.known[1, i, j] < now:
-        most = limit(s, i, j, TOUCH, SIZE)
-        if s.known[0, i, j] != now and apart(s, i, j) > max(CLEAR, 2.0 * most):
-            s.known[1, i, j] = now
-        else:
-            s.known[1, i, j] = now + 1 if measure(s, i, j) <= most else now
-    return s.known[1, i, j] == now + 1
+    if s.known[1, i, j] >= now:
+        return s.known[1, i, j] == now + 1
+    return touch_at(s, i, j, -math.inf if s.known[0, i, j] == now else apart(s, i, j))
+
+
+def touch_at(s, i, j, gap):
+    """Whether bodies i < j touch, whose bounding boxes are so far apart."""
+    most, now = limit(s, i, j, TOUCH, SIZE), s.masks[5]
+    near = not gap > max(CLEAR, 2.0 * most) and measure(s, i, j) <= most
+    s.known[1, i, j] = now + np.int64(near)
+    return near
 
 
 # ---------------------------------------------------------------------------------------------- contacts
@@ -597,38 +609,49 @@ def meet(s):
     return count
 
 
+def go_on(s, k):
+    """A body's velocities now, which would stay as they are."""
+    at = s.code[AT_BODIES] + BODY * k
+    now, free = s.velocity[0], s.velocity[1]
+    now[0, k], now[1, k], now[2, k] = (
+        s.x[s.code[at + COL_VX]],
+        s.x[s.code[at + COL_VY]],
+        s.x[s.code[at + COL_SPIN]],
+    )
+    free[0, k], free[1, k], free[2, k] = now[0, k], now[1, k], now[2, k]
+
+
 def move(s):
     """Next velocities of all movers (`relgym.laws.book.LawBook.motion`); the number of contacts, -1: too many."""
-    bodies, x = s.code[BODIES], s.x
-    now, free, v, flags = s.velocity[0], s.velocity[1], s.velocity[2], s.body_flags
-    spins = False
-    for k in range(bodies):
-        at = s.code[AT_BODIES] + BODY * k
-        now[0, k], now[1, k], now[2, k] = (
-            x[s.code[at + COL_VX]],
-            x[s.code[at + COL_VY]],
-            x[s.code[at + COL_SPIN]],
-        )
-        free[0, k], free[1, k], free[2, k] = now[0, k], now[1, k], now[2, k]
+    bodies = s.code[BODIES]
+    free, v, flags = s.velocity[1], s.velocity[2], s.body_flags
+    count = meet(s)
+    if count < 0:
+        return count
+    for k in lanes(bodies):
         flags[0, k] = flags[1, k] = flags[2, k] = 0
-        spins = spins or s.code[at + SPINS] == 1
+    for k in range(bodies if count else 0):  # those who don't move take part in contacts alone
+        go_on(s, k)
     for m in range(s.code[MOVERS]):
         at = s.code[s.code[AT_MOVERS] + m]
         k = s.code[at]
+        if count == 0:
+            go_on(s, k)
         for d in range(s.code[at + 2]):
             free[d, k] = math.nan
         for d in range(s.code[at + 3]):
             free[d, k] = total(s, s.code[at + 4 + d])
-        stated = 1
+        stated = np.int64(1)
         for d in range(s.code[at + 1]):
-            if not math.isfinite(free[d, k]):
-                stated = 0
+            stated &= np.int64(math.isfinite(free[d, k]))
         flags[0, k] = flags[1, k] = stated
-    for k in range(bodies):
         v[0, k], v[1, k], v[2, k] = free[0, k], free[1, k], free[2, k]
-    count = meet(s)
-    if count <= 0:
+    if count == 0:
         return count
+    spins = False
+    for k in range(bodies):
+        spins = spins or s.code[s.code[AT_BODIES] + BODY * k + SPINS] == 1
+        v[0, k], v[1, k], v[2, k] = free[0, k], free[1, k], free[2, k]
     for k in range(count):
         flags[2, s.pair[k, 1]] = flags[2, s.pair[k, 2]] = 1
     if s.code[LAWS] == 0:
@@ -785,40 +808,35 @@ def closing(s, a, b):
 
 
 def sides(s, a, b):
-    """How body a lies to b, and b to a: bits of the kinds of relations between bounding boxes; touching aside."""
+    """How body a lies to b, and b to a: bits of the kinds of relations between bounding boxes, touching aside.
+
+    And the boxes' gap.
+    """
     one, there, back, beside = np.int64(1), np.int64(0), np.int64(0), np.int64(0)
-    over, under = True, True
+    over = under = one
+    gap = -math.inf
     for d in range(s.code[DIMENSIONS]):
         low_a, high_a = s.body[a, LOW_X + d], s.body[a, HIGH_X + d]
         low_b, high_b = s.body[b, LOW_X + d], s.body[b, HIGH_X + d]
         offset = s.body[a, BX + d] - s.body[b, BX + d]
         wide_a, wide_b = high_a - low_a, high_b - low_b
         margin = -(ALIGN_MARGIN * min(wide_a, wide_b))
-        less, greater = (low_b - high_a) - offset >= margin, (low_a - high_b) + offset >= margin
-        if less:
-            there |= one << (5 + d)
-            back |= one << (8 + d)
-        if greater:
-            there |= one << (8 + d)
-            back |= one << (5 + d)
-        if not (less or greater):
-            beside |= one << (11 + d)
+        ahead, behind = (low_b - high_a) - offset, (low_a - high_b) + offset
+        gap = max(gap, max(ahead, behind))
+        below, above = np.int64(ahead >= margin), np.int64(behind >= margin)
+        there |= below << (5 + d) | above << (8 + d)
+        back |= below << (8 + d) | above << (5 + d)
+        beside |= (one ^ (below | above)) << (11 + d)
         if d == s.code[UP]:
-            over, under = over and greater, under and less
-        elif over or under:
+            over, under = over & above, under & below
+        else:
             shared = min(high_a + offset, high_b) - max(low_a + offset, low_b)
-            over = over and shared >= MIN_OVERLAP * wide_a
+            over &= np.int64(shared >= MIN_OVERLAP * wide_a)
             shared = min(high_b - offset, high_a) - max(low_b - offset, low_a)
-            under = under and shared >= MIN_OVERLAP * wide_b
-    if over:
-        there |= one << 3
-    if under:
-        back |= one << 3
-    if SIZE_RATIO * s.body[a, WHOLE] < s.body[b, WHOLE]:
-        there |= one << 4
-    if SIZE_RATIO * s.body[b, WHOLE] < s.body[a, WHOLE]:
-        back |= one << 4
-    return there | beside, back | beside
+            under &= np.int64(shared >= MIN_OVERLAP * wide_b)
+    there |= over << 3 | np.int64(SIZE_RATIO * s.body[a, WHOLE] < s.body[b, WHOLE]) << 4
+    back |= under << 3 | np.int64(SIZE_RATIO * s.body[b, WHOLE] < s.body[a, WHOLE]) << 4
+    return there | beside, back | beside, gap
 
 
 def fastest(s, a, b):
@@ -837,11 +855,7 @@ def relate(s, among):
         return
     among |= s.masks[4]
     s.masks[4], s.masks[6] = among, 0
-    one, at, bodies = np.int64(1), s.code[AT_BODIES] + BODY * s.code[BODIES], s.code[BODIES]
-    asked, state = np.int64(0), mixed(np.uint64(among))
-    for r in range(s.code[RELATIONS]):
-        if s.code[at + r] >= 0:
-            asked |= one << s.code[at + r]
+    one, bodies, asked, state = np.int64(1), s.code[BODIES], s.code[ASKED], mixed(np.uint64(among))
     if asked & (one << 4):
         for k in range(bodies):
             whole = 0.0
@@ -857,8 +871,11 @@ def relate(s, among):
                 continue
             there = back = np.int64(0)
             if asked & ~7:
-                there, back = sides(s, a, b)
-            if touch(s, a, b):
+                there, back, gap = sides(s, a, b)
+                near = touch(s, a, b) if s.known[1, a, b] >= s.masks[5] else touch_at(s, a, b, gap)
+            else:
+                near = touch(s, a, b)
+            if near:
                 there, back = there | 4, back | 4
                 if asked & 3 and closing(s, a, b) < math.inf:
                     there, back = there | 1, back | 1
@@ -1177,7 +1194,7 @@ def rank(s, vote, count, target):
 def line_up(s, t):
     """Bodies in canonical order as t sees them (`relgym.scene.context.canonical_order`), t itself first.
 
-    Returns whether some are alike in their relations to t, so that numbers decide.
+    Returns whether some are alike in their relations to t, and whether some are in all relations: then numbers decide.
     """
     bodies, relations = s.code[BODIES], s.code[RELATIONS]
     toward, around = s.hashes[0], s.hashes[1]
@@ -1201,17 +1218,22 @@ def line_up(s, t):
                 if j != k and j != t:
                     bits = both_ways(s, relations, k, j) + s.hashes[2, j]
                     around[k] += mixed(mixed(bits + GOLDEN) + toward[j] + GOLDEN)
-    order[0], count = t, 1
+    order[0], count, alike = t, 1, False
     for k in range(bodies):
         if k == t:
             continue
         j = count
-        while j > 1 and earlier(s, t, k, order[j - 1]):
+        while j > 1:
+            known, first = by_relations(s, k, order[j - 1])
+            if not known:
+                alike, first = True, by_numbers(s, t, k, order[j - 1])
+            if not first:
+                break
             order[j] = order[j - 1]
             j -= 1
         order[j] = k
         count += 1
-    return tied
+    return tied, alike
 
 
 def rank_groups(s, t, relations):
@@ -1232,20 +1254,24 @@ def both_ways(s, relations, a, b):
     """Which relations hold between two bodies either way round, as bits; the first one's are the highest."""
     bits, one = ZERO64, np.int64(1)
     for r in range(relations):
-        bits = (bits << ONE64) | (ONE64 if s.rows[r, a] & (one << b) else ZERO64)
-        bits = (bits << ONE64) | (ONE64 if s.columns[r, a] & (one << b) else ZERO64)
+        bits = bits << ONE64 | np.uint64(s.rows[r, a] >> b & one)
+        bits = bits << ONE64 | np.uint64(s.columns[r, a] >> b & one)
     return bits
 
 
-def earlier(s, t, a, b):
-    """Whether body a comes before b."""
+def by_relations(s, a, b):
+    """Whether types and relations tell which of two bodies comes first; whether a does."""
     first, second = s.code[AT_BODIES] + BODY * a, s.code[AT_BODIES] + BODY * b
     if s.code[first + GROUP] != s.code[second + GROUP]:
-        return s.code[first + GROUP] < s.code[second + GROUP]
+        return True, s.code[first + GROUP] < s.code[second + GROUP]
     if s.hashes[0, a] != s.hashes[0, b]:
-        return s.hashes[0, a] > s.hashes[0, b]
-    if s.hashes[1, a] != s.hashes[1, b]:
-        return s.hashes[1, a] < s.hashes[1, b]
+        return True, s.hashes[0, a] > s.hashes[0, b]
+    return s.hashes[1, a] != s.hashes[1, b], s.hashes[1, a] < s.hashes[1, b]
+
+
+def by_numbers(s, t, a, b):
+    """Whether body a comes before b, which is alike in all relations: who is nearer to t, then by places and sizes."""
+    first, second = s.code[AT_BODIES] + BODY * a, s.code[AT_BODIES] + BODY * b
     near_a = np.round(measure(s, min(a, t), max(a, t)) / SAME_DISTANCE)
     near_b = np.round(measure(s, min(b, t), max(b, t)) / SAME_DISTANCE)
     if near_a != near_b:
@@ -1445,27 +1471,31 @@ def familiar(s, a, slot):
     return record[0] & 1 == 1
 
 
-def players_of(s, a, mode, number, slot, tied):
-    """Fill the roles of a mode: bodies in `s.cast[0]`; whether they can be, and whether numbers decide an order."""
+def players_of(s, a, mode, number, slot, alike):
+    """Fill the roles of a mode: bodies in `s.cast[0]`; whether they can be, and whether numbers decide an order.
+
+    What relations alone decide is remembered. `alike`: whether numbers decide; -1: nobody was lined up yet.
+    """
     casting = s.code[mode + 3]
     if casting == 0:
-        return False, tied
+        return False, alike
     roles = s.code[casting + 1]
     record = s.memory[max(slot, 0)]
     at = 2 + REMEMBERED_MODES + number * (1 + REMEMBERED_ROLES)
     if slot >= 0 and record[at]:
         for k in range(roles):
             s.cast[0, k] = record[at + 1 + k]
-        return record[at] == 1, tied
+        return record[at] == 1, alike
     unfold(s)
-    if tied < 0:
-        tied = 1 if line_up(s, s.code[a + 2]) else 0
+    if alike < 0:
+        _, numeric = line_up(s, s.code[a + 2])
+        alike = 1 if numeric else 0
     done = assign(s, casting, s.code[a + 2])
-    if slot >= 0 and tied == 0 and roles <= REMEMBERED_ROLES:
+    if slot >= 0 and alike == 0 and roles <= REMEMBERED_ROLES:
         record[at] = 1 if done else 2
         for k in range(roles):
             record[at + 1 + k] = s.cast[0, k]
-    return done, tied
+    return done, alike
 
 
 def by_modes(s, a, answer):
@@ -1517,14 +1547,14 @@ def by_modes(s, a, answer):
             mode = s.code[modes + s.order[0, 0]]
             value = x[s.code[mode + 1]]
             return clip(s, s.code[a + 18], clipped, value), OUTSIDE, s.code[mode], 0.0
-    tied = -1
+    alike = -1
     for rank_ in range(count):
         mode = s.code[modes + s.order[0, rank_]]
         if s.code[mode + 2] == 0:
             continue
         value = x[s.code[mode + 1]]
         if s.code[mode + 4]:
-            done, tied = players_of(s, a, mode, s.order[0, rank_], slot, tied)
+            done, alike = players_of(s, a, mode, s.order[0, rank_], slot, alike)
             if not done:
                 if not s.code[a + 9]:
                     continue
@@ -1805,7 +1835,7 @@ def run(s, n, settling, telling, writing, vectors, following, outcomes, modes, m
     s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
     for i in range(n):
         now, wrong = i * width, 0
-        for k in range(width):
+        for k in lanes(width):
             value = vectors[now + k]
             s.x[k] = following[now + k] = value
             wrong += not abs(value) < math.inf
@@ -1877,7 +1907,8 @@ def see(s, t, vector, table, close, struck, told, order):
         close[k], struck[k] = s.masks[1] >> k & one, s.masks[0] >> k & one
         for f in range(width):
             told[k * width + f] = s.told[k, f]
-    order[0] = 1 if line_up(s, t) else 0
+    tied, _ = line_up(s, t)
+    order[0] = 1 if tied else 0
     for k in range(1, bodies):
         order[k] = s.lineup[0, k]
     return 0

@@ -34,7 +34,7 @@ HEADER = 28
     AT_LAWS,
 ) = range(12)
 (KINEMATICS, AT_KINEMATICS, ANGLES, AT_ANGLES, RELATIONS, FACTS, OTHERS) = range(12, 19)
-(OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP, NEXTS, AT_NEXTS) = range(19, 27)
+(OFFSETS, PARTING, EVERYTHING, KEYS, DIMENSIONS, UP, NEXTS, AT_NEXTS, ASKED) = range(19, 28)
 """Entries of the header."""
 
 (TURN, TOUCH, PART, PRECISION, SLACK) = range(5)
@@ -246,6 +246,7 @@ class _Writer:
         kinds = [self._relation(name) if k in wanted else -1 for k, name in enumerate(p.relations)]
         # Behind the bodies: kinds of the relations (-1: nobody asks), then the columns of the others' numbers.
         self.put(*kinds)
+        head[ASKED] = sum(1 << kind for kind in set(kinds) if kind >= 0)
         width = len(p.others[0]) if p.others else 0
         head[OTHERS] = width
         self.put(*self.col(*(c for row in p.others for c in row)))

@@ -45,6 +45,9 @@ def fresh() -> np.ndarray[Any, Any]:
     return space
 
 
+lanes = range
+
+
 def pair(s, x):  # type: ignore[no-untyped-def]
     return s.b[x], x + 1
 
@@ -68,6 +71,8 @@ def statements(s, n):  # type: ignore[no-untyped-def]
         total += k
     for k in range(n - 1, -1, -2):
         total = 2 * total - k
+    for k in lanes(min(n, 4)):
+        total += s.a[2, k] * (k < 3)
     for each in (1, 3, 2):
         if each == 2 and n > 2:
             break
