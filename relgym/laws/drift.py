@@ -39,19 +39,20 @@ class Drift:
     total: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     squares: float = 0.0
     steps: float = 0.0
-    _last: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
+    _last: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
 
     def add(self, name: str, now: NDArray[np.float64], after: NDArray[np.float64]) -> None:
         """Take up an object's velocity in a step, and the next one."""
-        change = after - now
+        here, there = now.tolist(), after.tolist()
+        change = [b - a for a, b in zip(here, there, strict=True)]
         self.count += 1
         self.total[: len(change)] += change
-        self.squares += float((change**2).sum())
+        self.squares += sum([c * c for c in change])
         last = self._last.get(name)
-        if last is not None and np.array_equal(last[0], now):
+        if last is not None and last[0] == here:
             self.pairs += 1
-            self.steps += float(((change - last[1]) ** 2).sum())
-        self._last[name] = after.copy(), change
+            self.steps += sum([(c - d) * (c - d) for c, d in zip(change, last[1], strict=True)])
+        self._last[name] = there, change
 
     def noisy(self) -> bool:
         """Whether changes are as little alike as noise is, as far as that is known."""

@@ -418,7 +418,7 @@ class LawLearner:
         if self._noise is not None:
             self.book.tolerance = STDS * self._noise
             return
-        largest = float(np.abs(vector[self.book.rounded(cast)]).max(initial=0.0))
+        largest = max(map(abs, vector[self.book.rounded(cast)].tolist()), default=0.0)
         floor = STDS * ROUNDINGS * float(np.finfo(np.float64).eps) * largest
         self.book.tolerance = max(self.book.tolerance, floor)
 

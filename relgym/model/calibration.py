@@ -29,6 +29,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -877,7 +878,13 @@ class Calibration:
 
 def _able(values: Sequence[float]) -> tuple[int, ...]:
     """Places of the experts that have a value."""
-    return tuple([k for k, value in enumerate(values) if math.isfinite(value)])
+    return _places(tuple(map(math.isfinite, values)))
+
+
+@cache
+def _places(held: tuple[bool, ...]) -> tuple[int, ...]:
+    """Where something holds; kept, for there are few such patterns and many predictions."""
+    return tuple(k for k, holds in enumerate(held) if holds)
 
 
 def _makes_claims(speaker: int) -> bool:

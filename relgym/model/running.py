@@ -519,8 +519,7 @@ class _Teller:
 
     def values(self, said: list[float], now: list[float]) -> tuple[float, ...]:
         """What each of `EXPERTS` says, persistence too; NaN: nothing."""
-        found = [value if math.isfinite(value) else math.nan for value in said]
-        return (*found, now[self.answer.column])
+        return (*said, now[self.answer.column])
 
     def known(
         self, now: list[float], mode: int, noted: int, players: _Bits

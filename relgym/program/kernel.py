@@ -1697,6 +1697,8 @@ def consult(s, a, k, value):
     for expert in range(PERSISTENCE):
         if math.isfinite(said[expert]):
             able |= np.int64(1) << expert
+        else:
+            said[expert] = math.nan
     return able
 
 
