@@ -69,7 +69,7 @@ def test_dreamt_policies_and_speeds() -> None:
     assert [m.ok for m in asleep.measures] == [False]
     among = BENCHMARKS["truck-more-boxes"].show([({}, {"successes": {"2": 80, "7": 79}, "seconds": 1.0})])
     assert [m.ok for m in among.measures] == [True, False]
-    speed = BENCHMARKS["speed"].show([({"world": "truck"}, {"dreams": 120_000.0, "engine": 50_000.0})])
+    speed = BENCHMARKS["speed"].show([({"world": "truck"}, {"dreams": 1.6e6, "engine": 50_000.0})])
     assert [m.ok for m in speed.measures] == [True, False]
 
 
