@@ -201,7 +201,10 @@ def _speed(found: Found) -> Shown:
             measured(f"{world}: env-steps a second", least, [value["dreams"]], ">="),
             measured(f"{world}: times the engine's", times, [value["dreams"] / value["engine"]], ">="),
         ]
-    return Shown(measures, ["Processor time, medians of five rounds; 1,024 scenes at once, the engine's in a SyncVectorEnv."])
+    return Shown(
+        measures,
+        ["Processor time, medians of five rounds; 1,024 scenes at once, the engine's in a SyncVectorEnv."],
+    )
 
 
 def _times(found: Found) -> str:

@@ -48,8 +48,9 @@ OWN, GUESS, LINEAR, PRODUCTS, LATEST, PERSISTENCE = range(len(EXPERTS))
 _KNOWN: Final = (LINEAR, PRODUCTS, PERSISTENCE)
 """What anybody would try first."""
 
-_FITTED: Final = (LINEAR, PRODUCTS)
-"""Who errs the less the more was learned from: of n trials the i-th counts for i / n."""
+_FITTED: Final = (GUESS, LINEAR, PRODUCTS)
+"""Who errs the less the more was learned from: of n trials the i-th counts for nearly (i / n)^2. What falls as c / i, as
+least squares' part of the errors does, is taken for 1.5 c / n then; the variance is that of 5 n / 9 trials."""
 
 _VALUES: Final = (GUESS, LINEAR, PRODUCTS, PERSISTENCE)
 """Who makes no claims."""
@@ -175,8 +176,8 @@ class _Record:
 
     def add(self, hit: bool, times: int, *, fitted: bool) -> None:
         """Take in a value that nobody claims, so that no run of hits or misses needs to be noticed at once."""
-        if fitted and self.trials:  # weights of i / n sum to n / 2
-            kept = max(1.0 - times / (2.0 * self.trials), 0.5)
+        if fitted and self.trials:  # weights of (i / n)^2 sum to n / 3
+            kept = max(1.0 - 2.0 * times / (3.0 * self.trials), 1.0 / 3.0)
             self.trials, self.hits = kept * self.trials, kept * self.hits
         self.trials += times
         self.hits += times * hit
@@ -507,6 +508,10 @@ class Calibration:
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
+            better = self._unheard(trusted, speaker, able)
+            if better is not None:
+                speaker, trusted = better, self._whole()
+                family, known = trusted, [trusted]
         elif not self._cells or (OWN in able and self._vouches(family, bits)):
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:  # of a new winner nothing is known, and of those like it nothing good
@@ -528,6 +533,17 @@ class Calibration:
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
+
+    def _unheard(self, cell: _Cell, speaker: int, able: tuple[int, ...]) -> int | None:
+        """Who was never heard in a cell, but elsewhere codes best by enough; None: nobody, or a mode or law speaks."""
+        if _makes_claims(speaker):
+            return None
+        others = [k for k in able if k in _VALUES and not cell.squares[k][0]]
+        if not others:
+            return None
+        whole = self._whole()
+        best = min(others, key=whole.left)
+        return best if whole.lead(best, speaker) >= EVIDENCE else None
 
     def _vouches(self, family: _Cell | None, bits: float) -> bool:
         """Whether modes, or laws, were right often enough for a new one to have the word, and hardly left more than is.

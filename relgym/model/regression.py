@@ -6,9 +6,11 @@ try first. So it is tried beside everything else, and where it codes what comes 
 
 Where a row lies far from all that were learned, a regression errs by far more than among them, and the more so the more
 columns it has. So the second kind counts each word as far as its leverage h allows: first that nothing changes, then
-the linear one's, then the products'. What a regression leaves, s in the mean square, is mostly misfit, and becomes
-s (1 + h)^2; what the words before it leave is more by b everywhere. What adds up to the least error is
-b / (b + s (1 + h)^2 - s) of its word, and the rest of theirs (shrinkage: James & Stein 1961).
+the linear one's, then the products'. What a regression leaves, s in the mean square in the midst of n rows of d
+columns, is mostly misfit: other slopes would suit other places. That grows with the squared distance from what is
+known, which is h n, and d of a row like those: to s (1 + h n / d), of fewer rows than columns to s (1 + h). What the
+words before it leave is more by b everywhere. What adds up to the least error is b / (b + s h n / d) of its word, and
+the rest of theirs (shrinkage: James & Stein 1961).
 """
 
 from __future__ import annotations
@@ -114,7 +116,7 @@ class Regression:
         if not np.isfinite(leverage).all():  # a gross error, which isn't learned either
             return
         size = np.abs(np.concatenate([np.zeros((1, len(y))), found[0]]) - y)
-        size[1:] /= 1.0 + leverage[0][:, None]
+        size[1:] /= np.sqrt(1.0 + leverage[0] * self._growth())[:, None]
         known = np.isfinite(size)
         rate = min(1.0, 2.0 / (self._ridges[0].rows - FIRST + 1))  # each counts in proportion to its number
         squares = np.square(np.minimum(np.where(known, size, 0.0), np.sqrt(SUMMABLE)))
@@ -170,18 +172,25 @@ class Regression:
         """How far a regression's word counts, at leverages ``(n,)``, for each target, shape ``(n, targets)``."""
         bias, left = self._bias(kind)
         with np.errstate(over="ignore", invalid="ignore"):
-            more = np.where(left > 0.0, left * ((2.0 + leverage) * leverage)[:, None], 0.0)
+            more = np.where(left > 0.0, left * leverage[:, None], 0.0)
             return np.where(bias > 0.0, bias / (bias + more), 0.0)
 
     def _bias(self, kind: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """How much more the words before a regression leave of each target, and what it leaves, in the mean square.
+        """How much more the words before a regression leave of each target than it, and what it leaves more at h = 1.
 
-        Where nobody ever compared them it has the last word.
+        In the mean square. Where nobody ever compared them it has the last word.
         """
         left = self._left[kind + 1]
         known = np.isfinite(left)
         bias = np.maximum(self._left[: kind + 1].min(axis=0) - left, 0.0)
-        return np.where(known, bias, 1.0), np.where(known, left, 0.0)
+        return np.where(known, bias, 1.0), np.where(known, left * self._growth()[kind], 0.0)
+
+    def _growth(self) -> NDArray[np.float64]:
+        """By how much of itself what each regression leaves grows with a leverage of 1, shape ``(KINDS,)``."""
+        found = np.ones(KINDS)
+        for k, ridge in enumerate(self._ridges):
+            found[k] = max(1.0, ridge.rows / ridge.columns)
+        return found
 
     def fit(
         self, signature: SlotSignature
@@ -210,7 +219,7 @@ class Regression:
     def trusted(self) -> NDArray[np.float64]:
         """How far the word of each regression counts for each target, shape ``(targets, regressions, 3)``.
 
-        What the words before it leave more than it, what it leaves, both in the mean square, and 1 / rows
+        What the words before it leave more than it, what it leaves more at h = 1, both in the mean square, and 1 / rows
         (`relgym.program.records.Trusted`).
         """
         found = np.empty((len(self.targets), len(self._ridges), 3))

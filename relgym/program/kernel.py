@@ -1676,8 +1676,8 @@ def regress(s, record, k):
             linear = word
         if math.isfinite(word):
             at = reach + 2 + 3 * kind
-            bias, left, far = s.numbers[at], s.numbers[at + 1], s.leverage[kind] + s.numbers[at + 2]
-            more = left * ((2.0 + far) * far) if left > 0.0 else 0.0
+            bias, growth, far = s.numbers[at], s.numbers[at + 1], s.leverage[kind] + s.numbers[at + 2]
+            more = growth * far if growth > 0.0 else 0.0
             share = bias / (bias + more) if bias > 0.0 else 0.0
             whole = whole + share * (word - whole)
     s.experts[k, LINEAR] = present + linear

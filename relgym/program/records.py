@@ -498,18 +498,19 @@ class Fit:
 
 @dataclass(frozen=True, slots=True)
 class Trusted:
-    """How far the word of a regression counts at leverage h: ``bias / (bias + left ((1 + h)^2 - 1))``, 0 without bias.
+    """How far the word of a regression counts at leverage h: ``bias / (bias + more h)``, 0 without bias.
 
     Attributes
     ----------
-    bias, left
-        By how much more the words before it leave, and what it leaves, in the mean square.
+    bias, more
+        How much more the words before it leave than it, and how much more it leaves at a leverage of 1, in the mean
+        square.
     least
         Leverage in the midst of all that is known: one part in the number of rows.
     """
 
     bias: float
-    left: float
+    more: float
     least: float
 
 

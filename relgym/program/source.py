@@ -588,7 +588,7 @@ class _Source:
         add(f"{name.upper()}_LEAST_SQUARES = (")
         weights = (f"({', '.join(map(_number, row))},)" for row in r.weights)
         trusted = (
-            f"({_number(each.bias)}, {_number(each.left)}, {_number(each.least)})" for each in r.trusted
+            f"({_number(each.bias)}, {_number(each.more)}, {_number(each.least)})" for each in r.trusted
         )
         add(f"    {self.names[r.present]}, FIT_{r.fit},\n    ({', '.join(weights)},),")
         add(f"    {_number(r.least)}, {_number(r.most)}, ({', '.join(trusted)},),\n)")
@@ -851,12 +851,12 @@ def regressed(x, present, fit, weights, least, most, trusted):
         words = [in_order(np.array([1.0, *shown]) * np.array(row)) for shown, row in zip(both, weights)]
     words = [min(max(word, least), most) if word == word else word for word in words]
     whole = 0.0
-    for word, shown, (mean, text), (bias, left, midst) in zip(words, both, reach, trusted):
+    for word, shown, (mean, text), (bias, growth, midst) in zip(words, both, reach, trusted):
         off = np.array(shown) - np.array(mean)
         with np.errstate(over="ignore", invalid="ignore"):
             far = in_order(off * np.add.accumulate(spread(text, len(mean)) * off[:, None])[-1])
         h = (far if far >= 0.0 else math.inf) + midst
-        more = left * ((2.0 + h) * h) if left > 0.0 else 0.0
+        more = growth * h if growth > 0.0 else 0.0
         share = bias / (bias + more) if bias > 0.0 else 0.0
         if math.isfinite(word):
             whole = whole + share * (word - whole)

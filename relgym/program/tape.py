@@ -547,7 +547,7 @@ class _Writer:
             return 0
         weights = [self.num(*row) for row in r.weights]
         reach = self.num(
-            r.least, r.most, *(v for each in r.trusted for v in (each.bias, each.left, each.least))
+            r.least, r.most, *(v for each in r.trusted for v in (each.bias, each.more, each.least))
         )
         self.reaches.append(reach)
         return self.put(self.fits[r.fit], *self.col(r.present), reach, *weights)

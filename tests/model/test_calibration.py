@@ -590,7 +590,10 @@ def test_another_expert_takes_over_at_ten_bits() -> None:
         spoke.append(found.speaker)
     assert spoke == [OWN] * 9 + [LINEAR] * 2
     # Its record goes back to where it had a value, of which late trials count for more; of its errors it begins now.
-    assert (found.records[OWN].trials, found.records[LINEAR].trials) == (11.0, 6.0)
+    assert (found.records[OWN].trials, found.records[LINEAR].trials) == (
+        11.0,
+        pytest.approx((11.0 + 2.0) / 3.0),
+    )
     assert sum(found.records[LINEAR].errors.values()) == 1.0
 
 
@@ -863,10 +866,21 @@ def test_all_modes_know_how_often_each_was_right_who_spoke() -> None:
         seen(known, said, 1.0)
     (family,) = [c for key, c in known._cells.items() if key.lead == OF_FAMILY]
     assert spoke.count(LINEAR) > 20
-    assert (family.records[LINEAR].trials, family.records[LINEAR].hits) == (
-        0.5 * (spoke.count(LINEAR) + 1),
-    ) * 2
+    known_of = pytest.approx((spoke.count(LINEAR) + 2) / 3)
+    assert (family.records[LINEAR].trials, family.records[LINEAR].hits) == (known_of, known_of)
     assert (family.records[OWN].trials, family.records[OWN].hits) == (30, 0)
+
+
+def test_who_was_never_heard_in_a_cell_speaks_there_if_elsewhere_it_codes_best() -> None:
+    known, other = Calibration(), KEY._replace(winner=2)
+    for _ in range(40):  # linear had nothing to say yet: that nothing changes codes best
+        seen(known, values(own=5.0, now=0.5), 1.0, other)
+    assert known.assess(other, values(own=5.0, linear=1.0, now=0.5)).speaker == PERSISTENCE
+    for _ in range(40):
+        seen(known, values(own=5.0, linear=1.0, now=0.5), 1.0)
+    told = known.assess(other, values(own=5.0, linear=1.0, now=0.5))
+    assert told.speaker == LINEAR and told.interval == 0.0 and told.probability > 0.9
+    assert known.assess(other, values(own=5.0, now=0.5)).speaker == PERSISTENCE
 
 
 def test_a_renewed_expert_begins_with_ten_trials_of_who_speaks() -> None:
@@ -1294,9 +1308,9 @@ def test_of_who_learns_on_late_trials_count_for_more() -> None:
     for k in range(40):
         fitted.add(k >= 20, 1, fitted=True)
         constant.add(k >= 20, 1, fitted=False)
-    # the i-th of 40 counts for i / 40
-    assert fitted.trials == pytest.approx(sum(range(1, 41)) / 40)
-    assert fitted.hits == pytest.approx(sum(range(21, 41)) / 40)
+    # the i-th of 40 counts for i (i + 1) / (40 * 41)
+    assert fitted.trials == pytest.approx(sum(i * (i + 1) for i in range(1, 41)) / (40 * 41))
+    assert fitted.hits == pytest.approx(sum(i * (i + 1) for i in range(21, 41)) / (40 * 41))
     assert (constant.trials, constant.hits) == (40.0, 20.0)
 
 

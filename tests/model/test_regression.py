@@ -66,7 +66,8 @@ def test_products_count_as_far_as_their_leverage_allows() -> None:
             said_so_far, left = 0.0, nothing
             for kind, s in enumerate((linear, products)):
                 bias, h = max(left - s, 0.0), leverage[k, kind]
-                share = bias / (bias + s * ((1.0 + h) ** 2 - 1.0)) if bias else 0.0
+                ridge = found._ridges[kind]
+                share = bias / (bias + s * h * ridge.rows / ridge.columns) if bias else 0.0
                 said_so_far += share * (own[k, kind, target] - said_so_far)
                 left = min(left, s)
             assert said[k, 1, target] == pytest.approx(said_so_far)
@@ -179,9 +180,9 @@ def test_sums_say_what_values_say(n: int, seed: int) -> None:
         told = found.sums(target)
         assert told is not None
         weights, (least, most) = told
-        for kind, (bias, left, few) in enumerate(found.trusted[k].tolist()):
+        for kind, (bias, more, few) in enumerate(found.trusted[k].tolist()):
             assert few == 1.0 / found._ridges[kind].rows
-            share = bias / (bias + left * ((1.0 + leverage[:, kind]) ** 2 - 1.0)) if bias else np.zeros(4)
+            share = bias / (bias + more * leverage[:, kind]) if bias else np.zeros(4)
             np.testing.assert_allclose(found._share(kind, leverage[:, kind])[:, k], share)
         for row, expected in zip(rows, said, strict=True):
             z = [(row[p] - c) / s for p, c, s in zip(places, centre, scale, strict=True)]

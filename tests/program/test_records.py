@@ -74,12 +74,12 @@ def test_a_name_of_what_stands_below_is_no_answers_name() -> None:
 def test_least_squares_by_hand() -> None:
     """z = (4 - 2) / 2 = 1 and (1 - 0) / 1 = 1: 0.5 + z_1 + 2 z_2 = 3.5, kept to 3; with products 1.75.
 
-    With a leverage of 1/2 the first word counts 1 / (1 + 2 (9/4 - 1)), the second one 3 / (3 + 2 (9/4 - 1)).
+    With a leverage of 1/2 the first word counts 1 / (1 + 5 / 2), the second one 3 / (3 + 5 / 2).
     """
     columns = ((1, 2.0, 2.0), (2, 0.0, 1.0))
     weights = ((0.5, 1.0, 2.0), (0.0, 1.0, 0.0, 0.0, 0.25, 0.5))  # 1, z1, z2; then z1 z1, z1 z2, z2 z2
     leverage = tuple(ir.Leverage((0.0,) * d, b64encode(bytes(2 * d * (d + 1))).decode()) for d in (2, 5))
-    trusted = ir.Trusted(1.0, 2.0, 0.5), ir.Trusted(3.0, 2.0, 0.5)
+    trusted = ir.Trusted(1.0, 5.0, 0.5), ir.Trusted(3.0, 5.0, 0.5)
     squares = ir.Regression(0, 0, weights, -3.0, 3.0, trusted)
     told = {}
     for speaker in (2, 3):

@@ -311,7 +311,7 @@ def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tu
                 along += next(entries) * (1.0 if i == j else 2.0) * off[j]
             far += off[i] * along
         h = (far if far >= 0.0 else math.inf) + known.least
-        more = known.left * ((2.0 + h) * h) if known.left else 0.0
+        more = known.more * h if known.more else 0.0
         whole += (known.bias / (known.bias + more) if known.bias else 0.0) * (words[-1] - whole)
     return x[r.present] + words[0], x[r.present] + whole
 
