@@ -49,8 +49,8 @@ _KNOWN: Final = (LINEAR, PRODUCTS, PERSISTENCE)
 """What anybody would try first."""
 
 _FITTED: Final = (GUESS, LINEAR, PRODUCTS)
-"""Who errs the less the more was learned from: of n trials the i-th counts for nearly (i / n)^2. What falls as c / i, as
-least squares' part of the errors does, is taken for 1.5 c / n then; the variance is that of 5 n / 9 trials."""
+"""Who errs the less the more was learned from: of n trials the i-th counts for nearly (i / n)^2. What falls as c / i,
+as least squares' part of the errors does, is taken for 1.5 c / n then; the variance is that of 5 n / 9 trials."""
 
 _VALUES: Final = (GUESS, LINEAR, PRODUCTS, PERSISTENCE)
 """Who makes no claims."""
