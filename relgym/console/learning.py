@@ -273,7 +273,7 @@ def _tested(done: Round, env: ModelLearner, seed: int) -> Round:
     """The round with errors on fresh steps, and advice."""
     found = transitions(fresh_episodes(env.env, env.view, seed=seed), min(TEST, done.planned))
     advice = env.model.advice()
-    advised = dict.fromkeys(f for each in advice for f in each.features if f not in done.features)
+    advised = [each for each in env.model.advised_features() if each not in done.features]
     return replace(
         done,
         score=score(env.model, found, env.view.precision),

@@ -43,7 +43,7 @@ from relgym.model.parts import Parts
 from relgym.model.perception import Percept, Situation
 from relgym.model.prediction import BatchPrediction, Outcome, ScenePrediction
 from relgym.model.querying import predict, predict_many
-from relgym.model.reports.advice import Advice, advices
+from relgym.model.reports.advice import Advice, advices, together
 from relgym.model.reports.rules import doubted, of_laws, rule_list
 from relgym.model.running import Programs
 from relgym.model.scenes import next_values, with_action
@@ -828,6 +828,14 @@ class WorldModel:
                 del known[target]
         known = now | known
         return tuple(known[str(t)] for t in self.targets if str(t) in known)
+
+    def advised_features(self) -> tuple[str, ...]:
+        """`ModelConfig.features` of a model that follows `advice`: what is on, and what is advised behind it.
+
+        Each advice is for one target; together they may ask for more columns than there may be. What most targets need
+        goes first then, and what doesn't fit is left out. Cost: that of `advice`.
+        """
+        return together(self._parts, self.advice())
 
     @refusing(ObservationError)
     def explain(self, scene: Scene) -> str:

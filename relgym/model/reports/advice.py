@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,7 +21,7 @@ from relgym.model.reports.distant import DistantForce, distant_forces
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import ACTION, TASK
 
-__all__ = ["Advice", "advices", "advise"]
+__all__ = ["Advice", "advices", "advise", "together"]
 
 LIBRARIES = (("trig",), ("products",), ("trig", "products"))
 """What is tried, from small to large."""
@@ -206,6 +207,26 @@ def advices(parts: Parts) -> tuple[Advice, ...]:
         if target.type in forces and target.property in parts.schema.type(target.type).velocity:
             lacking[target] = replace(each, forces=forces[target.type])
     return tuple(lacking.values())
+
+
+def together(parts: Parts, advice: Iterable[Advice]) -> tuple[str, ...]:
+    """What is switched on, and behind it what is advised, as far as all of that can be had at once.
+
+    What most targets need goes first; what would make a library too wide with it is left out.
+    """
+    found = parts.config.features
+    for features, _ in Counter(each.features for each in advice if each.features).most_common():
+        more = tuple(dict.fromkeys((*found, *features)))
+        if all(_fits(more, known) for table in parts.tables.values() for known in table.signatures):
+            found = more
+    return found
+
+
+def _fits(features: tuple[str, ...], known: SlotSignature) -> bool:
+    """Whether a type can be offered these features."""
+    own = known.types[0]
+    slots: SlotSignature = replace(known, nonlinear=library_of(features, own.name, own.angles))
+    return slots.feature_count <= MOST_FEATURES
 
 
 def _choose(trials: Iterable[_Trial], left: float) -> _Trial | None:
