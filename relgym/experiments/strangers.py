@@ -1,8 +1,8 @@
 """Other people's worlds with nothing tuned to them: what is claimed, and how right claims are.
 
 ``python -m relgym.experiments.strangers --out strangers.json`` learns from 2,000 random steps of each env with the
-default configuration, and predicts fresh episodes. Each (env, seed) that is done is in the file and isn't done again.
-Envs ending in ``-v5`` need the extra ``bench-envs``. What is measured, per property:
+default configuration, and predicts fresh episodes. Each (env, seed) that is done is in the file and isn't done again;
+one file is for one kind of run. Envs ending in ``-v5`` need the extra ``bench-envs``. What is measured, per property:
 
 - *claimed*, and *claimed and off*: by more than 5 % of the change (the median of those fresh steps that change it);
   *own*: by more than 5 % of each step's own change, however small;
@@ -11,6 +11,8 @@ Envs ending in ``-v5`` need the extra ``bench-envs``. What is measured, per prop
 - *calibration error*: mean distance between the probability stated and the share of predictions that came true, over
   ten bins of the probability (Naeini et al. 2015), of all targets together;
 - *coverage*: the share of next values inside the 95 % interval stated;
+- with ``--advised``: the same with the features that are advised, learned from the same steps, and *against library
+  ridge* and *against PySINDy* on the same columns (`relgym.experiments.strangers_library`);
 - process time per step, mean and largest. What is loaded once in a process, the compiled kernel, is loaded before, and
   what Python's garbage collector does with all that was there before isn't counted: it is the same for any program.
 """
@@ -22,7 +24,7 @@ import gc
 import json
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,9 +32,11 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config import ModelConfig
 from relgym.envs.views import NumbersView
 from relgym.errors import DataError
 from relgym.experiments.any_env_data import Study, stream
+from relgym.experiments.strangers_library import RIVALS, predicted
 from relgym.experiments.strangers_made import MADE
 from relgym.files.writing import write_whole
 from relgym.model.compiled import KERNEL
@@ -76,7 +80,7 @@ OFF: Final = 0.05
 _PREDICTED: Final = OUTCOMES.index(Outcome.PREDICTED)
 
 
-def measure(env_id: str, seed: int, steps: int = STEPS) -> dict[str, Any]:
+def measure(env_id: str, seed: int, steps: int = STEPS, *, advised: bool = False) -> dict[str, Any]:
     """Learn one env, and measure what is claimed of fresh episodes.
 
     Parameters
@@ -87,6 +91,8 @@ def measure(env_id: str, seed: int, steps: int = STEPS) -> dict[str, Any]:
         Of the training steps; the fresh ones' is another.
     steps
         Learned from, and predicted.
+    advised
+        Whether another model learns with the features that the default one advises, and is compared on those.
     """
     env = gym.make(env_id)
     view = NumbersView(env.observation_space, env.action_space)
@@ -100,20 +106,34 @@ def measure(env_id: str, seed: int, steps: int = STEPS) -> dict[str, Any]:
         compare_and_learn(warm, transition, warm.predict_one(transition.before), precision=view.precision)
     gc.collect()
     gc.freeze()
-    model = WorldModel(view.schema)
-    costs = []
+    model, costs = _taught(view, training, ModelConfig())
+    rivals = {"ridge": _ridge(training, fresh)}
+    features: tuple[str, ...] = ()
+    if advised:
+        features = model.advised_features()
+        model, costs = _taught(view, training, ModelConfig(features=features))
+        rivals |= predicted(model, training, fresh)
+    return {
+        "env": env_id,
+        "seed": seed,
+        "features": list(features),
+        "mean_ms": 1e3 * float(np.mean(costs)),
+        "max_ms": 1e3 * float(np.max(costs)),
+        **_compared(model, rivals, fresh, view.precision),
+    }
+
+
+def _taught(
+    view: NumbersView, training: Sequence[Transition], config: ModelConfig
+) -> tuple[WorldModel, list[float]]:
+    """A model of some steps, and the process time that each took."""
+    model, costs = WorldModel(view.schema, config), []
     for transition in training:
         began = time.process_time()
         compare_and_learn(model, transition, model.predict_one(transition.before), precision=view.precision)
         costs.append(time.process_time() - began)
     model.finish()
-    return {
-        "env": env_id,
-        "seed": seed,
-        "mean_ms": 1e3 * float(np.mean(costs)),
-        "max_ms": 1e3 * float(np.max(costs)),
-        **_compared(model, training, fresh, view.precision),
-    }
+    return model, costs
 
 
 def _transitions(study: Study, view: NumbersView, seed: int, steps: int) -> list[Transition]:
@@ -122,12 +142,15 @@ def _transitions(study: Study, view: NumbersView, seed: int, steps: int) -> list
 
 
 def _compared(
-    model: WorldModel, training: Sequence[Transition], fresh: Sequence[Transition], precision: float
+    model: WorldModel,
+    rivals: Mapping[str, Mapping[str, NDArray[np.float64]]],
+    fresh: Sequence[Transition],
+    precision: float,
 ) -> dict[str, Any]:
+    """What is claimed of fresh steps and how right it is; `rivals`: the changes that others predict, by property."""
     layout = fresh[0].before.layout
     before = np.array([t.before.vector for t in fresh])
     said = model.predict_batch(layout, before)
-    ridge = _ridge(training, fresh)
     rows: dict[str, dict[str, float]] = {}
     every: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
     for k, (name, prop) in enumerate(said.parts):
@@ -147,8 +170,11 @@ def _compared(
             "claimed_off_own": float(
                 (claimed & (np.abs(error) > np.maximum(rounding, OFF * np.abs(change)))).mean()
             ),
-            "ridge": _ratio(error, _short(ridge[f"{name}.{prop}"] - change, angle), rounding),
             "persistence": _ratio(error, change, rounding),
+            **{
+                rival: _ratio(error, _short(said_there[f"{name}.{prop}"] - change, angle), rounding)
+                for rival, said_there in rivals.items()
+            },
         }
         if hasattr(said, "probabilities"):
             stated = said.probabilities[:, k]
@@ -161,9 +187,10 @@ def _compared(
             )
     columns = {key: np.array([row[key] for row in rows.values()]) for key in next(iter(rows.values()))}
     summary = {key: float(np.mean(columns[key])) for key in ("claimed", "claimed_off", "claimed_off_own")}
+    for rival in rivals:
+        summary[f"{rival}_median"] = float(np.median(columns[rival]))
+        summary[f"{rival}_worst"] = float(columns[rival].max())
     summary |= {
-        "ridge_median": float(np.median(columns["ridge"])),
-        "ridge_worst": float(columns["ridge"].max()),
         "persistence_worst": float(columns["persistence"].max()),
         "ece": _calibration_error(every),
         "coverage": float(np.nanmean(columns["coverage"])) if "coverage" in columns else float("nan"),
@@ -215,10 +242,14 @@ _HEAD = ("claimed", "claimed_off", "ridge_median", "ridge_worst", "persistence_w
 
 
 def _table(results: Sequence[dict[str, Any]]) -> str:
-    lines = [f"{'env':22}{'seed':>5}" + "".join(f"{h:>19}" for h in (*_HEAD, "mean_ms", "max_ms"))]
+    there = [f"{rival}_{which}" for rival in RIVALS for which in ("median", "worst")]
+    head = (*_HEAD, *(name for name in there if all(name in one for one in results)), "mean_ms", "max_ms")
+    lines = [f"{'env':26}{'seed':>5}" + "".join(f"{h:>19}" for h in head)]
     for one in results:
-        numbers = "".join(f"{one[h]:>19.4g}" for h in (*_HEAD, "mean_ms", "max_ms"))
-        lines.append(f"{one['env']:22}{one['seed']:>5}{numbers}")
+        numbers = "".join(f"{one[h]:>19.4g}" for h in head)
+        lines.append(
+            f"{one['env']:26}{one['seed']:>5}{numbers}  {' '.join(one.get('features', ()))}".rstrip()
+        )
     return "\n".join(lines)
 
 
@@ -228,6 +259,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--envs", nargs="+", default=list(NAMED))
     parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2, 3, 4])
     parser.add_argument("--steps", type=int, default=STEPS)
+    parser.add_argument(
+        "--advised", action="store_true", help="with advised features; needs the extra bench-envs"
+    )
     parser.add_argument("--out", type=Path, default=Path("strangers.json"))
     options = parser.parse_args(arguments)
     results: list[dict[str, Any]] = json.loads(options.out.read_text()) if options.out.exists() else []
@@ -237,7 +271,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if (env_id, seed) not in done:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")  # envs and their bindings warn when they are made
-                    results.append(measure(env_id, seed, options.steps))
+                    results.append(measure(env_id, seed, options.steps, advised=options.advised))
                 write_whole(options.out, json.dumps(results, indent=1).encode(), error=DataError)
                 print(_table(results[-1:]), flush=True)
     print(_table(results))

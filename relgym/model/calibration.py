@@ -177,7 +177,7 @@ class _Record:
     def add(self, hit: bool, times: int, *, fitted: bool) -> None:
         """Take in a value that nobody claims, so that no run of hits or misses needs to be noticed at once."""
         if fitted and self.trials:  # weights of (i / n)^2 sum to n / 3
-            kept = max(1.0 - 2.0 * times / (3.0 * self.trials), 1.0 / 3.0)
+            kept = max(1.0 - 2.0 * times / (3.0 * self.trials), 0.0)
             self.trials, self.hits = kept * self.trials, kept * self.hits
         self.trials += times
         self.hits += times * hit
