@@ -36,7 +36,7 @@ from relgym.config import ModelConfig
 from relgym.envs.views import NumbersView
 from relgym.errors import DataError
 from relgym.experiments.any_env_data import Study, stream
-from relgym.experiments.strangers_library import RIVALS, predicted
+from relgym.experiments.strangers_library import BASELINES, predicted
 from relgym.experiments.strangers_made import MADE
 from relgym.files.writing import write_whole
 from relgym.model.compiled import KERNEL
@@ -107,19 +107,19 @@ def measure(env_id: str, seed: int, steps: int = STEPS, *, advised: bool = False
     gc.collect()
     gc.freeze()
     model, costs = _taught(view, training, ModelConfig())
-    rivals = {"ridge": _ridge(training, fresh)}
+    baselines = {"ridge": _ridge(training, fresh)}
     features: tuple[str, ...] = ()
     if advised:
         features = model.advised_features()
         model, costs = _taught(view, training, ModelConfig(features=features))
-        rivals |= predicted(model, training, fresh)
+        baselines |= predicted(model, training, fresh)
     return {
         "env": env_id,
         "seed": seed,
         "features": list(features),
         "mean_ms": 1e3 * float(np.mean(costs)),
         "max_ms": 1e3 * float(np.max(costs)),
-        **_compared(model, rivals, fresh, view.precision),
+        **_compared(model, baselines, fresh, view.precision),
     }
 
 
@@ -143,11 +143,11 @@ def _transitions(study: Study, view: NumbersView, seed: int, steps: int) -> list
 
 def _compared(
     model: WorldModel,
-    rivals: Mapping[str, Mapping[str, NDArray[np.float64]]],
+    baselines: Mapping[str, Mapping[str, NDArray[np.float64]]],
     fresh: Sequence[Transition],
     precision: float,
 ) -> dict[str, Any]:
-    """What is claimed of fresh steps and how right it is; `rivals`: the changes that others predict, by property."""
+    """What is claimed of fresh steps and how right it is; `baselines`: the changes that others predict, by property."""
     layout = fresh[0].before.layout
     before = np.array([t.before.vector for t in fresh])
     said = model.predict_batch(layout, before)
@@ -172,8 +172,8 @@ def _compared(
             ),
             "persistence": _ratio(error, change, rounding),
             **{
-                rival: _ratio(error, _short(said_there[f"{name}.{prop}"] - change, angle), rounding)
-                for rival, said_there in rivals.items()
+                baseline: _ratio(error, _short(said_there[f"{name}.{prop}"] - change, angle), rounding)
+                for baseline, said_there in baselines.items()
             },
         }
         if hasattr(said, "probabilities"):
@@ -187,9 +187,9 @@ def _compared(
             )
     columns = {key: np.array([row[key] for row in rows.values()]) for key in next(iter(rows.values()))}
     summary = {key: float(np.mean(columns[key])) for key in ("claimed", "claimed_off", "claimed_off_own")}
-    for rival in rivals:
-        summary[f"{rival}_median"] = float(np.median(columns[rival]))
-        summary[f"{rival}_worst"] = float(columns[rival].max())
+    for baseline in baselines:
+        summary[f"{baseline}_median"] = float(np.median(columns[baseline]))
+        summary[f"{baseline}_worst"] = float(columns[baseline].max())
     summary |= {
         "persistence_worst": float(columns["persistence"].max()),
         "ece": _calibration_error(every),
@@ -242,7 +242,7 @@ _HEAD = ("claimed", "claimed_off", "ridge_median", "ridge_worst", "persistence_w
 
 
 def _table(results: Sequence[dict[str, Any]]) -> str:
-    there = [f"{rival}_{which}" for rival in RIVALS for which in ("median", "worst")]
+    there = [f"{baseline}_{which}" for baseline in BASELINES for which in ("median", "worst")]
     head = (*_HEAD, *(name for name in there if all(name in one for one in results)), "mean_ms", "max_ms")
     lines = [f"{'env':26}{'seed':>5}" + "".join(f"{h:>19}" for h in head)]
     for one in results:

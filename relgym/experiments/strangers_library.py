@@ -12,7 +12,7 @@ from relgym.clustering.columns import PRIME
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout, Transition
 
-__all__ = ["RIVALS", "predicted", "ridge", "sparse"]
+__all__ = ["BASELINES", "predicted", "ridge", "sparse"]
 
 Fit: TypeAlias = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
@@ -27,9 +27,9 @@ def predicted(
     model: WorldModel,
     training: Sequence[Transition],
     fresh: Sequence[Transition],
-    rivals: Mapping[str, Fit] | None = None,
+    baselines: Mapping[str, Fit] | None = None,
 ) -> dict[str, dict[str, NDArray[np.float64]]]:
-    """Changes of fresh steps that each rival predicts, by its name and by ``object.property``.
+    """Changes of fresh steps that each baseline predicts, by its name and by ``object.property``.
 
     Parameters
     ----------
@@ -38,16 +38,16 @@ def predicted(
         standardised, and those that never vary left out.
     training, fresh
         Steps of one layout, fitted to and predicted.
-    rivals
-        By name: weights from standardised columns and centred changes; default: `RIVALS`.
+    baselines
+        By name: weights from standardised columns and centred changes; default: `BASELINES`.
     """
-    rivals = RIVALS if rivals is None else rivals
-    found: dict[str, dict[str, NDArray[np.float64]]] = {name: {} for name in rivals}
+    baselines = BASELINES if baselines is None else baselines
+    found: dict[str, dict[str, NDArray[np.float64]]] = {name: {} for name in baselines}
     for part, x, z, y in _libraries(model, training, fresh):
         mean, spread = x.mean(axis=0), x.std(axis=0)
         varies = spread > 0.0
         shown, asked = ((each[:, varies] - mean[varies]) / spread[varies] for each in (x, z))
-        for name, fit in rivals.items():
+        for name, fit in baselines.items():
             found[name][part] = np.asarray(asked @ fit(shown, y - y.mean()) + y.mean())
     return found
 
@@ -101,5 +101,5 @@ def _thresholded(x: NDArray[np.float64], y: NDArray[np.float64], share: float) -
     return np.asarray(found.coef_[0], dtype=np.float64)
 
 
-RIVALS: Final[Mapping[str, Fit]] = {"library": ridge, "sindy": sparse}
+BASELINES: Final[Mapping[str, Fit]] = {"library": ridge, "sindy": sparse}
 """By name: ridge regression, and PySINDy."""

@@ -24,7 +24,7 @@ def curve(n: int, seed: int) -> list[Transition]:
     return found
 
 
-def test_rivals_are_given_the_models_own_columns() -> None:
+def test_baselines_are_given_the_models_own_columns() -> None:
     training, fresh = curve(200, 0), curve(50, 1)
     v = np.array([t.before["self"]["v"] for t in fresh])
     change = np.array([t.after["self"]["v"] for t in fresh]) - v

@@ -33,9 +33,15 @@ def scores_by_episodes(runs: Sequence[Any], target: str, part: str = "all") -> d
     """Pooled scores of all batches by number of training episodes; `part` is ``"all"`` or ``"counted"``."""
     numbers = [each["episodes"] for each in runs[0]["scores"]]
     return {
-        episodes: pooled_scores(run["scores"][k]["targets"][target][part] for run in runs)
+        episodes: _pooled([run["scores"][k]["targets"][target][part] for run in runs])
         for k, episodes in enumerate(numbers)
     }
+
+
+def _pooled(scores: Sequence[_Score]) -> _Score:
+    """Pooled scores, as far as all batches tell: after few episodes some have modes, where others' laws have none."""
+    told = set.intersection(*map(set, scores))
+    return pooled_scores([{key: each[key] for key in scores[0] if key in told} for each in scores])
 
 
 def _axis(target: str) -> str:
@@ -139,7 +145,7 @@ def _by_mode(runs: Sequence[Any], target: str) -> dict[str, dict[int, _Score]]:
             for score in each["targets"][target]["modes"]:
                 found.setdefault(score["name"], {}).setdefault(each["episodes"], []).append(score)
     return {
-        name: {episodes: pooled_scores(scores) for episodes, scores in by_episodes.items()}
+        name: {episodes: _pooled(scores) for episodes, scores in by_episodes.items()}
         for name, by_episodes in found.items()
     }
 
