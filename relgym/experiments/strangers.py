@@ -36,7 +36,7 @@ from relgym.config import ModelConfig
 from relgym.envs.views import NumbersView
 from relgym.errors import DataError
 from relgym.experiments.any_env_data import Study, stream
-from relgym.experiments.strangers_library import BASELINES, predicted
+from relgym.experiments.strangers_library import BASELINES, predicted, ridge, short
 from relgym.experiments.strangers_made import MADE
 from relgym.files.writing import write_whole
 from relgym.model.compiled import KERNEL
@@ -157,8 +157,8 @@ def _compared(
         place = layout.column(layout.index(name), prop)
         came = np.array([t.after[name][prop] for t in fresh])
         angle = prop in layout.types[layout.index(name)].angles
-        error = _short(said.vectors[:, place] - came, angle)
-        change = _short(came - before[:, place], angle)
+        error = short(said.vectors[:, place] - came, angle)
+        change = short(came - before[:, place], angle)
         moved = np.abs(change[change != 0.0])
         size = float(np.median(moved)) if len(moved) else 0.0
         claimed = said.outcomes[:, k] == _PREDICTED
@@ -172,7 +172,7 @@ def _compared(
             ),
             "persistence": _ratio(error, change, rounding),
             **{
-                baseline: _ratio(error, _short(said_there[f"{name}.{prop}"] - change, angle), rounding)
+                baseline: _ratio(error, short(said_there[f"{name}.{prop}"] - change, angle), rounding)
                 for baseline, said_there in baselines.items()
             },
         }
@@ -198,10 +198,6 @@ def _compared(
     return {**summary, "properties": rows}
 
 
-def _short(difference: NDArray[np.float64], angle: bool) -> NDArray[np.float64]:
-    return np.arctan2(np.sin(difference), np.cos(difference)) if angle else difference
-
-
 def _ratio(error: NDArray[np.float64], other: NDArray[np.float64], rounding: NDArray[np.float64]) -> float:
     """Ratio of root mean squares; errors within rounding aren't told apart."""
     least = float(np.sqrt(np.square(rounding).mean()))
@@ -217,13 +213,12 @@ def _ridge(training: Sequence[Transition], fresh: Sequence[Transition]) -> dict[
     x, z = (x - mean) / std, (z - mean) / std
     layout = training[0].before.layout
     found = {}
-    gram = x.T @ x + np.eye(x.shape[1])
     for index, (name, kind) in enumerate(zip(layout.names, layout.types, strict=True)):
         for prop in kind.properties if name in training[0].after else ():
             place = layout.column(index, prop)
             y = np.array([t.after[name][prop] - t.before.vector[place] for t in training])
-            y = _short(y, prop in kind.angles)
-            found[f"{name}.{prop}"] = z @ np.linalg.solve(gram, x.T @ (y - y.mean())) + y.mean()
+            y = short(y, prop in kind.angles)
+            found[f"{name}.{prop}"] = z @ ridge(x, y - y.mean()) + y.mean()
     return found
 
 

@@ -12,7 +12,7 @@ from relgym.clustering.columns import PRIME
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout, Transition
 
-__all__ = ["BASELINES", "predicted", "ridge", "sparse"]
+__all__ = ["BASELINES", "predicted", "ridge", "short", "sparse"]
 
 Fit: TypeAlias = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
@@ -62,9 +62,7 @@ def _libraries(
         for index in layout.of_type(target.type):
             name, column = layout.names[index], layout.column(index, target.property)
             came = np.array([t.after[name][target.property] for t in training])
-            y: NDArray[np.float64] = came - before[:, column]
-            if target.property in layout.types[index].angles:
-                y = np.asarray(np.arctan2(np.sin(y), np.cos(y)))
+            y = short(came - before[:, column], target.property in layout.types[index].angles)
             x, z = (_columns(model, layout, vectors, index) for vectors in (before, later))
             yield f"{name}.{target.property}", x, z, y
 
@@ -77,6 +75,11 @@ def _columns(
     count = len(signature.columns) + len(signature.features)
     present = [k for k in range(count) if PRIME not in signature.named(k)]
     return signature.matrix(percept.rows(index, vectors.copy(), ordered=False), present)
+
+
+def short(difference: NDArray[np.float64], angle: bool) -> NDArray[np.float64]:
+    """Differences, of an angle the short way round."""
+    return np.asarray(np.arctan2(np.sin(difference), np.cos(difference))) if angle else difference
 
 
 def ridge(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,7 +15,8 @@ of its winner where there are few trials. Of a cell
 
 Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a
 law that changed is doubted at once, and a mode whose conditions were found is believed at once. Who makes none is known
-by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
+by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more. Where
+it had none yet, all cells together tell whether it speaks.
 
 A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
 Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
