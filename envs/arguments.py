@@ -15,6 +15,7 @@ from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from relgym.arguments import finite
 from relgym.config.checks import checked_count
 from relgym.errors import ActionError, ConfigError
 from relgym.scene.objects import Float1D
@@ -151,7 +152,7 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
     For a Box a float64 array of its shape, otherwise `action` itself.
     """
     if not isinstance(space, spaces.Box):
-        if not space.contains(action):
+        if not _chosen(space, action) and not space.contains(action):
             raise ActionError(f"action {action!r} lies outside {space}")
         return action
     try:
@@ -165,6 +166,13 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
             "clip or rescale it"
         )
     return np.clip(array, space.low, space.high)
+
+
+def _chosen(space: spaces.Space[Any], action: Any) -> bool:
+    """Whether an action is a whole number that a space of choices has; faster than to ask the space."""
+    if type(space) is not spaces.Discrete or not isinstance(action, (int, np.int64)):
+        return False
+    return bool(0 <= action - space.start < space.n)
 
 
 def refuse_vector_env(env: Any) -> None:
@@ -249,7 +257,7 @@ def action_numbers(action: Any, count: int | None = None) -> Float1D:
         array = np.asarray(action, dtype=np.float64).ravel()
     except (TypeError, ValueError, OverflowError):
         raise ActionError(f"expected the numbers of an action, got {reprlib.repr(action)}") from None
-    if (count is not None and len(array) != count) or not np.isfinite(array).all():
+    if (count is not None and len(array) != count) or not finite(array):
         said = "" if count is None else f"{count} "
         raise ActionError(f"expected an action of {said}finite numbers, got {reprlib.repr(action)}")
     return array

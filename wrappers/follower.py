@@ -21,7 +21,7 @@ BadObservations: TypeAlias = Literal["raise", "skip"]
 """What to do with an observation that shows no scene: raise `ObservationError`, or skip and count it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: made in every step
 class Look:
     """What an observation shows, before anything follows from it.
 

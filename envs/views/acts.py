@@ -13,7 +13,7 @@ from relgym.envs.actions import without_action
 from relgym.envs.arguments import action_numbers
 from relgym.envs.views.records import identifiers
 from relgym.errors import ActionError, ConfigError
-from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene
+from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene, SceneLayout
 
 __all__ = ["MOST_CHOICES", "Acts"]
 
@@ -54,6 +54,7 @@ class Acts:
     def __init__(self, space: spaces.Space[Any], names: Sequence[str] | None = None) -> None:
         self.space = space
         self.names = None if names is None else tuple(names)
+        self._latest: tuple[SceneLayout, SceneLayout, int] | None = None  # without an action, and with one
         self._starts, self._counts = _choices(space)
         discrete = isinstance(space, spaces.Discrete)
         given = self.names if self.names is not None and not discrete else _numbered(len(self._starts))
@@ -120,8 +121,11 @@ class Acts:
         """The scene with this action in it, in place of another one if there is one."""
         bare = without_action(scene)
         schema = scene.schema
-        layout = schema.layout((*bare.layout.names, ACTION))
-        at = layout.offsets[layout.index(ACTION)]  # objects stand in schema order
+        known = self._latest
+        if known is None or known[0] is not bare.layout:
+            found = schema.layout((*bare.layout.names, ACTION))
+            known = self._latest = bare.layout, found, found.offsets[found.index(ACTION)]
+        _, layout, at = known  # objects stand in schema order
         parts = (bare.vector[:at], self.values(action), bare.vector[at:])
         return Scene(schema, layout, np.concatenate(parts))
 

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from relgym.arguments import array_of, refusing, refusing_calls
+from relgym.arguments import array_of, finite, refusing, refusing_calls
 from relgym.envs.spaces_json import space_from_json, space_to_json
 from relgym.envs.views.acts import Acts
 from relgym.envs.views.angles import candidates, circular, decoded, disjoint, on_circle
@@ -178,7 +178,7 @@ class NumbersView:
     ) -> Scene:
         """The scene that an observation shows; see `View.scene`."""
         numbers, how = self._numbers.read(observation), self._how
-        if not np.isfinite(numbers).all():
+        if not finite(numbers):
             self._complain(numbers)
         if how.pairs or len(how.constants):
             angles = [self._decoded(pair, numbers) for pair in how.pairs]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.arguments import finite
 from relgym.config.constants import LEFT_OPEN
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits
@@ -105,7 +106,7 @@ class FreeLearner:
 
     def confirm(self, x: NDArray[np.float64], after: NDArray[np.float64]) -> None:
         """`learn_one` of an example that the law explains, where `confirms` says that this is all."""
-        if np.isfinite(x).all() and (place := self.store.draw(0)) is not None:
+        if finite(x) and (place := self.store.draw(0)) is not None:
             self.store.put(place, np.concatenate([x, after]), cell=0)
 
     def _patience(self) -> int:

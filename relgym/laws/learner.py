@@ -8,7 +8,7 @@ was derived from it is derived again from the raw contacts.
 
 from __future__ import annotations
 
-from collections import Counter
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -223,7 +223,11 @@ class LawLearner:
             for body in cast.pairs[pair]:
                 degree[body] += 1
         free = [body for body in cast.movers if not degree[body]]
-        for name, more in Counter([cast.sources[body][0].type.name for body in free]).items():
+        kinds: dict[str, int] = {}
+        for body in free:
+            name = cast.sources[body][0].type.name
+            kinds[name] = kinds.get(name, 0) + 1
+        for name, more in kinds.items():
             learner = self._free[name]
             due = [learner.seen + k + 1 in ESTIMATE_AT for k in range(more)]
             if not learner.confirms(more) or any(due):
@@ -419,7 +423,7 @@ class LawLearner:
             self.book.tolerance = STDS * self._noise
             return
         largest = max(map(abs, vector[self.book.rounded(cast)].tolist()), default=0.0)
-        floor = STDS * ROUNDINGS * float(np.finfo(np.float64).eps) * largest
+        floor = STDS * ROUNDINGS * sys.float_info.epsilon * largest
         self.book.tolerance = max(self.book.tolerance, floor)
 
     def _estimate(self, learner: FreeLearner, drift: Drift) -> bool:

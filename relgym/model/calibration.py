@@ -411,7 +411,7 @@ class Calibration:
         )
         self._everyone = tuple(range(self.experts))
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
-        self._verdicts: dict[tuple[Key, tuple[int, ...]], tuple[Assessment, bool]] = {}
+        self._verdicts: dict[tuple[Key, tuple[bool, ...]], tuple[Assessment, bool]] = {}
         self._united: _Cell | None = None  # see `_whole`
 
     def __getstate__(self) -> dict[str, Any]:
@@ -448,10 +448,10 @@ class Calibration:
 
     def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
         """What `assess` and `claims` say of a prediction; worked out once between changes."""
-        able = _able(values)
-        if (known := self._verdicts.get((key, able))) is None:
-            told = self._known(key, able)
-            known = self._verdicts[key, able] = told, self.claims(key, told)
+        held = tuple(map(math.isfinite, values))
+        if (known := self._verdicts.get((key, held))) is None:
+            told = self._known(key, _places(held))
+            known = self._verdicts[key, held] = told, self.claims(key, told)
         return known
 
     def own_word(self, key: Key) -> Assessment | None:

@@ -34,7 +34,7 @@ NOTHING: Final[Mapping[tuple[str, str], Confirmed]] = MappingProxyType({})
 """Of a transition of which nobody looked back at what was predicted."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: made in every step
 class LearnReport:
     """What one transition taught.
 
@@ -121,8 +121,10 @@ def learn(
             parts.looks += due(parts, type_name)
         forget(table, [model for _, model in parts.by_type[type_name]], parts.config.history)
     _inquire(parts, budget)
-    heard = parts.laws is not None and parts.laws.learn_one(
-        percept, following, _there(parts, transition, only), parts.models, told
+    heard = (
+        parts.laws is not None
+        and bool(parts.laws.learner.sources)
+        and parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models, told)
     )
     work = 0
     if not idle or reports or heard:

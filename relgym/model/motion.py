@@ -76,6 +76,8 @@ class Laws:
 
     def governs(self, target: Target) -> bool:
         """Whether the laws predict a target."""
+        if not self.governed:
+            return False
         pair = self.learner.book.pair
         if self._governs[0] is not self.governed or self._governs[1] is not pair:
             own = {(t, p) for t in self.governed for p in self.learner.book.components(t)}
@@ -152,17 +154,18 @@ class Laws:
         said: dict[int, int] = {}
         off: dict[int, float] = {}
         touched: dict[int, list[int]] = {}
+        places, came = layout.places, following.tolist()
         for one in told.parts:
             body = bodies.get(one.object, -1)
             if one.property not in wanted.get(body, ()):
                 continue
             if not one.ok or len(one.roles) < one.mode or one.mode not in (FREE, TOUCHING):
                 return False  # a batch tells no roles
-            error = abs(one.value - float(following[layout.places[one.object, one.property]]))
+            error = abs(one.value - came[places[one.object, one.property]])
             said[body] = said.get(body, 0) + 1
             off[body] = max(off.get(body, 0.0), error)
             touched[body] = [bodies[name] for name in one.roles[1:]]
-        if any(not components or said.get(body, 0) != len(components) for body, components in wanted.items()):
+        if any([not components or said.get(body, 0) != len(components) for body, components in wanted.items()]):
             return False
         perception = percept.perception
         return self.learner.confirm(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
+from relgym.arguments import finite
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
 from relgym.model.chaining import Inquiry, Look, in_order
@@ -139,7 +140,7 @@ class Parts:
         schema = scene.schema
         if schema is not self.schema and self._kin.get(id(schema)) is not schema:
             return False  # `check` looks at it once
-        return bool(np.isfinite(scene.vector).all())
+        return finite(scene.vector)
 
     def knows(self, layout: SceneLayout) -> bool:
         """Whether it can predict scenes of a layout; `checked_batch` says why not."""
@@ -170,7 +171,7 @@ class Parts:
                     "differ, their types may not"
                 )
             self._kin[id(schema)] = schema  # kept alive, so that its id stays its own
-        if not np.isfinite(scene.vector).all():
+        if not finite(scene.vector):
             schema.scene(scene.values())  # raises, naming object and property
         if scene.layout.bodies:
             check_sizes(scene)

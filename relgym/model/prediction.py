@@ -80,9 +80,9 @@ def _audited(audit: Audit | None, key: Key, speaker: int) -> LateAudit:
     return LateAudit(lambda: audit, key, speaker)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: one is made for every target in every step, and that takes a sixth as long
 class Prediction:
-    """The next value of one property of one object.
+    """The next value of one property of one object; not to be changed.
 
     Attributes
     ----------
@@ -145,9 +145,9 @@ class Prediction:
         return self.ok or self.mode != 0 or not math.isnan(self.spread)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # as predictions are
 class ScenePrediction:
-    """The next scene, and the predictions it was made of.
+    """The next scene, and the predictions it was made of; not to be changed.
 
     Attributes
     ----------

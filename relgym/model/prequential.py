@@ -24,7 +24,7 @@ Key: TypeAlias = tuple[str, str]
 """An object and one of its properties."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: made in every step
 class StepReport:
     """What one step told the learner; ``info["relgym"]``.
 
@@ -68,7 +68,7 @@ class StepReport:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: made in every step
 class Outcomes:
     """How the predictions of one step came out, part by part.
 
@@ -95,7 +95,7 @@ class Outcomes:
     @classmethod
     def of(cls, prediction: ScenePrediction, before: Scene, residuals: Mapping[Key, float]) -> Outcomes:
         """What became of a prediction; `residuals` are those of `compared`."""
-        places, angles, vector = before.layout.places, before.layout.angles, before.vector
+        places, angles, now = before.layout.places, before.layout.angles, before.vector.tolist()
         parts, offs, changes, claimed, spreads = list[Key](), [], [], [], []
         for part in prediction.parts:
             key = part.object, part.property
@@ -104,7 +104,7 @@ class Outcomes:
                 continue
             column = places[key]
             # Observed minus predicted plus predicted minus before; a turn is measured the short way, as its residual.
-            moved = part.value - float(vector[column])
+            moved = part.value - now[column]
             if column in angles:
                 moved = math.remainder(moved, 2.0 * math.pi)
             parts.append(key)
@@ -237,7 +237,7 @@ def compared(
     """
     residuals: dict[Key, float] = {}
     wrong: list[Key] = []
-    places, angles = after.layout.places, after.layout.angles
+    places, angles, numbers = after.layout.places, after.layout.angles, after.vector.tolist()
     for part in () if prediction is None else prediction.parts:
         key = (part.object, part.property)
         column = places.get(key)
@@ -245,7 +245,7 @@ def compared(
             if part.object not in after:
                 continue
             column = after.layout.column(after.layout.index(part.object), part.property)
-        came = float(after.vector[column])
+        came = numbers[column]
         off = residuals[key] = came - part.value
         if column in angles:  # π and -π are the same place
             off = residuals[key] = math.remainder(off, 2.0 * math.pi)

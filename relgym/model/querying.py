@@ -35,7 +35,7 @@ from relgym.model.prediction import (
 )
 from relgym.model.regression import KINDS
 from relgym.model.scenes import wrap
-from relgym.model.target.property_model import Verdict
+from relgym.model.target.property_model import PropertyModel, Verdict
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
@@ -85,7 +85,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
                 one = replace(one, outcome=outcome, mode=0, spread=np.nan)
-            one = settled(parts, target, percept, index, following, one, lawful=lawful)
+            one = settled(parts, parts.models[target], percept, index, following, one, lawful=lawful)
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
@@ -97,7 +97,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
 
 def settled(
     parts: Parts,
-    target: Target,
+    model: PropertyModel,
     percept: Percept,
     index: int,
     following: NDArray[np.float64],
@@ -110,8 +110,8 @@ def settled(
 
     Parameters
     ----------
-    parts, target, percept, index
-        The model, and of which object of which scene what is predicted.
+    parts, model, percept, index
+        All that is learned, who predicts, and for which object of which scene.
     following
         Next values as far as they are predicted, the present one of this property, shape ``(width,)``.
     one
@@ -121,10 +121,9 @@ def settled(
     lawful
         Whether laws say it (`Parts.governs`).
     """
-    model = parts.models[target]
-    winner = -one.mode if lawful else one.mode
+    target, mode, margin = model.target, one.mode, one.margin
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
-    key = key_of(_PREDICTED if one.mode else OUTCOMES.index(one.outcome), winner, one.margin)
+    key = key_of(_PREDICTED if mode else OUTCOMES.index(one.outcome), -mode if lawful else mode, margin)
     word = model.own_word(key) if values is None and math.isfinite(one.value) else None
     record: Audit | LateAudit
     if word is not None:  # what others would have said is asked if somebody looks back
@@ -137,18 +136,20 @@ def settled(
             values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
         told, claimed = model.verdict(key, values)
         value, record = values[told.speaker], Audit(key, values, told.speaker)
-    mode, roles, spread = one.mode, one.roles, one.spread
-    if told.speaker == LATEST and mode:
+    speaker, _, _, spread = told
+    roles = one.roles
+    outcome = _outcome(one, speaker, claimed=claimed, known=bool(model.calibration.trials))
+    if speaker == OWN:
+        spread = one.spread
+    elif speaker == LATEST and mode:
         mode, roles = model.latest, roles[:1]
-    margin = one.margin
-    if told.speaker >= len(EXPERTS):  # its word has nothing to do with modes
+    elif speaker == PERSISTENCE:
+        spread = math.nan
+    elif speaker >= len(EXPERTS):  # its word has nothing to do with modes
         mode, roles, margin = 0, (), 0.0
-    if told.speaker == GUESS:
+    elif speaker == GUESS:
         best = model.fallback.guess_at(percept, index, following)
-        spread = spread if best is None else best.mode.sigma
-    elif told.speaker != OWN:
-        spread = math.nan if told.speaker == PERSISTENCE else told.spread
-    outcome = _outcome(one, told.speaker, claimed=claimed, known=bool(model.calibration.trials))
+        spread = one.spread if best is None else best.mode.sigma
     return Prediction(
         percept.layout.names[index],
         target.property,
@@ -216,10 +217,11 @@ def _experts_one(
 
 def _outcome(one: Prediction | Said, speaker: int, *, claimed: bool, known: bool) -> Outcome:
     """What is known of a mode's predictions, or of a hypothesis', has the last word on whether one is claimed."""
-    if one.ok or (speaker >= len(EXPERTS) and claimed):
+    said = one.outcome
+    if said is Outcome.PREDICTED or (speaker >= len(EXPERTS) and claimed):
         return Outcome.PREDICTED if claimed else Outcome.UNSURE
-    trusted = one.mode and one.outcome is Outcome.UNEXPLAINED and claimed and known
-    return Outcome.PREDICTED if trusted else one.outcome
+    trusted = one.mode and said is Outcome.UNEXPLAINED and claimed and known
+    return Outcome.PREDICTED if trusted else said
 
 
 def _experts(

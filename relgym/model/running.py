@@ -167,6 +167,16 @@ class _Known:
     changes: int
 
 
+@dataclass(slots=True)
+class _Reaching:
+    """Targets of a regression that are asked, where on the tape it stands how far these reach, and of when that is."""
+
+    regression: Regression
+    targets: list[int]
+    where: NDArray[np.intp]
+    seen: int = -1
+
+
 class _Told(NamedTuple):
     """What the kernel says of one scene, answer by answer."""
 
@@ -177,9 +187,9 @@ class _Told(NamedTuple):
     noted: list[int]
     players: _Bits
     sure: list[list[float]]
-    """Probability and interval of each answer; stale unless it is settled."""
+    """Probability and interval of each answer; empty unless it is settled."""
     believed: list[list[int]]
-    """Number and place of each answer's belief; stale unless it is settled."""
+    """Number and place of each answer's belief; empty unless it is settled."""
     experts: list[list[float]]
     """What everybody but persistence says of each answer (`relgym.model.calibration.EXPERTS`)."""
 
@@ -252,11 +262,13 @@ class Runner:
             if modes:
                 model = teller.model
                 code[place] = modes.get(model.latest, 0) if model.asks_latest else 0
-        for regression, targets, where in self._regressions:
-            self._space["numbers"][0, where] = regression.reach[targets]
+        for known in self._regressions:
+            if known.seen != known.regression.seen:
+                known.seen = known.regression.seen
+                self._space["numbers"][0, known.where] = known.regression.reach[known.targets]
 
-    def _reaches_at(self, places: Sequence[int]) -> list[tuple[Regression, list[int], NDArray[np.intp]]]:
-        """Regressions, targets of theirs that are asked, and where on the tape it stands how far these reach."""
+    def _reaches_at(self, places: Sequence[int]) -> list[_Reaching]:
+        """Regressions that are asked."""
         found: dict[str, tuple[list[int], list[int]]] = {}
         for teller, place in zip(self._tellers, places, strict=True):
             if place >= 0:
@@ -266,7 +278,7 @@ class Runner:
                 starts.append(place)
         known = [(self._parts.regressions[name], *each) for name, each in found.items()]
         return [
-            (r, targets, np.array(starts)[:, None] + np.arange(r.reach.shape[1]))
+            _Reaching(r, targets, np.array(starts)[:, None] + np.arange(r.reach.shape[1]))
             for r, targets, starts in known
         ]
 
@@ -327,9 +339,9 @@ class Runner:
             return None
         following, own = now.copy(), True
         found: list[Prediction] = []
+        after, outcomes, modes, margins, noted, players, _, _, experts = told
         for k, teller in enumerate(self._tellers):
             a = teller.answer
-            after, outcomes, modes, margins, noted, players, _, _, experts = told
             said = experts[k]
             raw = teller.tell(numbers, said[OWN], outcomes[k], modes[k], margins[k], noted[k], players[k])
             if raw is None:
@@ -337,7 +349,7 @@ class Runner:
             others = None if teller.model.candidates else teller.values(said, numbers)
             one = settled(
                 self._parts,
-                teller.target,
+                teller.model,
                 percept,
                 teller.index,
                 following,
@@ -355,8 +367,9 @@ class Runner:
                 told = self._told(now, settling=False, given=given)
                 if told is None:
                     return None
+                after, outcomes, modes, margins, noted, players, _, _, experts = told
         if own:
-            following = told.following
+            following = after
         else:
             derive(scene.schema, self._layout, now[None], following[None])
             wrap(self._layout, following)
@@ -444,8 +457,8 @@ class Runner:
                 margins.tolist(),
                 noted.tolist(),
                 players.copy(),
-                sure.tolist(),
-                believed.tolist(),
+                sure.tolist() if settling else [],
+                believed.tolist() if settling else [],
                 experts.tolist(),
             )
 

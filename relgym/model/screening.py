@@ -11,7 +11,7 @@ occurrences.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -127,9 +127,14 @@ class Screen:
         self.set_aside += 1
         return False
 
-    def plausible(self, layout: SceneLayout, vector: NDArray[np.float64]) -> bool:
-        """Whether a scene's numbers are as large as is known; takes note of nothing."""
-        return bool(np.count_nonzero(np.abs(vector) <= self._marked(layout).limits) == len(vector))
+    def plausible(
+        self, layout: SceneLayout, vector: NDArray[np.float64], others: Sequence[tuple[int, float]] = ()
+    ) -> bool:
+        """Whether a scene's numbers, and others in some of its columns, are as large as is known; notes nothing."""
+        limits = self._marked(layout).limits
+        if np.count_nonzero(np.abs(vector) <= limits) < len(vector):
+            return False
+        return all([abs(number) <= limits[column] for column, number in others])
 
     def _marked(self, layout: SceneLayout) -> _Marks:
         """What the numbers of a layout are held against; cached until one of it moves."""

@@ -6,7 +6,7 @@ import copy
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from functools import partial
 from typing import Any, Self
@@ -145,21 +145,24 @@ class WorldModel:
             self._roll_back()
         return self._state
 
-    @contextmanager
-    def _step(self, name: str, *arguments: Any, numbers: int = 0) -> Iterator[None]:
-        """Make a step that is either made as a whole or not at all, whatever error comes in between."""
+    def _made(self, name: str, *arguments: Any, numbers: int = 0) -> Any:
+        """What a method returns, whose step is made either as a whole or not at all, whatever error comes in between.
+
+        Arguments are kept until the next checkpoint: the method is called with them again where a later step fails.
+        """
         if self._damaged:
             self._roll_back()
         mark = self._journal.prepare(self._learned)
         self._programs.changed()
         try:
-            yield
+            found = getattr(self, name)(*arguments)
             self._journal.add(name, arguments, numbers)
         except BaseException:
             self._damaged = True
             self._journal.drop(mark)
             self._roll_back()
             raise
+        return found
 
     def _learned(self) -> WorldModel:
         """A model with all that steps change, and nothing of what its owner has attached to this one."""
@@ -253,8 +256,8 @@ class WorldModel:
         Cost: relations once, then per target O(modes); searches and re-learning when an example is news.
         """
         self._check_step(transition)
-        with self._step("_learn", transition, numbers=2 * len(transition.before.vector)):
-            return self._learn(transition)
+        report: LearnReport = self._made("_learn", transition, numbers=2 * len(transition.before.vector))
+        return report
 
     @refusing(ObservationError)
     def take_up(
@@ -272,8 +275,10 @@ class WorldModel:
         self._check_step(transition)
         numbers = 3 * len(transition.before.vector)
         precision = self._told(prediction, residuals, precision)
-        with self._step("_take_up", transition, prediction, dict(residuals), precision, numbers=numbers):
-            return self._take_up(transition, prediction, residuals, precision)
+        report: LearnReport = self._made(
+            "_take_up", transition, prediction, dict(residuals), precision, numbers=numbers
+        )
+        return report
 
     def _take_up(
         self,
@@ -485,20 +490,19 @@ class WorldModel:
             Relative precision of what was observed (`View.precision`); of numbers below 1 it is absolute.
         """
         precision = self._told(prediction, residuals, precision)
-        with self._step("_look_back", prediction, dict(residuals), precision):
-            self._look_back(prediction, residuals, precision)
+        self._made("_look_back", prediction, dict(residuals), precision)
 
     def _look_back(
         self, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
     ) -> Retrospect:
         layout, expected = prediction.scene.layout, prediction.scene.vector
-        observed = expected.copy()
-        for part in prediction.parts:
-            key = part.object, part.property
-            if key in residuals:
-                observed[layout.places[key]] = part.value + residuals[key]
-        largest = np.maximum(np.abs(expected), np.abs(observed))
-        if not self._parts.screen.plausible(layout, largest):
+        told = [(part.object, part.property, part.value) for part in prediction.parts]
+        came = [
+            (layout.places[name, prop], value + residuals[name, prop])
+            for name, prop, value in told
+            if (name, prop) in residuals
+        ]
+        if not self._parts.screen.plausible(layout, expected, came):
             return Retrospect({}, counted=False)
         return look_back(self._parts, prediction, residuals, precision)
 
@@ -540,8 +544,8 @@ class WorldModel:
         self._rules = self._advice = None
         if self.frozen:
             return 0
-        with self._step("_finish"):
-            return self._finish()
+        work: int = self._made("_finish")
+        return work
 
     def _finish(self) -> int:
         return finish(self._parts)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from relgym.arguments import refusing, refusing_fields, unfit
+from relgym.arguments import finite, refusing, refusing_fields, unfit
 from relgym.errors import ObservationError, QueryError, SchemaError
 from relgym.scene.objects import Scene, SceneLayout
 from relgym.scene.types import Float1D, Kinematics, ObjectType, Target
@@ -186,7 +186,7 @@ class SceneSchema:
                 _checked(name, t, p) for name, t, p in zip(layout.names, layout.types, parts, strict=True)
             ]
         vector = np.concatenate(parts) if parts else np.empty(0)
-        if not np.isfinite(vector).all():
+        if not finite(vector):
             for name, t, part in zip(layout.names, layout.types, parts, strict=True):
                 _checked(name, t, part)
         return Scene(self, layout, vector)
@@ -201,10 +201,10 @@ class SceneSchema:
 
 def _plain(parts: Sequence[Any], types: Sequence[ObjectType]) -> bool:
     """Whether all are arrays of float64, as long as the types say; `_checked` says what else they are."""
-    return all(
-        type(part) is np.ndarray and part.dtype == np.float64 and part.shape == (len(t.properties),)
-        for part, t in zip(parts, types, strict=True)
-    )
+    for part, t in zip(parts, types, strict=True):
+        if type(part) is not np.ndarray or part.dtype != np.float64 or part.shape != (len(t.properties),):
+            return False
+    return True
 
 
 def _checked(name: str, t: ObjectType, values: Sequence[float] | Float1D) -> Float1D:

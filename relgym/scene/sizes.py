@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,20 @@ from relgym.scene.shapes import Sphere
 
 __all__ = ["check_sizes"]
 
-_Plan: TypeAlias = tuple[
-    Axes, Bodies, NDArray[np.intp], NDArray[np.float64], NDArray[np.intp], NDArray[np.intp]
-]
+
+@dataclass(slots=True)
+class _Plan:
+    """What must be known of a layout: axes, its bodies, the columns of their poses, which are spheres, and extents."""
+
+    up: str
+    planar: bool
+    axes: Axes
+    bodies: Bodies
+    columns: NDArray[np.intp]
+    constants: NDArray[np.float64]
+    spheres: NDArray[np.intp]
+    scaled: NDArray[np.intp]
+    fine: bytes | None = None  # the latest extents that can be: they rarely change
 
 
 def check_sizes(scene: Scene) -> None:
@@ -24,29 +35,31 @@ def check_sizes(scene: Scene) -> None:
 
     Cost O(bodies), some microseconds.
     """
-    axes, bodies, columns, constants, spheres, scaled = _plan(scene)
-    fine = f"_sizes-fine-{scene.schema.up}-{scene.schema.planar}"
-    if len(bodies.names):
-        sizes = scene.vector[scaled]
-        if sizes.tobytes() != scene.layout.__dict__.get(fine):
-            padded = np.concatenate([scene.vector, constants])
-            check_extents(bodies, axes, padded[columns][:, :, None], spheres)
-            scene.layout.__dict__[fine] = sizes.tobytes()  # sizes rarely change
+    plan = _plan(scene)
+    if not plan.bodies.names:
+        return
+    sizes = scene.vector[plan.scaled].tobytes()
+    if sizes != plan.fine:
+        padded = np.concatenate([scene.vector, plan.constants])
+        check_extents(plan.bodies, plan.axes, padded[plan.columns][:, :, None], plan.spheres)
+        plan.fine = sizes
 
 
 def _plan(scene: Scene) -> _Plan:
     """What must be known of a layout; cached on it."""
-    layout, key = scene.layout, f"_sizes-{scene.schema.up}-{scene.schema.planar}"
-    known: _Plan | None = layout.__dict__.get(key)
-    if known is None:
+    layout, schema = scene.layout, scene.schema
+    known: _Plan | None = layout.__dict__.get("_sizes")
+    if known is None or known.up != schema.up or known.planar != schema.planar:
         columns, constants = pose_columns(layout)
         shapes = tuple(shape for i in layout.bodies if (shape := layout.types[i].shape) is not None)
         spheres = np.flatnonzero([isinstance(shape, Sphere) for shape in shapes])
         bodies = Bodies(tuple(layout.names[i] for i in layout.bodies), shapes)
         extents = columns[:, 6:9]
         scaled = np.unique(extents[extents < layout.width])
-        known = layout.__dict__[key] = (
-            Axes.of(scene.schema),
+        known = layout.__dict__["_sizes"] = _Plan(
+            schema.up,
+            schema.planar,
+            Axes.of(schema),
             bodies,
             columns.T.copy(),
             constants,

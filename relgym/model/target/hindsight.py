@@ -19,7 +19,7 @@ import numpy as np
 
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import STDS
-from relgym.mixing import GOLDEN, mixed_one
+from relgym.mixing import GOLDEN, MOST, mixed_one
 from relgym.model.calibration import OWN, Calibration, Key
 from relgym.model.prediction import Prediction, ScenePrediction
 
@@ -178,8 +178,8 @@ def look_back(
     """
     answers, look = parts.answers(prediction.scene.layout), _Look(parts, precision)
     for part in prediction.parts:
-        residual = residuals.get((part.object, part.property))
-        answer = answers.get((part.object, part.property))
+        key = part.object, part.property
+        residual, answer = residuals.get(key), answers.get(key)
         if residual is not None and answer is not None and not look.repeats(part, residual, answer):
             look.compare(part, residual, answer)
     counted = look.counted
@@ -203,7 +203,7 @@ class _Look:
         self._off: set[tuple[str, str]] = set()
         # A number from 0 to 1 for this step; a model that is loaded again draws the same.
         trials = sum([model.calibration.trials for model in parts.models.values()])
-        self._draw = mixed_one(trials * GOLDEN) / int(np.iinfo(np.uint64).max)
+        self._draw = mixed_one(trials * GOLDEN) / MOST
         # How many predictions that came true, or that came out as such ones do, the present one counts for.
         self._times = self._stands = 0
         self.counts: dict[Target, list[int]] = {}

@@ -428,8 +428,8 @@ class PropertyModel:
 
     def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
         """Who gives the value of a prediction, how right it will be, and whether it is claimed."""
-        told, claimed = self.record.verdict(key, values)
-        return told, claimed and not (self.surmise and self.config.abstain)
+        known = self.record.verdict(key, values)
+        return (known[0], False) if self.surmise and self.config.abstain else known
 
     def own_word(self, key: Key) -> Assessment | None:
         """How right a prediction will be whose winner has the word whatever others say; None where that depends."""
