@@ -134,5 +134,8 @@ class Task(RewardFunctions):
 
 def column_of(layout: SceneLayout, name: str, prop: str, vectors: Float2D) -> Float1D:
     """A property of one object in n scenes, shape ``(n,)``."""
-    column: Float1D = vectors[:, layout.column(layout.index(name), prop)]
+    place = layout.places.get((name, prop))
+    if place is None:
+        place = layout.column(layout.index(name), prop)  # which says what is wrong
+    column: Float1D = vectors[:, place]
     return column

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -105,8 +106,7 @@ class TaskView:
 
     def with_action(self, scene: Scene, action: Any) -> Scene:
         """The scene with what the agent does in it, and what that brings: 0, as long as it isn't known."""
-        acting = self._own(self.view.with_action(self._bare(scene), action))
-        return self._with(acting, [0.0] * len(self._names))
+        return self._with(self.view.with_action(self._bare(scene), action), [0.0] * len(self._names))
 
     def with_outcome(self, scene: Scene, reward: Any, terminated: bool) -> Scene:
         """The scene together with what the step to it brought.
@@ -163,6 +163,8 @@ def _told(targets: Sequence[Target], names: Sequence[str]) -> tuple[Target, ...]
 
 
 def _number(reward: Any) -> float:
+    if type(reward) is float and math.isfinite(reward):
+        return reward
     try:
         numbers = np.asarray(reward, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
