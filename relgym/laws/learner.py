@@ -223,15 +223,8 @@ class LawLearner:
             for body in cast.pairs[pair]:
                 degree[body] += 1
         free = [body for body in cast.movers if not degree[body]]
-        kinds: dict[str, int] = {}
-        for body in free:
-            name = cast.sources[body][0].type.name
-            kinds[name] = kinds.get(name, 0) + 1
-        for name, more in kinds.items():
-            learner = self._free[name]
-            due = [learner.seen + k + 1 in ESTIMATE_AT for k in range(more)]
-            if not learner.confirms(more) or any(due):
-                return False
+        if not self._confirms(cast, free):
+            return False
         single = self._single(cast, touching, degree)
         if single and (
             _doubled(self._store.seen + len(single), len(single))
@@ -250,6 +243,19 @@ class LawLearner:
         for pair in single:
             assert isinstance(self._store, EncounterStore), "of bodies that turn none is single here"
             self._store.confirm(contacts, cast, pair, vector, after)
+        return True
+
+    def _confirms(self, cast: Cast, free: Sequence[int]) -> bool:
+        """Whether these free bodies, which came as the laws said, change nothing but the choice of examples kept."""
+        counts: dict[str, int] = {}
+        for body in free:
+            name = cast.sources[body][0].type.name
+            counts[name] = counts.get(name, 0) + 1
+        for name, more in counts.items():
+            learner = self._free[name]
+            due = [learner.seen + k + 1 in ESTIMATE_AT for k in range(more)]
+            if not learner.confirms(more) or any(due):
+                return False
         return True
 
     def _assess(self, cast: Cast, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:

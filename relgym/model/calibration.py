@@ -794,6 +794,16 @@ class Calibration:
             return _family(Key(outcome, 1, 0)) in self._cells
         return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 
+    def failing(self, key: Key) -> bool:
+        """Whether who won was less often right than a fair coin, by `EVIDENCE` bits, since the record last ended."""
+        cell = self._cells.get(_winner(key))
+        own = None if cell is None else cell.records.get(OWN)
+        if own is None or 2.0 * own.hits >= own.trials:
+            return False
+        counts = (own.hits, own.trials - own.hits)
+        coded = sum(-n * math.log2(n / own.trials) for n in counts if n)
+        return own.trials - coded >= EVIDENCE
+
     def forget(self) -> None:
         """What follows is another model's word: only what mostly changes stays, and what the others know."""
         whole = self._whole()

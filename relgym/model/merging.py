@@ -124,6 +124,7 @@ def _take_up(
 ) -> None:
     first = len(mine.clusterer.y)
     same = mine.target.given == theirs.target.given
+    mine.past.clear()  # of two histories neither comes first
     mine.clusterer.absorb(theirs.clusterer, table, moved[theirs.clusterer.rows], functions=same)
     mine.follow(table)
     numbers = first + theirs.classifier.exemplars.rows

@@ -165,7 +165,9 @@ class Laws:
             said[body] = said.get(body, 0) + 1
             off[body] = max(off.get(body, 0.0), error)
             touched[body] = [bodies[name] for name in one.roles[1:]]
-        if any([not components or said.get(body, 0) != len(components) for body, components in wanted.items()]):
+        if any(
+            [not components or said.get(body, 0) != len(components) for body, components in wanted.items()]
+        ):
             return False
         perception = percept.perception
         return self.learner.confirm(

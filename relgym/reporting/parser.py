@@ -11,6 +11,7 @@ from relgym.reporting.conditions import CONTEXTS, Condition, parse_condition
 from relgym.reporting.functions import Sum, number_of, parse_sum, split_outside, whole_of
 from relgym.reporting.motion import HEADING, parse_motion
 from relgym.reporting.rules import (
+    ENDED,
     SEEN,
     Bound,
     Branch,
@@ -54,6 +55,7 @@ class _Draft:
     unexplained: int = 0
     doubt: str = ""
     advice: str = ""
+    ended: list[str] = field(default_factory=list)
 
     def rules(self) -> PropertyRules:
         branches = tuple(self._named(*pair) for pair in zip(self.branches, self.heads, strict=True))
@@ -67,6 +69,7 @@ class _Draft:
             self.unexplained,
             self.doubt,
             self.advice,
+            ended=tuple(self.ended),
         )
 
     def _named(self, branch: Branch, head: str) -> Branch:
@@ -250,7 +253,9 @@ def _bound(draft: _Draft, text: str) -> bool:
 
 
 def _rest(draft: _Draft, text: str) -> bool:
-    if text.startswith("no prediction: "):
+    if text.startswith(ENDED):
+        draft.ended.append(text.removeprefix(ENDED))
+    elif text.startswith("no prediction: "):
         draft.doubt = text.removeprefix("no prediction: ")
     elif text.startswith("advice: "):
         draft.advice = text.removeprefix("advice: ")

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from relgym.scene.objects import Scene, SceneLayout
 
 __all__ = [
+    "ENDED",
     "SEEN",
     "Bound",
     "Branch",
@@ -42,6 +43,9 @@ __all__ = [
 
 WIDTH = 96
 """Longest line, in characters, if its parts allow it."""
+
+ENDED = "has ended: "
+"""Before a function that held until the world changed."""
 
 SEEN = "Situations seen; in others there is no prediction"
 """First line of the section of fingerprints."""
@@ -191,6 +195,8 @@ class PropertyRules:
         What the property lacks, a sentence.
     experience
         Situations outside which there is no prediction; None: there is one everywhere.
+    ended
+        Functions that held until the world changed.
     """
 
     type: str
@@ -203,6 +209,7 @@ class PropertyRules:
     doubt: str = ""
     advice: str = ""
     experience: Experience | None = None
+    ended: tuple[str, ...] = ()
 
     @builtins.property  # `property` is a field here
     def target(self) -> str:
@@ -237,6 +244,9 @@ class PropertyRules:
             lines.append(
                 f"  {self.unexplained:,} of these steps ({share:.2g} %) follow none of these functions"
             )
+        for function in self.ended:
+            first, *rest = _wrapped(function, WIDTH - 20, (" + ", " - ", " "))
+            lines += [f"  {ENDED}{first}", *(f"    | {line}" for line in rest)]
         told = [*_role_lines(self.roles), *_name_lines(self.branches)]
         if told:
             lines += ["", *told]
@@ -265,6 +275,7 @@ class PropertyRules:
                 for branch in self.branches
             ],
             "bounds": [bound_text(bound, digits=digits).removeprefix("then ") for bound in self.bounds],
+            "ended": list(self.ended),
             "roles": [
                 {"names": [*role.labels], "type": role.type, "if": [*map(condition_text, role.alternatives)]}
                 for role in self.roles

@@ -303,6 +303,18 @@ def test_long_runs_of_either_kind_are_taken() -> None:
     assert known.assess(KEY, values(own=1.0)).probability > 0.99
 
 
+def test_who_was_right_and_is_always_wrong_fails() -> None:
+    known = right(100)
+    assert not known.failing(KEY)
+    for misses in range(1, 15):
+        seen(known, values(own=1.0), 2.0)
+        # The first misses end the record of hits; then ten of them are news.
+        assert known.failing(KEY) == (misses >= 10)
+    seen(known, values(own=1.0), 1.0)
+    assert not known.failing(KEY)
+    assert not known.failing(Key(0, 7, 0))  # who never won
+
+
 def test_modes_that_are_gone_are_forgotten() -> None:
     known = right(20)
     for _ in range(20):

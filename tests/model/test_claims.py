@@ -14,7 +14,8 @@ from relgym.experiments.law_worlds import Ball, Material, World
 from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
-from relgym.scene.objects import Scene, Transition
+from relgym.reporting.parser import parse_rules
+from relgym.scene.objects import Scene, Target, Transition
 from relgym.scene.schema import SceneSchema
 
 Row = tuple[float, ...]
@@ -229,6 +230,53 @@ def test_a_law_that_changed_is_doubted_at_once(
     # Right again as soon as the first law was found, or nearly; which is kept.
     assert right_from(said[1], after) <= 2 * right_from(said[0], before)
     assert len(model.modes("self", "v")) == 2
+
+
+def geared(rng: np.random.Generator, other: bool, count: int = 1_000) -> Acts:
+    """What one of two laws moves, as a switch stands; each of them may be another one."""
+    for v, w, u in rng.uniform(-1.0, 1.0, (count, 3)).tolist():
+        pushed, slowed = (v + 2.0 * u, 0.25 * v) if other else (v + u, 0.5 * v)
+        yield (v, w), (u,), (pushed if w > 0.0 else slowed, w)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_modes_of_a_world_that_changed_take_no_part_in_the_vote(seed: int, tmp_path: object) -> None:
+    schema, rng = schema_of(("v", "w"), ("u",)), np.random.default_rng(seed)
+    first, then, back = (
+        [
+            Transition(schema.scene({"self": now, "action": u}), schema.scene({"self": then, "action": u}))
+            for now, u, then in geared(rng, changed)
+        ]
+        for changed in (False, True, False)
+    )
+    model = WorldModel(schema, targets=[Target("self", "v")])
+    begun = right_from(watched(model, first), first)
+    part = model.property_model("self", "v")
+    old = {mode.id for mode in part.modes}
+    assert len(old) == 2
+    assert not part.past
+    said = watched(model, then)
+    assert right_from(said, then) <= max(2 * begun, 200)
+    assert claimed_and_off(said, then) <= 0.01
+    assert part.past == old
+    assert set(part.classifier.modes) == {mode.id for mode in part.modes} - old
+    assert model.describe(details=True).count("has ended: others hold now") == 2
+    assert model.describe().count("has ended: v' = ") == 2
+    assert parse_rules(model.describe(digits=17)).properties[0].ended == model.rules().properties[0].ended
+
+    model.save(path := f"{tmp_path}/model.json", history=True)
+    again = WorldModel.load(path)
+    known = again.property_model("self", "v")
+    assert known.past == old
+    assert [again.predict_one(s.before) for s in back] == [model.predict_one(s.before) for s in back]
+    merged = WorldModel.load(path)
+    merged.merge(again)
+    assert not merged.property_model("self", "v").past  # of two histories neither comes first
+    said = watched(again, back)  # the old laws hold again, and needn't be found again
+    assert {mode.id for mode in known.modes} == {mode.id for mode in part.modes}
+    assert not known.past & old
+    late = [abs(p["self", "v"].value - s.after["self"]["v"]) < 1e-9 for p, s in zip(said, back, strict=True)]
+    assert np.mean(late[-500:]) > 0.85
 
 
 def test_soft_contacts_of_moving_discs_are_not_claimed() -> None:

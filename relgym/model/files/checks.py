@@ -392,18 +392,17 @@ class _TargetCheck:
             )
 
     def _check_bounds(self, model: PropertyRecord, ids: Collection[int]) -> None:
-        """Limits, stops and landings are modes, and none that take part in the vote."""
+        """Limits, stops, landings and what has ended are modes, and none that take part in the vote."""
         limits = [bound for bound in (model.limits.low, model.limits.high) if bound is not None]
         if len(limits) == 2:
             least, most = limits[0][1], limits[1][1]
             _require(least <= most, f"{self.where}.limits", "expected the low one below the high one")
         every: list[StopRecord | LandingRecord] = [*model.stops.stops, *model.stops.landings]
         voting = set(model.classifier.modes)
-        for mode in (*(bound[0] for bound in limits), *(each.mode for each in every)):
-            _require(mode in ids, f"{self.where}.limits or stops", f"there is no mode {mode}")
-            _require(
-                mode not in voting, f"{self.where}.limits or stops", f"mode {mode} takes part in the vote"
-            )
+        where = f"{self.where}.limits, stops or past"
+        for mode in (*(bound[0] for bound in limits), *(each.mode for each in every), *model.past):
+            _require(mode in ids, where, f"there is no mode {mode}")
+            _require(mode not in voting, where, f"mode {mode} takes part in the vote")
         properties = self.parts.schema.type(self.target.type).properties
         for each in every:
             _require(

@@ -410,6 +410,7 @@ class PropertyRecord(Record):
     limits: LimitsRecord = field(default_factory=LimitsRecord)
     candidates: CandidatesRecord | None = None
     stops: StopsRecord = field(default_factory=StopsRecord)
+    past: list[ModeId] = []
     latest: ModeOrNoise = 0
     unsettled: bool = False
 

@@ -184,6 +184,8 @@ def _record(part: PropertyModel) -> str:
 def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
     if mode.id in part.stops:
         return f"{mode.formula(digits)} {part.stops.text(mode.id, part.target.property)}"
+    if mode.id in part.past:
+        return f"{mode.formula(digits)} has ended: others hold now"
     if mode.id not in part.limits:
         return mode.formula(digits)
     side = "least" if mode.id == part.limits.low else "most"

@@ -202,6 +202,7 @@ def _property(part: PropertyModel) -> PropertyRules:
         part.clusterer.noise_examples,
         _doubt(part),
         experience=_experience(part),
+        ended=tuple(mode.formula() for mode in part.modes if mode.id in part.past),
     )
 
 

@@ -15,8 +15,6 @@ from enum import Enum
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one

@@ -27,6 +27,7 @@ from relgym.model.prediction import OUTCOMES, Outcome, Prediction
 from relgym.model.target.candidates import Candidates
 from relgym.model.target.casting import Casting
 from relgym.model.target.conditions import Conditions, needed
+from relgym.model.target.ended import ended
 from relgym.model.target.fallback import Fallback
 from relgym.model.target.functions import ModeFunctions, Verdict, bodies_of
 from relgym.model.target.guess import Guesses
@@ -85,6 +86,8 @@ class PropertyModel:
         Which modes are limits: they take no part in the vote but cut off what its winner predicts.
     stops
         Which modes are walls at work: they take no part in the vote either.
+    past
+        Ids of modes that have ended (`relgym.model.target.ended`): nor do they.
     hindsight
         How the latest predictions came out, if somebody looked back at them.
     calibration
@@ -114,6 +117,7 @@ class PropertyModel:
         self.spreads = Spreads()
         self.limits = Limits()
         self.stops = Stops()
+        self.past: set[int] = set()
         self.hindsight = Hindsight()
         self.candidates = Candidates(config.hypotheses)
         self.calibration = Calibration(config.claim_probability, config.claim_slips, len(config.hypotheses))
@@ -186,18 +190,44 @@ class PropertyModel:
             if budget is not None:  # so that not all of many targets are measured in the same step
                 budget.spend(SEARCHED_CELLS)
         refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
-        if report.changed or refuted or self.stops.contradicted(report.mode, situation.signature, x[0]):
+        refuted |= self.stops.contradicted(report.mode, situation.signature, x[0])
+        mode = self._of_now(report)
+        if self._turned(mode) or report.changed or refuted:
             self._follow(table)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(
             self.functions.values_one(situation.signature, x[0].tolist(), self.classifier.modes)
         )
-        assigned = UNKNOWN if report.mode == NOISE or self.bounds(report.mode) else report.mode
-        played = self.functions.played_one(table, seen.row, report.mode)
+        assigned = UNKNOWN if mode == NOISE or self.bounds(mode) else mode
+        played = self.functions.played_one(table, seen.row, mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played, weight=weight)
         if played:
-            self.casting.observe(self.mode(report.mode), seen, played, weight)
+            self.casting.observe(self.mode(mode), seen, played, weight)
         return report
+
+    def _of_now(self, report: ClusterReport) -> int:
+        """The mode that an example is of: not one that has ended, as long as another one explains it, too."""
+        if report.mode not in self.past:
+            return report.mode
+        return next((mode for mode in report.fits if mode not in self.past), report.mode)
+
+    def _turned(self, mode: int) -> bool:
+        """Take note of modes that have ended, or of one that hasn't after all; whether there were any."""
+        if mode in self.past:
+            self.past.discard(mode)
+            return True
+        if not self.undecided:
+            return False
+        known = self.calibration
+        over = ended(
+            self.clusterer.labels,
+            self.classifier.modes,
+            lambda mode: known.failing(Key(_PREDICTED, mode, 0)),
+        )
+        if over:
+            self.past |= over
+            self.hindsight = Hindsight()  # another vote is taken from now on
+        return bool(over)
 
     @property
     def waits(self) -> bool:
@@ -380,6 +410,7 @@ class PropertyModel:
         self.stops = self._find_stops(table)
         numbers = self.classifier.exemplars.rows.astype(np.intp)
         known, fits = self.clusterer.fits(table, numbers)
+        self.past.intersection_update(known)
         ids = tuple(i for i in known if not self.bounds(i))
         fits = fits[:, [not self.bounds(i) for i in known]]
         values = self.functions.values_many(table, self.clusterer.rows[numbers], ids)
@@ -397,8 +428,8 @@ class PropertyModel:
 
     # ------------------------------------------------------------------ answering
     def bounds(self, mode: int) -> bool:
-        """Whether a mode takes no part in the vote, but stands in where the others would lead too far."""
-        return mode in self.limits or mode in self.stops
+        """Whether a mode takes no part in the vote: it stands in where the others would lead too far, or has ended."""
+        return mode in self.limits or mode in self.stops or mode in self.past
 
     @property
     def unexplained(self) -> bool:
@@ -712,6 +743,7 @@ class PropertyModel:
             **({"candidates": self.candidates.to_json()} if self.candidates else {}),
             "limits": self.limits.to_json(),
             "stops": self.stops.to_json(),
+            **({"past": sorted(self.past)} if self.past else {}),
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -733,6 +765,7 @@ class PropertyModel:
             self.candidates.restore(data["candidates"])
         self.limits = Limits.from_json(data.get("limits", {}))
         self.stops = Stops.from_json(data.get("stops", {}))
+        self.past = {int(mode) for mode in data.get("past", ())}
         self.functions.bound.clear()
         self.fallback.bound.clear()
 

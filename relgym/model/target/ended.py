@@ -1,0 +1,58 @@
+"""Modes that have ended: the world changed, and others hold in the situations that were theirs.
+
+No clause can tell such modes from those that took their place, since the same conditions hold for both: all that
+differs is when. So what has ended takes no part in the vote any more, and clauses are learned between the others alone.
+It is kept, and votes again as soon as an example comes that it alone explains.
+
+A world that stays as it is has modes that seldom hold, and it goes through its situations in turns. Therefore three
+things must come together. Nothing tells which mode holds (`relgym.model.target.hindsight`). Where the mode wins the
+vote it is wrong, since its record began or began anew (`relgym.model.calibration.Calibration.failing`). And it has not
+held for so long that this is news: in a share p of the examples up to its last one, and in none of the n since, which
+has the probability (1 - p)^n. What is news says `EVIDENCE`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.config.constants import EVIDENCE
+
+__all__ = ["ended"]
+
+
+def ended(labels: NDArray[np.int32], modes: Sequence[int], failing: Callable[[int], bool]) -> set[int]:
+    """Modes that have ended, as long as there are others that haven't.
+
+    Parameters
+    ----------
+    labels
+        Id of the mode that explains each example, oldest first, shape ``(n,)``.
+    modes
+        Ids of those that take part in the vote.
+    failing
+        Whether a mode is wrong where it wins the vote.
+
+    Notes
+    -----
+    Cost O(n) for each mode that fails.
+
+    Examples
+    --------
+    >>> ended(np.array([1, 2] * 20 + [3, 2] * 20), [1, 2, 3], lambda mode: mode == 1)
+    {1}
+    >>> ended(np.array([1, 2] * 20 + [3, 2] * 3), [1, 2, 3], lambda mode: mode == 1)  # six steps tell nothing yet
+    set()
+    """
+    over = {mode for mode in modes if failing(mode) and _news(np.flatnonzero(labels == mode), len(labels))}
+    return over if len(over) < len(modes) else set()
+
+
+def _news(held: NDArray[np.intp], count: int) -> bool:
+    """Whether it is news that a mode which held in these of so many examples has not held since the last of them."""
+    until = int(held.max(initial=-1)) + 1
+    share = len(held) / (until + 1.0)  # never all: nothing is known to hold always
+    return -(count - until) * math.log2(1.0 - share) >= EVIDENCE
