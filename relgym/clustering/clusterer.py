@@ -155,9 +155,9 @@ class ModeClusterer:
         """Number of examples that it ever learned from, forgotten ones included."""
         return self.population.seen
 
-    def pass_over(self) -> None:
-        """Count an example that isn't learned from, since others stand for it."""
-        self.population.log.passed[NOISE] += 1
+    def pass_over(self, count: int = 1) -> None:
+        """Count examples that aren't learned from, since others stand for them."""
+        self.population.log.passed[NOISE] += count
 
     def stand_for(self, mode: int, others: int) -> None:
         """An example of a mode stands for so many that were passed over."""

@@ -19,6 +19,7 @@ from relgym.model.parts import Parts
 from relgym.model.perception import Percept
 from relgym.model.prediction import ScenePrediction
 from relgym.model.scenes import next_values, passage, unwrapped
+from relgym.model.stillness import recall
 from relgym.model.target.hindsight import Confirmed
 from relgym.model.target.property_model import bodies_of
 from relgym.scene.objects import TASK, Target, Transition
@@ -97,9 +98,7 @@ def learn(
         (`relgym.model.target.hindsight.look_back`).
     """
     before, after = transition.before, transition.after
-    known = len(parts.targets)
-    if parts.open:
-        parts.discover_targets(before, after)
+    found = parts.discover_targets(before, after) if parts.open else ()
     stays = passage(before.layout, after.layout).stays
     following = unwrapped(before.layout, before.vector, next_values(before, after))
     reports: dict[tuple[str, str], ClusterReport] = {}
@@ -116,6 +115,9 @@ def learn(
         for index in before.layout.of_type(type_name):
             if (only is None or index in only) and stays[index]:
                 moved |= _learn_object(parts, percept, index, following, reports, searches, confirmed)
+    for target in found:  # behind the change: of what is always the same hardly a function is verified
+        table = parts.tables[target.type]
+        recall(parts, target, len(table) - table.seen + rows.get(target.type, 0), searches)
     for type_name, table in parts.tables.items() if reports else ():
         if parts.open and any(rows[type_name] < at <= table.seen for at in CHECK_AT):
             parts.looks += due(parts, type_name)
@@ -131,7 +133,7 @@ def learn(
         work = _refresh(parts, budget)
         parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
         parts.idle = not budget.spent and _nothing_waits(parts)
-    counted = not (reports or moved or heard or budget.spent) and len(parts.targets) == known
+    counted = not (reports or moved or heard or budget.spent or found)
     return LearnReport(reports, work, counted=counted)
 
 
@@ -240,7 +242,9 @@ def _learn_object(
         rough |= model.rough
         changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
         if target.property in weights:
-            report = model.learn_one(table, row, y, situation, example, budget, weights[target.property])
+            report = model.learn_one(
+                table, row, y, situation.signature, example, budget, weights[target.property]
+            )
             reports[name, target.property] = report
     if rough:
         parts.regressions[type_name].learn_one(situation.signature, x, changes)

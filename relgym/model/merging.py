@@ -21,6 +21,7 @@ from relgym.model.chaining import in_order
 from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.scenes import mismatch
+from relgym.model.stillness import remembered
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import Target
 
@@ -140,24 +141,10 @@ def _exemplars(
     theirs: PropertyModel, mine: PropertyModel, table: ExampleTable, numbers: NDArray[np.int64]
 ) -> Iterator[tuple[Example, float]]:
     """What the other's classifiers remember, with its new numbers and own features."""
-    kept = theirs.classifier.exemplars
-    c, base = kept.columns, theirs.base_features
-    for slot, (number, weight) in enumerate(zip(numbers.tolist(), kept.weights().tolist(), strict=True)):
-        k = int(c["exists"][slot].sum())
+    weights = theirs.classifier.exemplars.weights()
+    for slot, (number, weight) in enumerate(zip(numbers.tolist(), weights.tolist(), strict=True)):
         row = mine.clusterer.rows[number]
         signature = table.signatures[table.signature_ids[row]]
         ahead = mine.conditions.values(signature, table.x[row : row + 1])[0]
-        yield (
-            Example(
-                c["table"][slot][:, :k, :k],
-                c["unary"][slot][:, :k],
-                c["close"][slot][:k],
-                c["pair"][slot][:k],
-                np.concatenate([c["own"][slot][:base], ahead]),
-                int(c["target"][slot]),
-                kept.key_of(slot),
-                number,
-                c["approached"][slot][:k],
-            ),
-            weight,
-        )
+        example, _ = remembered(theirs, slot)
+        yield example.with_own(np.concatenate([example.own, ahead]), number), weight

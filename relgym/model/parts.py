@@ -235,14 +235,14 @@ class Parts:
             p for p in self.perception.chained if p[0] != TASK or (p == end and target.property != TERMINATED)
         )
 
-    def discover_targets(self, before: Scene, after: Scene) -> None:
-        """Every property that changes becomes a target; it sees all transitions from its first change on.
+    def discover_targets(self, before: Scene, after: Scene) -> tuple[Target, ...]:
+        """Every property that changes becomes a target; it sees all transitions from its first change on. Those found.
 
         What the task says is asked for, and a target at once: of ends, that most steps are none is half the story.
         """
         layout = before.layout
         if not (open_ := self._undiscovered_in(layout)):
-            return
+            return ()
         stays = passage(layout, after.layout).stays
         changed = before.vector != next_values(before, after)
         found = dict.fromkeys(
@@ -253,6 +253,7 @@ class Parts:
         check_number(len(self.targets) + len(found))
         for target in found:
             self.add_target(target)
+        return tuple(t for t in self.targets if (t.type, t.property) in {(f.type, f.property) for f in found})
 
     def _undiscovered_in(self, layout: SceneLayout) -> list[tuple[Target, int, int]]:
         """What may become a target, the object and the column of each; cached until there is another target."""

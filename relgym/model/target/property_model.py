@@ -154,7 +154,7 @@ class PropertyModel:
         table: ExampleTable,
         row: int,
         y: float,
-        situation: Situation,
+        signature: SlotSignature,
         example: Example,
         budget: Budget | None = None,
         weight: int = 1,
@@ -167,16 +167,16 @@ class PropertyModel:
             The example's regression row.
         y
             The property's next value.
-        situation, example
-            How the target object is situated, in a single scene.
+        signature, example
+            The types in the row's slots, and how the target object is situated.
         budget
             What may be spent on searches; default: as much as they take.
         weight
             How many examples this one stands for.
         """
         x = table.x[row : row + 1]
-        seen = self._with_next(example, situation.signature, x, len(self.clusterer.y))
-        self._compare(situation, seen, x[0], y)
+        seen = self._with_next(example, signature, x, len(self.clusterer.y))
+        self._compare(signature, seen, x[0], y)
         report = self.clusterer.learn_one(table, row, y, budget)
         if weight > 1:
             self.clusterer.stand_for(report.mode, weight - 1)
@@ -190,14 +190,12 @@ class PropertyModel:
             if budget is not None:  # so that not all of many targets are measured in the same step
                 budget.spend(SEARCHED_CELLS)
         refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
-        refuted |= self.stops.contradicted(report.mode, situation.signature, x[0])
+        refuted |= self.stops.contradicted(report.mode, signature, x[0])
         mode = self._of_now(report)
         if self._turned(mode) or report.changed or refuted:
             self._follow(table)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
-        values = np.array(
-            self.functions.values_one(situation.signature, x[0].tolist(), self.classifier.modes)
-        )
+        values = np.array(self.functions.values_one(signature, x[0].tolist(), self.classifier.modes))
         assigned = UNKNOWN if mode == NOISE or self.bounds(mode) else mode
         played = self.functions.played_one(table, seen.row, mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played, weight=weight)
@@ -261,15 +259,15 @@ class PropertyModel:
             self.latest = mode
         return True
 
-    def _compare(self, situation: Situation, example: Example, x: NDArray[np.float64], y: float) -> None:
+    def _compare(self, signature: SlotSignature, example: Example, x: NDArray[np.float64], y: float) -> None:
         """Let the guess and the modes predict an example before it is learned from."""
-        binding = self.fallback.guessing(situation.signature)
+        binding = self.fallback.guessing(signature)
         if binding is None or self.fallback.unexplained or not self.classifier.modes:
             return
-        row = x[: len(situation.signature.columns)].tolist()
-        if not self.fallback.scope.covers_one(row, situation.signature):
+        row = x[: len(signature.columns)].tolist()
+        if not self.fallback.scope.covers_one(row, signature):
             return
-        values = self.functions.values_one(situation.signature, row, self.classifier.modes)
+        values = self.functions.values_one(signature, row, self.classifier.modes)
         first = self.classifier.rank(example, values).modes[0]
         said = values[self.classifier.modes.index(first)]
         if np.isfinite(said):
