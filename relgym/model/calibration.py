@@ -759,6 +759,18 @@ class Calibration:
         weight, kind.passed = kind.passed + 1, 0
         return weight
 
+    def stood_still(self, outcome: int, count: int) -> None:
+        """What nobody predicted stayed as it was, so many times: that nothing changes was right."""
+        times = float(min(count, MEMORY))
+        cell = self._cells.setdefault(Key(outcome, 0, 0), _Cell.new(PERSISTENCE, self.experts))
+        record = cell.records.setdefault(PERSISTENCE, _Record())
+        record.add(True, int(times), fitted=False)
+        record.errors = _counted(record.errors, _EXACT, int(times))
+        cell.squares[PERSISTENCE][0] += times
+        cell.heard += times
+        self.trials += count
+        self._changed()
+
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
         self._cells = {

@@ -346,8 +346,7 @@ class _Lowering:
         """Columns of the own features of a target's classifiers, by name."""
         base = self.perception.own_columns(layout, index)
         columns = [self.nan if c == layout.width else int(c) for c in base]
-        for name, prop in model.conditions.pairs:
-            place = model.conditions._place(signature, name, prop)
+        for place in model.conditions.places(signature):
             columns.append(self.nan if place < 0 else one.column(place))
         return dict(zip(model.classifier.vocabulary.own, columns, strict=True))
 

@@ -2,7 +2,7 @@
 
 A property becomes a target when it first changes, for most never do. What it did until then is known, too: nothing.
 Who learned from its changes alone would take a flag that has been 0 in two thousand steps, and 1 in the nine after its
-first change, for one that is always 1.
+first change, for one that is always 1. What was still for a shorter while will be seen to be so again.
 """
 
 from __future__ import annotations
@@ -12,13 +12,16 @@ from typing import Final
 import numpy as np
 
 from relgym.classification.examples import Example
-from relgym.config.constants import EVIDENCE
+from relgym.config.constants import EVIDENCE, HOPELESS
 from relgym.model.parts import Parts
+from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import TASK, Target
 from relgym.scheduling.agenda import Budget
 
 __all__ = ["recall"]
+
+_NO_MODE: Final = OUTCOMES.index(Outcome.NO_MODE)
 
 RECALLED: Final = round(EVIDENCE)
 """So many examples stand for all: each tells one bit, as a coin's side does, and so many of them a mode."""
@@ -27,7 +30,8 @@ RECALLED: Final = round(EVIDENCE)
 def recall(parts: Parts, target: Target, rows: int, budget: Budget) -> None:
     """Let a new target learn from some of its type's examples, which stand for all: it stayed as it was.
 
-    Nothing is recalled where nobody else of its type remembers any. Cost: as of so many transitions.
+    Nothing is recalled of fewer than `HOPELESS`, and where nobody else of its type remembers any. Cost: as of so many
+    transitions.
 
     Parameters
     ----------
@@ -43,7 +47,7 @@ def recall(parts: Parts, target: Target, rows: int, budget: Budget) -> None:
     table = parts.tables[target.type]
     others = [model for t, model in parts.by_type[target.type] if t != target]
     source = max(others, key=lambda other: len(other.classifier.exemplars), default=None)
-    if target.type == TASK or source is None:
+    if target.type == TASK or rows < HOPELESS or source is None:
         return
     kept = source.classifier.exemplars
     before = np.flatnonzero(source.clusterer.rows[kept.rows.astype(np.intp)] < rows)
@@ -63,6 +67,8 @@ def recall(parts: Parts, target: Target, rows: int, budget: Budget) -> None:
         model.learn_one(table, row, float(table.x[row, own]), signature, example, budget, weight)
     # Also for those before a mode was found.
     model.clusterer.stand_for(int(model.clusterer.labels[-1]), round(shares.sum()))
+    if source.calibration.trials:  # somebody looks back
+        model.calibration.stood_still(_NO_MODE, round(shares.sum()))
 
 
 def remembered(model: PropertyModel, slot: int) -> tuple[Example, int]:

@@ -298,7 +298,7 @@ class _TargetCheck:
         found, where = classifier.vocabulary, f"{self.where}.classifier.vocabulary"
         own = self.parts.schema.type(self.target.type)
         base = self.parts.perception.vocabulary(own)
-        expected = Conditions(self.parts.schema, self.target).vocabulary(base, tuple(found.follows))
+        expected = self._conditions(classifier).vocabulary(base, tuple(found.follows))
         plain = expected.to_dict()
         for name in ("relations", "unary", "pair", "own", "contact", "present"):
             _require(getattr(found, name) == plain[name], f"{where}.{name}", f"expected {plain[name]!r:.200}")
@@ -308,10 +308,15 @@ class _TargetCheck:
             set(names) <= set(plain["own"]), f"{where}.follows", f"expected some of {plain['own']!r:.200}"
         )
 
+    def _conditions(self, classifier: ClassifierRecord) -> Conditions:
+        found = Conditions(self.parts.schema, self.target)
+        found.keep(classifier.vocabulary.own)
+        return found
+
     def _scope(self, classifier: ClassifierRecord, modes: Sequence[int]) -> Scope:
         base = self.parts.perception.vocabulary(self.parts.schema.type(self.target.type))
         follows = tuple(classifier.vocabulary.follows)
-        vocabulary = Conditions(self.parts.schema, self.target).vocabulary(base, follows)
+        vocabulary = self._conditions(classifier).vocabulary(base, follows)
         return Scope.of(vocabulary, self.parts.config.classification, modes)
 
     def _check_pair(self, pair: PairRecord, where: str, scope: Scope) -> None:

@@ -3,12 +3,16 @@
 A wall is ``x + v' <= -1.2``, not a threshold on x: preconditions must be able to test what is predicted (§1.2.3 has
 actions and states only). A target that is given others' next values may test them, named with a prime; a target that
 others follow (``x' = x + k v'``) may test where they would get to if a mode held (`Vocabulary.follows`).
+
+What a step is worth, and whether it ends the episode, depends on what was as well as on what came of it: a truck that
+stops has moved before (``truck.vx > 0``). No object is part of the task, so that its classifiers are shown no body's
+present values otherwise.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -33,45 +37,64 @@ class Conditions:
         The scenes' schema.
     target
         Its `given` pairs count where they belong to the target's own object or to a bodiless one, of which there is
-        one only; for reward and termination, of which no object is part, all count.
+        one only; for reward and termination, of which no object is part, all count, and of bodies the present values,
+        too.
+
+    Attributes
+    ----------
+    pairs
+        Those pairs.
+    columns
+        (type, column) of every value, next ones with a prime.
     """
 
     def __init__(self, schema: SceneSchema, target: Target) -> None:
         own, alone = target.type, {t.name for t in schema.types if not t.has_body}
         self.pairs = tuple(p for p in target.given if own == TASK or p[0] == own or p[0] in alone)
+        present = tuple(p for p in self.pairs if own == TASK and p[0] not in alone)
+        self.columns = (*((t, p + PRIME) for t, p in self.pairs), *present)
         self._own, self._property = own, target.property
-        self._columns: dict[int, NDArray[np.intp]] = {}
+        self._places: dict[int, NDArray[np.intp]] = {}
 
     def __getstate__(self) -> dict[str, object]:
-        return self.__dict__ | {"_columns": {}}  # keyed by identity, which a copy doesn't share
+        return self.__dict__ | {"_places": {}}  # keyed by identity, which a copy doesn't share
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the next values, as clauses print them."""
-        return tuple((p if t == self._own else f"{t}.{p}") + PRIME for t, p in self.pairs)
+        """Names of the values, as clauses print them."""
+        return tuple(column if name == self._own else f"{name}.{column}" for name, column in self.columns)
+
+    def keep(self, names: Collection[str]) -> None:
+        """Show of present values only those of these names: classifiers of an older file were taught without."""
+        shown = zip(self.columns, self.names, strict=True)
+        self.columns = tuple(c for c, name in shown if name in names or name.endswith(PRIME))
+        self._places.clear()
 
     def vocabulary(self, base: Vocabulary, follows: tuple[tuple[str, float], ...]) -> Vocabulary:
-        """The vocabulary with the next values as further own features, and what it needs to know of the target."""
+        """The vocabulary with the values as further own features, and what it needs to know of the target."""
         known = tuple(pair for pair in follows if pair[0] in base.own)
         present = self._property if self._property in base.own else ""
         return replace(base, own=(*base.own, *self.names), follows=known, present=present)
 
     def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The next values on regression rows ``(n, d)``, shape ``(n, len(pairs))``; NaN where an object is missing."""
-        if not self.pairs:
+        """The values on regression rows ``(n, d)``, shape ``(n, len(columns))``; NaN where an object is missing."""
+        if not self.columns:
             return np.empty((len(x), 0))
-        columns = self._columns.get(id(signature))
-        if columns is None:
-            places = [self._place(signature, name, prop) for name, prop in self.pairs]
-            columns = self._columns[id(signature)] = np.array(places, dtype=np.intp)
-        found: NDArray[np.float64] = np.where(columns >= 0, x[:, columns], np.nan)
+        places = self._places.get(id(signature))
+        if places is None:
+            places = self._places[id(signature)] = np.array(self.places(signature), dtype=np.intp)
+        found: NDArray[np.float64] = np.where(places >= 0, x[:, places], np.nan)
         return found
 
-    def _place(self, signature: SlotSignature, name: str, prop: str) -> int:
+    def places(self, signature: SlotSignature) -> list[int]:
+        """Where each value stands in a signature's rows; -1 where no object, or none alone of its type, has it."""
+        return [self._place(signature, *column) for column in self.columns]
+
+    def _place(self, signature: SlotSignature, name: str, column: str) -> int:
         slots = (0,) if name == self._own else signature.slots_by_type.get(name, ())
-        if len(slots) != 1 or not signature.has(slots[0], prop + PRIME):
+        if len(slots) != 1 or not signature.has(slots[0], column):
             return -1
-        return signature.column(slots[0], prop + PRIME)
+        return signature.column(slots[0], column)
 
 
 def needed(

@@ -277,7 +277,7 @@ class PropertyModel:
         self, example: Example, signature: SlotSignature, x: NDArray[np.float64], number: int = -1
     ) -> Example:
         """An example by its number, with the next values that clauses may test, of a regression row ``(1, d)``."""
-        if not self.conditions.pairs:
+        if not self.conditions.columns:
             return example.with_own(example.own, number)
         return example.with_own(
             np.concatenate([example.own, self.conditions.values(signature, x)[0]]), number
@@ -392,7 +392,7 @@ class PropertyModel:
     def _widen(self, table: ExampleTable, follows: tuple[tuple[str, float], ...]) -> None:
         exemplars = self.classifier.exemplars
         rows = self.clusterer.rows[exemplars.rows.astype(np.intp)]
-        ahead = np.full((len(rows), len(self.conditions.pairs)), np.nan)
+        ahead = np.full((len(rows), len(self.conditions.columns)), np.nan)
         for number in np.unique(table.signature_ids[rows]):
             part = np.flatnonzero(table.signature_ids[rows] == number)
             ahead[part] = self.conditions.values(table.signatures[int(number)], table.x[rows[part]])
@@ -541,7 +541,7 @@ class PropertyModel:
     def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
         """`example` without the key, by which examples are kept and not classified."""
         first = situation.examples[0]
-        return self._with_next(first, situation.signature, x) if self.conditions.pairs else first
+        return self._with_next(first, situation.signature, x) if self.conditions.columns else first
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
@@ -720,7 +720,7 @@ class PropertyModel:
             sure = np.ones(n, dtype=np.bool_)
             return RankingBatch(np.full((n, 1), modes[0]), np.zeros((n, 1)), np.full(n, np.inf), sure, sure)
         shown = situation.preview(self.classifier.relations)
-        if self.conditions.pairs:
+        if self.conditions.columns:
             ahead = self.conditions.values(situation.signature, x)
             shown = replace(shown, own=np.concatenate([shown.own, ahead], axis=1))
         return self.classifier.rank_batch(shown, self.functions.values(situation.signature, x, modes))
@@ -758,6 +758,7 @@ class PropertyModel:
         self.latest = int(data.get("latest", NOISE))
         self._unsettled = bool(data.get("unsettled", False))
         self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
+        self.conditions.keep(self.classifier.vocabulary.own)
         self.casting.restore(data["casting"])
         if self.candidates:
             self.candidates.restore(data["candidates"])
