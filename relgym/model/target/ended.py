@@ -8,7 +8,8 @@ A world that stays as it is has modes that seldom hold, and it goes through its 
 things must come together. Nothing tells which mode holds (`relgym.model.target.hindsight`). Where the mode wins the
 vote it is wrong, since its record began or began anew (`relgym.model.calibration.Calibration.failing`). And it has not
 held for so long that this is news: in a share p of the examples up to its last one, and in none of the n since, which
-has the probability (1 - p)^n. What is news says `EVIDENCE`.
+has the probability (1 - p)^n; but since what comes in a row is alike, each tells one bit at most. What is news says
+`EVIDENCE`.
 """
 
 from __future__ import annotations
@@ -55,4 +56,4 @@ def _news(held: NDArray[np.intp], count: int) -> bool:
     """Whether it is news that a mode which held in these of so many examples has not held since the last of them."""
     until = int(held.max(initial=-1)) + 1
     share = len(held) / (until + 1.0)  # never all: nothing is known to hold always
-    return -(count - until) * math.log2(1.0 - share) >= EVIDENCE
+    return (count - until) * min(-math.log2(1.0 - share), 1.0) >= EVIDENCE

@@ -214,7 +214,7 @@ class PropertyModel:
         if mode in self.past:
             self.past.discard(mode)
             return True
-        if not self.undecided:
+        if not self.undecided or self.fallback.inexact:  # of what is only roughly known all fail now and then
             return False
         known = self.calibration
         over = ended(
