@@ -80,9 +80,8 @@ def _audited(audit: Audit | None, key: Key, speaker: int) -> LateAudit:
     return LateAudit(lambda: audit, key, speaker)
 
 
-@dataclass(
-    slots=True
-)  # not frozen: one is made for every target in every step, and that takes a sixth as long
+# Not frozen: one is made for every target in every step, and that takes a sixth as long.
+@dataclass(slots=True)
 class Prediction:
     """The next value of one property of one object; not to be changed.
 

@@ -58,11 +58,6 @@ class Said(NamedTuple):
     frame: str
     spread: float
 
-    @property
-    def ok(self) -> bool:
-        """Whether a mode or a law predicts it."""
-        return self.outcome is Outcome.PREDICTED
-
 
 def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
     """Predict the scene that follows one whose numbers are finite."""

@@ -19,7 +19,7 @@ from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import TASK, Target
 from relgym.scheduling.agenda import Budget
 
-__all__ = ["recall"]
+__all__ = ["recall", "remembered"]
 
 _NO_MODE: Final = OUTCOMES.index(Outcome.NO_MODE)
 
