@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 
 from relgym.classification.examples import Example
-from relgym.config.constants import EVIDENCE, HOPELESS
+from relgym.config.constants import EVIDENCE
+from relgym.model.calibration import MEMORY
 from relgym.model.parts import Parts
 from relgym.model.prediction import OUTCOMES, Outcome
 from relgym.model.target.property_model import PropertyModel
@@ -30,8 +31,7 @@ RECALLED: Final = round(EVIDENCE)
 def recall(parts: Parts, target: Target, rows: int, budget: Budget) -> None:
     """Let a new target learn from some of its type's examples, which stand for all: it stayed as it was.
 
-    Nothing is recalled of fewer than `HOPELESS`, and where nobody else of its type remembers any. Cost: as of so many
-    transitions.
+    Nothing is recalled of fewer than records remember (`MEMORY`). Cost: as of so many transitions.
 
     Parameters
     ----------
@@ -47,13 +47,13 @@ def recall(parts: Parts, target: Target, rows: int, budget: Budget) -> None:
     table = parts.tables[target.type]
     others = [model for t, model in parts.by_type[target.type] if t != target]
     source = max(others, key=lambda other: len(other.classifier.exemplars), default=None)
-    if target.type == TASK or rows < HOPELESS or source is None:
+    if target.type == TASK or source is None:
         return
     kept = source.classifier.exemplars
     before = np.flatnonzero(source.clusterer.rows[kept.rows.astype(np.intp)] < rows)
-    if not len(before):
-        return
     model, weights = parts.models[target], kept.weights()
+    if weights[before].sum() < MEMORY:
+        return
     slots = before[np.unique(np.linspace(0, len(before) - 1, RECALLED).astype(np.intp))]
     shares = weights[slots] * (weights[before].sum() / weights[slots].sum())
     for slot, share in zip(slots.tolist(), shares.tolist(), strict=True):

@@ -14,7 +14,7 @@ from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
 SCHEMA = schema_of(("v", "flag"), ("u",))
-STILL = 500
+STILL = 1_500
 
 
 def steps(seed: int, flags: Iterator[float] | list[float], count: int) -> list[Transition]:
@@ -47,7 +47,7 @@ def test_a_flag_that_was_always_down_is_no_flag_that_is_always_up() -> None:
     assert np.mean([model.predict_one(step.before)["self", "flag"].value for step in fresh]) < 0.5
 
 
-@pytest.mark.parametrize(("still", "recalled"), [(50, 0), (500, RECALLED)])
+@pytest.mark.parametrize(("still", "recalled"), [(500, 0), (1_500, RECALLED)])
 def test_what_was_still_for_long_is_recalled(still: int, recalled: int) -> None:
     more = 40
     model = taught(steps(2, [0.5] * (still + 1) + [2.0] * more, still + more))
