@@ -71,22 +71,22 @@ def test_single_scenes_batches_and_files_say_the_same(learner: ModelLearner, tmp
 
 
 def conditions() -> Conditions:
-    block = ObjectType("block", ("px", "py", "pz", "vx"), shape=Box())
-    types = (block, ObjectType("mark", ("at",)), ObjectType(TASK, ("terminated",)))
-    schema = SceneSchema(types, (("block", "block"), ("mark", "mark"), (TASK, TASK)))
-    return Conditions(schema, Target(TASK, "terminated", given=(("block", "vx"), ("mark", "at"))))
+    brick = ObjectType("brick", ("px", "py", "pz", "vx"), shape=Box())
+    types = (brick, ObjectType("mark", ("at",)), ObjectType(TASK, ("terminated",)))
+    schema = SceneSchema(types, (("brick", "brick"), ("mark", "mark"), (TASK, TASK)))
+    return Conditions(schema, Target(TASK, "terminated", given=(("brick", "vx"), ("mark", "at"))))
 
 
 def test_bodies_present_values_are_shown_to_the_task_alone() -> None:
     known = conditions()
-    assert known.names == ("block.vx'", "mark.at'", "block.vx")  # a mark's present value is shown to all
-    assert known.pairs == (("block", "vx"), ("mark", "at"))
+    assert known.names == ("brick.vx'", "mark.at'", "brick.vx")  # a mark's present value is shown to all
+    assert known.pairs == (("brick", "vx"), ("mark", "at"))
 
 
 def test_classifiers_of_an_older_file_are_shown_what_they_were_taught_with() -> None:
     known = conditions()
-    known.keep(("block.vx'", "mark.at'"))
-    assert known.names == ("block.vx'", "mark.at'")
+    known.keep(("brick.vx'", "mark.at'"))
+    assert known.names == ("brick.vx'", "mark.at'")
     known = conditions()
-    known.keep(("block.vx",))
-    assert known.names == ("block.vx'", "mark.at'", "block.vx")  # only present values are new
+    known.keep(("brick.vx",))
+    assert known.names == ("brick.vx'", "mark.at'", "brick.vx")  # only present values are new
