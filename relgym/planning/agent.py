@@ -289,6 +289,8 @@ class PlanningAgent:
             Called with the agent after each decision; false ends learning.
         """
         checked_count("total_steps", total_steps, 0, 10**9)
+        if callback is not None and not callable(callback):
+            raise ConfigError(f"callback={callback!r:.80}: expected a function of the agent, or None")
         while self.steps < total_steps:
             if self._observation is None:
                 self._observation, _ = self.env.reset(seed=int(self._rng.integers(2**31)))
