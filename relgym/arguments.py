@@ -45,6 +45,10 @@ _RAW: Final = (TypeError, ValueError, AttributeError, LookupError, ArithmeticErr
 """What Python and NumPy raise when they can't use what they were given."""
 
 
+_FEW: Final = 64
+"""Longer vectors are summed up more slowly than asked."""
+
+
 def refusing(error: type[RelgymError]) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
     """Decorate a public function: where it fails for an argument that doesn't fit its annotation, `error` says so.
 
@@ -130,10 +134,6 @@ def finite(vector: NDArray[np.float64]) -> bool:
     if len(vector) <= _FEW and math.isfinite(sum(vector.tolist())):
         return True
     return bool(np.isfinite(vector).all())  # the sum of huge numbers may overflow
-
-
-_FEW: Final = 64
-"""Longer vectors are summed up more slowly than asked."""
 
 
 def whole(what: str, value: Any, least: int, below: int, error: type[RelgymError]) -> int:

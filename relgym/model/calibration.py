@@ -761,11 +761,11 @@ class Calibration:
 
     def stood_still(self, outcome: int, count: int) -> None:
         """What nobody predicted stayed as it was, so many times: that nothing changes was right."""
-        times = float(min(count, MEMORY))
+        times = min(count, MEMORY)
         cell = self._cells.setdefault(Key(outcome, 0, 0), _Cell.new(PERSISTENCE, self.experts))
         record = cell.records.setdefault(PERSISTENCE, _Record())
-        record.add(True, int(times), fitted=False)
-        record.errors = _counted(record.errors, _EXACT, int(times))
+        record.add(True, times, fitted=False)
+        record.errors = _counted(record.errors, _EXACT, times)
         cell.squares[PERSISTENCE][0] += times
         cell.heard += times
         self.trials += count

@@ -21,7 +21,6 @@ from relgym.model.chaining import in_order
 from relgym.model.forgetting import forget
 from relgym.model.parts import Parts
 from relgym.model.scenes import mismatch
-from relgym.model.stillness import remembered
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import Target
 
@@ -146,5 +145,5 @@ def _exemplars(
         row = mine.clusterer.rows[number]
         signature = table.signatures[table.signature_ids[row]]
         ahead = mine.conditions.values(signature, table.x[row : row + 1])[0]
-        example, _ = remembered(theirs, slot)
+        example, _ = theirs.remembered(slot)
         yield example.with_own(np.concatenate([example.own, ahead]), number), weight

@@ -123,10 +123,10 @@ class Laws:
     ) -> bool:
         """Take up one transition, then weigh laws against modes if that is due; whether laws may say something else.
 
+        Nobody calls it where there is nothing that moves (`LawLearner.sources`).
+
         What was predicted of it may be told: what came as predicted is only counted, and offered to what is kept.
         """
-        if not self.learner.sources:
-            return False
         self._seen += 1
         changed, tolerance = False, self.learner.book.tolerance
         known = told is not None and self._confirmed(percept, following, stays, told)

@@ -250,10 +250,15 @@ class Parts:
             for target, index, column in open_
             if stays[index] and (changed[column] or target.type == TASK)
         )
+        if not found:
+            return ()
         check_number(len(self.targets) + len(found))
         for target in found:
             self.add_target(target)
-        return tuple(t for t in self.targets if (t.type, t.property) in {(f.type, f.property) for f in found})
+        names = {
+            (target.type, target.property) for target in found
+        }  # those of the task are given what follows
+        return tuple(t for t in self.targets if (t.type, t.property) in names)
 
     def _undiscovered_in(self, layout: SceneLayout) -> list[tuple[Target, int, int]]:
         """What may become a target, the object and the column of each; cached until there is another target."""

@@ -11,16 +11,14 @@ from typing import Final
 
 import numpy as np
 
-from relgym.classification.examples import Example
 from relgym.config.constants import EVIDENCE
 from relgym.model.calibration import MEMORY
 from relgym.model.parts import Parts
 from relgym.model.prediction import OUTCOMES, Outcome
-from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import TASK, Target
 from relgym.scheduling.agenda import Budget
 
-__all__ = ["recall", "remembered"]
+__all__ = ["recall"]
 
 _NO_MODE: Final = OUTCOMES.index(Outcome.NO_MODE)
 
@@ -57,7 +55,7 @@ def recall(parts: Parts, target: Target, rows: int, budget: Budget) -> None:
     slots = before[np.unique(np.linspace(0, len(before) - 1, RECALLED).astype(np.intp))]
     shares = weights[slots] * (weights[before].sum() / weights[slots].sum())
     for slot, share in zip(slots.tolist(), shares.tolist(), strict=True):
-        example, row = remembered(source, slot)
+        example, row = source.remembered(slot)
         signature = table.signatures[table.signature_ids[row]]
         own = next(
             k for k, c in enumerate(signature.columns) if c.slot == 0 and c.property == target.property
@@ -69,22 +67,3 @@ def recall(parts: Parts, target: Target, rows: int, budget: Budget) -> None:
     model.clusterer.stand_for(int(model.clusterer.labels[-1]), round(shares.sum()))
     if source.calibration.trials:  # somebody looks back
         model.calibration.stood_still(_NO_MODE, round(shares.sum()))
-
-
-def remembered(model: PropertyModel, slot: int) -> tuple[Example, int]:
-    """What a classifier remembers in a slot, next values left aside, and its row in the example table."""
-    kept = model.classifier.exemplars
-    c = kept.columns
-    k = int(c["exists"][slot].sum())
-    example = Example(
-        c["table"][slot][:, :k, :k],
-        c["unary"][slot][:, :k],
-        c["close"][slot][:k],
-        c["pair"][slot][:k],
-        c["own"][slot][: model.base_features],
-        int(c["target"][slot]),
-        kept.key_of(slot),
-        int(c["row"][slot]),
-        c["approached"][slot][:k],
-    )
-    return example, int(model.clusterer.rows[example.row])

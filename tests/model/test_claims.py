@@ -262,6 +262,8 @@ def test_modes_of_a_world_that_changed_take_no_part_in_the_vote(seed: int, tmp_p
     assert set(part.classifier.modes) == {mode.id for mode in part.modes} - old
     assert model.describe(details=True).count("has ended: others hold now") == 2
     assert model.describe().count("has ended: v' = ") == 2
+    steps = sum(branch.steps for branch in model.rules().properties[0].branches)
+    assert 0.9 * len(then) < steps <= len(then)  # of those before none goes by what holds now
     assert parse_rules(model.describe(digits=17)).properties[0].ended == model.rules().properties[0].ended
 
     model.save(path := f"{tmp_path}/model.json", history=True)

@@ -9,7 +9,7 @@ import pytest
 from points import schema_of, transitions
 
 from relgym.model.fitting import compare_and_learn
-from relgym.model.stillness import RECALLED, remembered
+from relgym.model.stillness import RECALLED
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
@@ -72,5 +72,5 @@ def test_what_is_remembered_is_what_was_seen() -> None:
     part = model.property_model("self", "v")
     table = model._parts.tables["self"]
     for slot in range(len(part.classifier.exemplars)):
-        example, row = remembered(part, slot)
+        example, row = part.remembered(slot)
         assert example.own[:2].tolist() == table.x[row, :2].tolist()

@@ -305,6 +305,9 @@ def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, .
         most = max(modes, key=lambda m: (_counts(part)[m], -m))
         return (_branch(part, (), most, functions, _counts(part)[most]),)
     view, weights, ranking = part.classifier.remembered()
+    if part.past:  # what followed functions that have ended follows none of these
+        labels = part.clusterer.labels[part.classifier.exemplars.rows.astype(np.intp)]
+        weights = np.where(np.isin(labels, list(part.past)), 0.0, weights)
     atoms = _atoms(part, view, functions)
     allowed = _allowed(part, view, ranking.modes[:, 0])
     truth = np.array([atom.truth for atom in atoms], dtype=np.bool_).T.reshape(len(view), len(atoms))

@@ -70,7 +70,7 @@ class PropertyModel:
     target
         What it predicts.
     vocabulary
-        Names of what its classifiers are shown, next values left aside.
+        Names of what its classifiers are shown, without what `conditions` adds.
     config
         Free parameters.
     schema
@@ -175,7 +175,7 @@ class PropertyModel:
             How many examples this one stands for.
         """
         x = table.x[row : row + 1]
-        seen = self._with_next(example, signature, x, len(self.clusterer.y))
+        seen = self._with_values(example, signature, x, len(self.clusterer.y))
         self._compare(signature, seen, x[0], y)
         report = self.clusterer.learn_one(table, row, y, budget)
         if weight > 1:
@@ -273,10 +273,10 @@ class PropertyModel:
         if np.isfinite(said):
             self.fallback.guesses.compare(said - y, binding.value(row) - y)
 
-    def _with_next(
+    def _with_values(
         self, example: Example, signature: SlotSignature, x: NDArray[np.float64], number: int = -1
     ) -> Example:
-        """An example by its number, with the next values that clauses may test, of a regression row ``(1, d)``."""
+        """An example by its number, with the values that `conditions` adds, of a regression row ``(1, d)``."""
         if not self.conditions.columns:
             return example.with_own(example.own, number)
         return example.with_own(
@@ -288,11 +288,6 @@ class PropertyModel:
         """Names, as clauses use them, of the numbers that are 1 or 0 as something holds or not."""
         others = {f"{t.name}.{prop}" for t in self.schema.types for prop in t.flags}
         return frozenset(others.union(self.schema.type(self.target.type).flags))
-
-    @property
-    def base_features(self) -> int:
-        """Number of own features that classifiers are shown, next values left aside."""
-        return len(self._base.own)
 
     def follow(self, table: ExampleTable) -> None:
         """The modes changed from outside: classifiers and spreads follow."""
@@ -315,6 +310,24 @@ class PropertyModel:
     def start_over(self, table: ExampleTable) -> None:
         """Learn all classifiers anew, of what they remember."""
         self._widen(table, self.classifier.vocabulary.follows)
+
+    def remembered(self, slot: int) -> tuple[Example, int]:
+        """What its classifiers remember in a slot, without what `conditions` adds, and its row in the example table."""
+        kept = self.classifier.exemplars
+        c = kept.columns
+        k = int(c["exists"][slot].sum())
+        example = Example(
+            c["table"][slot][:, :k, :k],
+            c["unary"][slot][:, :k],
+            c["close"][slot][:k],
+            c["pair"][slot][:k],
+            c["own"][slot][: len(self._base.own)],
+            int(c["target"][slot]),
+            kept.key_of(slot),
+            int(c["row"][slot]),
+            c["approached"][slot][:k],
+        )
+        return example, int(self.clusterer.rows[example.row])
 
     def remember(self, table: ExampleTable, example: Example, weight: float) -> None:
         """Let the classifiers remember one more of the examples there are, by its number in ``example.row``."""
@@ -541,7 +554,7 @@ class PropertyModel:
     def _shown(self, situation: Situation, x: NDArray[np.float64]) -> Example:
         """`example` without the key, by which examples are kept and not classified."""
         first = situation.examples[0]
-        return self._with_next(first, situation.signature, x) if self.conditions.columns else first
+        return self._with_values(first, situation.signature, x) if self.conditions.columns else first
 
     def predict_one(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Prediction:
         """Predict for one object of a single scene; the caller fills in names.
