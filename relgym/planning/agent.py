@@ -18,7 +18,7 @@ from relgym.envs.arguments import checked_count, checked_least
 from relgym.envs.dreams.rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
-from relgym.planning.doubts import DoubtedTask
+from relgym.planning.doubts import DoubtedTask, HopefulTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
 from relgym.planning.review import changed_at, learned_again, length, missed, mixed, right
@@ -192,7 +192,6 @@ class PlanningAgent:
         self._episodes: deque[int] = deque(maxlen=_REMEMBERED)
         self._begun = 0
         self._wrong: deque[bool] = deque(maxlen=_REMEMBERED)  # since the model took over
-        self._task_wrong: deque[bool] = deque(maxlen=_LATEST)
         self._at_random = True
         self._next_review = self._next_after_change = _FIRST_REVIEW
         self._size = Spread()
@@ -241,7 +240,7 @@ class PlanningAgent:
         if self._simulator is not None:
             simulator: Simulator = self._simulator(self.trainer)
         else:
-            task = cast(TaskFunctions, self._task())
+            task = cast(TaskFunctions, self._task(explores=explores))
             simulator = ModelSimulator(
                 self.model, self._like, view=self._recorder.view, task=task, repeat=self.repeat
             )
@@ -251,14 +250,14 @@ class PlanningAgent:
         objective, options = self._objective(explores=explores), {"safe": safe, "limit": self._limit}
         return Planner(simulator, self._search, objective, **options, **self._options)  # type: ignore[arg-type]
 
-    def _task(self) -> Any:
-        """What steps are worth in plans: as far as what was seen bears out what was learned of it."""
+    def _task(self, *, explores: bool) -> Any:
+        """What steps are worth: in expectation, or at best, as far as what was seen bears out what was learned of it."""
         own = self.trainer.reward_model
         if not isinstance(own, LearnedRewardModel):
             return own
         if self._doubted is None or self._doubted.model is not own:
             self._doubted = DoubtedTask(own, seed=self._seed)
-        return self._doubted
+        return HopefulTask(self._doubted) if explores and self.exploration > 0.0 else self._doubted
 
     def _objective(self, *, explores: bool) -> Objective:
         objective = Objective(discount=self.discount)
@@ -365,8 +364,7 @@ class PlanningAgent:
 
     def _take_up(self, real: Experience) -> None:
         """Learn from a real step."""
-        surplus, missed = self._surplus(self.trainer.reward_model, [real])
-        self._task_wrong.append(bool(missed[0]))
+        surplus, _ = self._surplus(self.trainer.reward_model, [real])
         self.trainer.take_up(real)
         self.steps += 1
         self._size.add(real.reward)
@@ -417,7 +415,7 @@ class PlanningAgent:
             own = missed(self.model, seen, episodes) + length(self.model)
             if (best := self._learned_again(seen, episodes, own)[0]) is not None:
                 self._adopt(best, seen, episodes)
-        if isinstance(self.trainer.reward_model, LearnedRewardModel) and any(self._task_wrong):
+        if isinstance(self.trainer.reward_model, LearnedRewardModel):
             self._review_task(self.trainer.reward_model)
 
     def _review_change(self) -> None:
@@ -504,10 +502,9 @@ class PlanningAgent:
             fresh.model.finish()
             wrong = self._missed(fresh, seen)
             if wrong.sum() < least:
-                best, least = (fresh, wrong), int(wrong.sum())
+                best, least = fresh, int(wrong.sum())
         if best is not None:
-            self.trainer.reward_model, wrong = best
-            self._task_wrong = deque(wrong[-_LATEST:].tolist(), maxlen=_LATEST)
+            self.trainer.reward_model = best
 
     def _missed(self, task: RewardModel, seen: Sequence[Experience]) -> NDArray[np.bool_]:
         """Of which steps a reward model is wrong about reward or end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -15,13 +16,13 @@ from relgym.numeric.version_space import VersionSpace
 from relgym.scene.objects import TASK, Float1D, Float2D, SceneLayout
 from relgym.wrappers.dyna.reward_models import LearnedRewardModel
 
-__all__ = ["DoubtedTask"]
+__all__ = ["DoubtedTask", "HopefulTask"]
 
 _RIGHT: Final = 1e-6
 """How far a right verdict may be off."""
 
 _LIKELY: Final = 0.5
-"""What always ended the episode does so where at least this share of the rules holds."""
+"""What always ended the episode does so where at least this share of the rules holds; and so much may be hoped for."""
 
 _REVIEW: Final = 10
 """Real steps after which the rules are drawn again at the latest, if no other mode was found and no episode ended."""
@@ -91,6 +92,15 @@ class DoubtedTask(RewardFunctions):
             worth += self._beyond.surplus * share
         return TaskOutcome(worth, ended, np.zeros(len(before), dtype=bool))
 
+    def claims(self, vectors: Float2D) -> Iterator[tuple[Float1D, VersionSpace, bool]]:
+        """Of each pair of modes: what it says n steps pay, the rules that tell where it holds, and whether it ends."""
+        for ends in (False, True):
+            modes, said = self.model.claims(vectors, np.full(len(vectors), ends))
+            numbers = [mode.id for mode in modes]
+            for (reward, _), group in self._groups.items():
+                if group.ends is ends and reward in numbers:
+                    yield said[:, numbers.index(reward)], group.rules, ends
+
     def _usual(self, vectors: Float2D, ended: NDArray[np.bool_]) -> Float1D:
         """The median of what all modes of the reward say of n steps, by their examples; NaN if there is no mode."""
         modes, said = self.model.claims(vectors, ended)
@@ -134,7 +144,8 @@ class DoubtedTask(RewardFunctions):
             rules = VersionSpace(features[mine & right], features[false], rng=self._rng)
             if rules.found:
                 wrong = paid[mine & ~right]
-                self._groups[reward, end] = _Group(rules, float(wrong.mean()) if len(wrong) else np.inf)
+                otherwise = float(wrong.mean()) if len(wrong) else np.inf
+                self._groups[reward, end] = _Group(rules, otherwise, ends_so)
         self._beyond = None
         if (most := float(surplus.max(initial=0.0))) > _RIGHT:
             # What is paid in several places for several reasons isn't told apart from the rest by one rule.
@@ -146,10 +157,11 @@ class DoubtedTask(RewardFunctions):
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """A pair of modes: rules that tell where it holds, and what was paid on average where it was wrong."""
+    """A pair of modes: rules that tell where it holds, what was paid on average where it was wrong, whether it ends."""
 
     rules: VersionSpace
     otherwise: float
+    ends: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,3 +171,35 @@ class _Beyond:
     rules: VersionSpace
     surplus: float
     ends: bool
+
+
+class HopefulTask(RewardFunctions):
+    """The same model's word of how much a step may pay at best: for agents that look for what pays.
+
+    Where two modes may hold and no step has shown which, such as a stop just short of the goal, where the bonus is
+    known to be paid, and one just beyond it, expectation keeps an agent from ever finding out. So a step is worth as
+    much as any mode says of which at least half the rules hold that fit all examples; each stop that pays less rules
+    some of them out (optimism in the face of uncertainty: Brafman and Tennenholtz 2002).
+
+    Parameters
+    ----------
+    expected
+        Says what steps are worth in expectation; live.
+    """
+
+    learned: Final = True
+
+    def __init__(self, expected: DoubtedTask) -> None:
+        self._expected = expected
+
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
+        """The most that n steps may pay, and the ends that go with it."""
+        own = self._expected
+        expected = own.evaluate(layout, before, actions, after)
+        vectors = own.model.joined(layout, before, actions, after)
+        rewards, ended = expected.rewards.copy(), expected.terminated.copy()
+        for claim, rules, over in own.claims(vectors):
+            more = np.flatnonzero(~(claim <= rewards + _RIGHT))
+            more = more[rules.share(vectors[more]) >= _LIKELY]
+            rewards[more], ended[more] = claim[more], over
+        return TaskOutcome(rewards, ended, expected.succeeded)

@@ -143,7 +143,6 @@ def test_orders_are_tried_until_two_come_to_the_same(
     monkeypatch.setattr(planning_agent, "length", lambda _: next(told))
     made._next_review = 10**9
     made._wrong.append(True)
-    made._task_wrong.clear()
     made._review()
     assert called == lessons and next(told, None) is None
 
