@@ -63,6 +63,14 @@ Names = Annotated[
 ]
 
 
+def _version(asked: bool) -> None:
+    if asked:
+        import relgym
+
+        print(f"relgym {relgym.__version__}")
+        raise typer.Exit
+
+
 @app.callback()
 def main(
     modules: Annotated[
@@ -73,6 +81,9 @@ def main(
             help="Import a module first, which registers envs or features; repeatable.",
         ),
     ] = None,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
 ) -> None:
     """Learn readable models of what actions do, and ask, test and print them."""
     if modules:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+import relgym
 from relgym.cli import app
 from relgym.experiments import demo
 from relgym.model.world_model import WorldModel
@@ -21,6 +24,14 @@ def run(*arguments: Any, code: int = 0) -> str:
     result = RUNNER.invoke(app, [str(a) for a in arguments], prog_name="relgym")
     assert result.exit_code == code, result.output
     return result.stdout if code == 0 else result.output
+
+
+def test_it_tells_its_version_and_runs_as_a_module() -> None:
+    assert run("--version") == f"relgym {relgym.__version__}\n"
+    told = subprocess.run(
+        [sys.executable, "-m", "relgym", "--version"], capture_output=True, text=True, check=True
+    )
+    assert told.stdout == f"relgym {relgym.__version__}\n"
 
 
 @pytest.fixture(scope="module")

@@ -251,7 +251,7 @@ class PlanningAgent:
         return Planner(simulator, self._search, objective, **options, **self._options)  # type: ignore[arg-type]
 
     def _task(self, *, explores: bool) -> Any:
-        """What steps are worth: in expectation, or at best, as far as what was seen bears out what was learned of it."""
+        """What steps are worth in plans, as far as what was seen bears it out: in expectation, or at best."""
         own = self.trainer.reward_model
         if not isinstance(own, LearnedRewardModel):
             return own

@@ -39,7 +39,9 @@ def taught(stops: list[float], rng: np.random.Generator, *, drives: int = 150) -
     return model
 
 
-def expected(model: LearnedRewardModel | DoubtedTask | HopefulTask, places: list[float], after: float = 0.0) -> Float1D:
+def expected(
+    model: LearnedRewardModel | DoubtedTask | HopefulTask, places: list[float], after: float = 0.0
+) -> Float1D:
     """Of coming to these places at that speed."""
     states: Float2D = np.array([[x, after] for x in places])
     before = np.array([[x - after, 2.0] for x in places])
