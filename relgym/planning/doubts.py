@@ -76,7 +76,8 @@ class DoubtedTask(RewardFunctions):
         share, least = known.astype(np.float64), np.full(len(vectors), np.inf)
         for pair, group in self._groups.items():
             rows = np.flatnonzero(known & (modes[:, 0] == pair[0]) & (modes[:, 1] == pair[1]))
-            share[rows], least[rows] = group.rules.share(vectors[rows]), group.otherwise
+            if len(rows):
+                share[rows], least[rows] = group.rules.share(vectors[rows]), group.otherwise
         worth = rewards.copy()
         doubtful = np.flatnonzero(share < 1.0)
         if len(doubtful):
@@ -200,6 +201,7 @@ class HopefulTask(RewardFunctions):
         rewards, ended = expected.rewards.copy(), expected.terminated.copy()
         for claim, rules, over in own.claims(vectors):
             more = np.flatnonzero(~(claim <= rewards + _RIGHT))
-            more = more[rules.share(vectors[more]) >= _LIKELY]
-            rewards[more], ended[more] = claim[more], over
+            if len(more):
+                more = more[rules.share(vectors[more]) >= _LIKELY]
+                rewards[more], ended[more] = claim[more], over
         return TaskOutcome(rewards, ended, expected.succeeded)

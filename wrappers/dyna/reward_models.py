@@ -144,7 +144,7 @@ class LearnedRewardModel(RewardFunctions):
         self._passed = 0
         self._rng = np.random.default_rng(0)
         self._claimants: tuple[int, tuple[Mode, ...], list[list[tuple[int, float]]]] | None = None
-        self._places: tuple[SceneLayout, dict[str, NDArray[np.intp]]] | None = None
+        self._places: tuple[SceneLayout, NDArray[np.intp]] | None = None
         self._together: set[tuple[int, int]] = set()
         self._reviewed: tuple[int, tuple[int, ...]] = (0, ())
 
@@ -317,10 +317,12 @@ class LearnedRewardModel(RewardFunctions):
 
     def joined(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> Float2D:
         """State vectors of its own model, of n steps: what `outcomes` takes."""
-        small = self.model.schema.layout()
-        vectors = np.zeros((len(before), small.width))
-        for k, name in enumerate(small.names):
-            vectors[:, small.slice(k)] = self._part(name, layout, before, actions, after)
+        parts = [before, after, np.zeros((len(before), 1))]
+        if self._action:
+            acting = self._acting or partial(acting_all, self.schema)
+            whole, joined = acting(layout, before, actions)
+            parts.append(joined[:, whole.slice(whole.index(ACTION))])
+        vectors: Float2D = np.concatenate(parts, axis=1).take(self._columns(layout), axis=1)
         return vectors
 
     def outcomes(self, vectors: Float2D) -> tuple[Float1D, NDArray[np.bool_], NDArray[np.int64]]:
@@ -337,9 +339,10 @@ class LearnedRewardModel(RewardFunctions):
         """
         small = self.model.schema.layout()
         found = self.model.predict_batch(small, self.unsaid(vectors))
-        known = found.ok & self._ever_together(found)
+        pairs = _pairs(found)
+        known = found.ok & self._ever_together(pairs)
         reward, ended = (found.vectors[:, column] for column in self._told_columns())
-        return np.where(known, reward, np.nan), (ended > 0.5) & known, _pairs(found)
+        return np.where(known, reward, np.nan), (ended > 0.5) & known, pairs
 
     def claims(self, vectors: Float2D, ended: NDArray[np.bool_]) -> tuple[tuple[Mode, ...], Float2D]:
         """What each mode of the reward says of n steps, whether it holds there or not.
@@ -398,15 +401,14 @@ class LearnedRewardModel(RewardFunctions):
         small = self.model.schema.layout()
         return [small.column(small.index(TASK), prop) for prop in _TOLD]
 
-    def _ever_together(self, found: BatchPrediction) -> NDArray[np.bool_]:
-        """Where reward and termination come from modes that were right of one and the same real step."""
+    def _ever_together(self, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which modes of reward and termination were right of one and the same real step; shape ``(n,)``."""
         seen, modes = self._reviewed
         # Their ids alone: how many examples each has would be counted anew for every batch.
         learners = [self.model.property_model(TASK, prop).clusterer for prop in _TOLD]
         now = tuple(number for learner in learners for number in sorted(learner.clusters))
         if self.model.seen >= seen + _REVIEW or now != modes:
             self._reviewed, self._together = (self.model.seen, now), self._right_together()
-        pairs = _pairs(found)
         together = np.zeros(len(pairs), dtype=np.bool_)
         for reward, ended in self._together:
             together |= (pairs[:, 0] == reward) & (pairs[:, 1] == ended)
@@ -422,28 +424,20 @@ class LearnedRewardModel(RewardFunctions):
         right = found.ok & (np.abs(found.vectors - said)[:, columns] <= _RIGHT).all(axis=1)
         return set(map(tuple, _pairs(found)[right].tolist()))
 
-    def _part(
-        self, name: str, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D
-    ) -> NDArray[np.float64]:
-        """The properties of one of the reward model's objects, shape ``(n, …)``."""
-        if name == TASK:
-            return np.zeros((len(before), 2))
-        if name == ACTION:
-            acting = self._acting or partial(acting_all, self.schema)
-            whole, joined = acting(layout, before, actions)
-            return joined[:, whole.slice(whole.index(ACTION))]
-        vectors = after if name == _NEXT else before
-        found: NDArray[np.float64] = vectors[:, self._columns(layout)[name]]
-        return found
-
-    def _columns(self, layout: SceneLayout) -> dict[str, NDArray[np.intp]]:
-        """Where in a layout what moves and what stays lies; steps of one layout are evaluated again and again."""
+    def _columns(self, layout: SceneLayout) -> NDArray[np.intp]:
+        """Where the numbers of its own scenes lie among those of a step: before, after, a zero, and the action."""
         if self._places is None or self._places[0] is not layout:
-            found = {
-                name: np.array([layout.column(layout.index(o), prop) for o, prop in pairs], dtype=np.intp)
-                for name, pairs in self._held.items()
-            }
-            self._places = layout, found
+            zero = 2 * layout.width
+            found: list[int] = []
+            for name in self.model.schema.layout().names:
+                if name == TASK:
+                    found += [zero] * len(_TOLD)
+                elif name == ACTION:
+                    found += range(zero + 1, zero + 1 + len(self._action))
+                else:
+                    first = layout.width if name == _NEXT else 0
+                    found += [first + layout.column(layout.index(o), prop) for o, prop in self._held[name]]
+            self._places = layout, np.array(found, dtype=np.intp)
         return self._places[1]
 
 
